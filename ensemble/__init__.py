@@ -1,0 +1,1 @@
+"""Ensembles of loops over (Hurst exponent, work of adhesion, realisation): tasks, ranks, files."""

@@ -1,0 +1,115 @@
+"""Jumps: where a contact state loses its stability, and what happens to its patches.
+
+The kinds, in the order in which one that fits is chosen (a jump may run through several events):
+
+``pull-off``    the last contact is lost.
+``snap-in``     a patch appears where there was none.
+``merging``     two or more patches become one.
+``vanishing``   a patch is lost while others stay.
+``splitting``   a patch becomes two.
+``spreading``   edges run outwards, the patches stay the same ones.
+``receding``    edges run inwards, the patches stay the same ones.
+
+Spreading and receding are the small-scale mechanism (an edge runs inside one patch, over the
+roughness under it); the others are the large-scale mechanism (patches come and go).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from solver.profile import Array
+
+JumpKind = Literal[
+    "pull-off", "snap-in", "merging", "vanishing", "splitting", "spreading", "receding"
+]
+JUMP_KINDS: tuple[JumpKind, ...] = get_args(JumpKind)
+SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
+
+
+@dataclass(frozen=True)
+class Jump:
+    """One jump at fixed separation.
+
+    Attributes
+    ----------
+    branch : {"loading", "unloading"}
+    separation : float
+        s at which stability is lost, in m.
+    energy_drop : float
+        U before minus U after, per unit nominal area, in J/m²; not negative.
+    kind : JumpKind
+    patches_before, patches_after : int
+    contact_before, contact_after : float
+        Contact fractions.
+    patch_length : float
+        Length in m of the largest patch that the jump changed, on the side where it is larger.
+    """
+
+    branch: Literal["loading", "unloading"]
+    separation: float
+    energy_drop: float
+    kind: JumpKind
+    patches_before: int
+    patches_after: int
+    contact_before: float
+    contact_after: float
+    patch_length: float
+
+    @property
+    def small_scale(self) -> bool:
+        """Whether edges only ran inside existing patches."""
+        return self.kind in SMALL_SCALE
+
+
+def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, float]:
+    """Kind of a jump, and the length of the largest patch that it changed.
+
+    Parameters
+    ----------
+    before, after : array, shape (patches, 2)
+        Edges in m, as in :class:`~solver.method.ContactState`.
+    period : float
+        λ in m.
+    """
+    if len(after) == 0:
+        longest = float((before[:, 1] - before[:, 0]).max()) if len(before) else 0.0
+        return "pull-off", longest
+    touches = [_overlapping(patch, after, period) for patch in before]
+    touched = [_overlapping(patch, before, period) for patch in after]
+    moved = [
+        b - a
+        for mine, other, hits in ((before, after, touches), (after, before, touched))
+        for (a, b), hit in zip(mine, hits, strict=True)
+        if len(hit) != 1 or not _same((a, b), other[hit[0]], period)
+    ]
+    length = float(max(moved, default=0.0))
+    if any(len(hit) == 0 for hit in touched):
+        return "snap-in", length
+    if any(len(hit) > 1 for hit in touched):
+        return "merging", length
+    if any(len(hit) == 0 for hit in touches):
+        return "vanishing", length
+    if any(len(hit) > 1 for hit in touches):
+        return "splitting", length
+    grown = (after[:, 1] - after[:, 0]).sum() - (before[:, 1] - before[:, 0]).sum()
+    return ("spreading" if grown >= 0 else "receding"), length
+
+
+def _overlapping(patch: Array, others: Array, period: float) -> list[int]:
+    """Indices of ``others`` that share a point with ``patch`` on the circle."""
+    a, b = patch
+    return [
+        k
+        for k, (c, d) in enumerate(others)
+        if any(a < d + shift and c + shift < b for shift in (-period, 0.0, period))
+    ]
+
+
+def _same(one: tuple[float, float], two: Array, period: float) -> bool:
+    """Whether two patches have the same edges on the circle."""
+    offset = (one[0] - two[0] + period / 2) % period - period / 2
+    return abs(offset) < 1e-12 * period and abs((one[1] - one[0]) - (two[1] - two[0])) < (
+        1e-12 * period
+    )

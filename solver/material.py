@@ -1,0 +1,39 @@
+"""The elastic half-space under plane strain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """Linear elastic, homogeneous, isotropic half-space in plane strain.
+
+    Parameters
+    ----------
+    young : float
+        Young's modulus E, in Pa, positive.
+    poisson : float
+        Poisson's ratio ν, -1 < ν ≤ 0.5.
+
+    Raises
+    ------
+    ValueError
+        If a value breaks the rules above.
+    """
+
+    young: float
+    poisson: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.young) and self.young > 0):
+            raise ValueError(f"young is {self.young!r}: it must be positive and finite, in Pa")
+        if not -1 < self.poisson <= 0.5:
+            raise ValueError(f"poisson is {self.poisson!r}: it must lie in (-1, 0.5]")
+
+    @property
+    def modulus(self) -> float:
+        """E* = E/(1 - ν²), in Pa."""
+        return self.young / (1 - self.poisson**2)

@@ -1,0 +1,64 @@
+"""The scene of one loop: a rough rigid profile, an elastic half-space, a work of adhesion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.material import HalfSpace
+from solver.profile import Profile
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
+
+    Parameters
+    ----------
+    profile : Profile
+        Not flat.
+    half_space : HalfSpace
+    work_of_adhesion : float
+        γ in J/m², finite, not negative (γ = 0 is contact without adhesion).
+
+    Raises
+    ------
+    ValueError
+        If γ breaks the rule, or the profile is flat: two flat surfaces touch everywhere at once,
+        and a penetration in units of h_max has no meaning.
+    """
+
+    profile: Profile
+    half_space: HalfSpace
+    work_of_adhesion: float
+
+    def __post_init__(self) -> None:
+        gamma = self.work_of_adhesion
+        if not (np.isfinite(gamma) and gamma >= 0):
+            raise ValueError(
+                f"work_of_adhesion is {gamma!r}: it must be finite and not negative, in J/m²"
+            )
+        if self.profile.is_flat:
+            raise ValueError(
+                "the profile is flat (h_max = 0): two flat surfaces touch everywhere at once and "
+                "a penetration in units of h_max has no meaning"
+            )
+
+    @property
+    def stress_scale(self) -> float:
+        """E* q0 h_max / 2 in Pa: the mean stress is σ~ times this (the paper's σ~)."""
+        return 0.5 * self.half_space.modulus * self.profile.q0 * self.profile.h_max
+
+    @property
+    def loss_scale(self) -> float:
+        """E* q0 h_max² / 2 in J/m²: a loss per nominal area is W~ times this, W~ = ∮ σ~ dΔ~."""
+        return self.stress_scale * self.profile.h_max
+
+    def separation(self, penetration: float) -> float:
+        """Separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""
+        return self.profile.h_max * (1.0 - penetration)
+
+    def penetration(self, separation: float) -> float:
+        """Penetration Δ~ = 1 - s/h_max at the separation s in m."""
+        return 1.0 - separation / self.profile.h_max
