@@ -1,0 +1,42 @@
+# make help lists what there is. tools/setup.sh does nothing when nothing has changed.
+.DEFAULT_GOAL := help
+.PHONY: help setup setup-test run test lint bench clean lock
+SHELL := /bin/bash
+bin := .venv/bin
+# Extra arguments for pytest, as in: make test ARGS='-k loop'
+ARGS :=
+CAMPAIGN := jobs/example.toml
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
+
+setup:  ## everything that hysteron needs, into .venv (HYSTERON_APT=no: no system packages)
+	@tools/setup.sh
+
+setup-test:
+	@tools/setup.sh --slurm
+
+run: setup  ## the example campaign on all cores, then its report (CAMPAIGN=file.toml for another)
+	@jobs/local.sh $(CAMPAIGN)
+
+lint: setup  ## ruff and mypy
+	$(bin)/ruff check .
+	$(bin)/mypy
+
+test: setup-test  ## the whole test suite, MPI and (where it can be installed) Slurm included
+	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
+	    export MPIRUN && exec $(bin)/python -m pytest $(ARGS)
+
+bench: setup  ## speed against error of each method
+	$(bin)/hysteron bench
+
+lock: setup  ## requirements.lock from the versions in .venv
+	@{ sed '/^[^#]/d' requirements.lock; \
+	    $(bin)/pip freeze --all --exclude-editable | grep -vE '^(pip|wheel|mpich|h5py)\b'; \
+	    $(bin)/python -c 'import h5py; print(f"h5py=={h5py.__version__}")'; } > .setup/lock
+	mv .setup/lock requirements.lock
+
+clean:  ## removes .venv, caches and the example's results; built wheels stay in .setup
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info \
+	    out/example out/example.h5
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,311 @@
+#!/usr/bin/env bash
+# Sets up everything that `make run` and `make test` need, in .venv of this checkout.
+#
+#   tools/setup.sh            MPI, parallel HDF5, Python packages, hysteron itself
+#   tools/setup.sh --slurm    besides, as root on Debian or Ubuntu, the Slurm that tests/test_slurm.py starts
+#
+# Does nothing if nothing has changed since the last time. Environment:
+#   PYTHON            the interpreter for .venv (default: python3)
+#   HDF5_DIR          a parallel HDF5 to build h5py against (default: looked for)
+#   HYSTERON_APT=no   never install system packages
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$root"
+venv=$root/.venv
+log=$root/.setup/setup.log
+stamp=$venv/hysteron-setup
+slurm=no
+if [ "${1:-}" = --slurm ]; then slurm=yes; fi
+SECONDS=0
+warnings=()
+
+H5PY=$(sed -n "s/^h5py==//p" requirements.lock)
+MPICH=5.0.2
+SYSTEM="gcc libc6-dev openmpi-bin libopenmpi-dev libhdf5-openmpi-dev"
+SLURM="slurmctld slurmd slurm-client munge"
+
+. tools/mpi.sh
+
+say() { printf 'setup: %s\n' "$*"; }
+warn() {
+    warnings+=("$*")
+    say "warning: $*"
+}
+die() {
+    say "failed: $*" >&2
+    exit 1
+}
+# step TEXT COMMAND…: one line with the time it took; its output goes to the log.
+step() {
+    local text=$1 start=$SECONDS
+    shift
+    printf 'setup: %s ... ' "$text"
+    if "$@" >>"$log" 2>&1; then
+        printf '%d s\n' $((SECONDS - start))
+    else
+        printf 'failed after %d s\n' $((SECONDS - start))
+        return 1
+    fi
+}
+# required TEXT COMMAND…: a step without which there is no installation.
+required() {
+    if ! step "$@"; then
+        tail -n 25 "$log" >&2
+        die "$1 (all of it in $log)"
+    fi
+}
+
+# ---------------------------------------------------------------------------------- what is here
+
+can_apt() {
+    [ "${HYSTERON_APT:-yes}" != no ] && [ "$(id -u)" = 0 ] && [ -e /etc/debian_version ] &&
+        command -v apt-get >/dev/null
+}
+
+find_python() {
+    local name
+    for name in "${PYTHON:-python3}" python3.13 python3.12 python3.11; do
+        if "$name" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+            python=$(command -v "$name")
+            return 0
+        fi
+        if [ -n "${PYTHON:-}" ]; then break; fi
+    done
+    return 1
+}
+has_venv() { "$python" -c 'import ensurepip, venv' 2>/dev/null; }
+has_headers() {
+    "$python" -c 'import os, sysconfig as s, sys
+sys.exit(not os.path.exists(os.path.join(s.get_path("include"), "Python.h")))'
+}
+
+is_parallel() { # DIR: does it hold an HDF5 that was built with MPI?
+    local header
+    for header in "$1/include/H5pubconf.h" "$1/include/H5pubconf-64.h"; do
+        if grep -Eqs '^#define +H5_HAVE_PARALLEL +1' "$header" && [ -d "$1/lib" ]; then return 0; fi
+    done
+    return 1
+}
+# Sets hdf5 (directory) and compiler; returns 1 if there is no parallel HDF5 or no MPI compiler.
+find_parallel_hdf5() {
+    local triplet dir flavour
+    hdf5='' compiler=''
+    if [ -n "${HDF5_DIR:-}" ]; then
+        if ! is_parallel "$HDF5_DIR"; then return 1; fi
+        hdf5=$HDF5_DIR
+    else
+        # A cluster's module first: its compiler wrapper is in PATH and knows where it is.
+        for flavour in h5pcc h5cc; do
+            if [ -n "$hdf5" ] || ! command -v $flavour >/dev/null; then continue; fi
+            dir=$($flavour -showconfig 2>/dev/null |
+                sed -n 's/^ *Installation point: *//p' | head -n 1) || true
+            if [ -n "$dir" ] && is_parallel "$dir"; then hdf5=$dir; fi
+        done
+        for flavour in hdf5-openmpi hdf5-mpich hdf5; do
+            if [ -n "$hdf5" ] || ! command -v pkg-config >/dev/null; then continue; fi
+            dir=$(pkg-config --variable=prefix $flavour 2>/dev/null) || true
+            if [ -n "$dir" ] && is_parallel "$dir"; then hdf5=$dir; fi
+        done
+        # Debian and Ubuntu keep one directory for each MPI.
+        triplet=$(gcc -dumpmachine 2>/dev/null) || true
+        for flavour in openmpi mpich; do
+            dir=/usr/lib/$triplet/hdf5/$flavour
+            if [ -z "$hdf5" ] && is_parallel "$dir"; then hdf5=$dir; fi
+        done
+    fi
+    compiler=mpicc
+    case $hdf5 in
+        */hdf5/openmpi) compiler=mpicc.openmpi ;;
+        */hdf5/mpich) compiler=mpicc.mpich ;;
+    esac
+    [ -n "$hdf5" ] && command -v "$compiler" >/dev/null
+}
+has_mpi() { command -v mpirun >/dev/null || command -v mpiexec >/dev/null; }
+
+key() {
+    cat pyproject.toml requirements.lock tools/setup.sh tools/mpi.sh
+    # Another place, interpreter or MPI module is another installation.
+    printf '%s\n' "$root" "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" \
+        "$(command -v mpicc)" "${HDF5_DIR:-}"
+}
+digest() { key | sha256sum | cut -d ' ' -f 1; }
+
+slurm_ready() { [ "$slurm" = no ] || command -v slurmctld >/dev/null || ! can_apt || [ -e .setup/no-slurm ]; }
+
+if find_python && [ -x "$venv/bin/hysteron" ] && [ -e "$stamp" ] &&
+    [ "$(cat "$stamp")" = "$(digest)" ] && slurm_ready; then
+    say "nothing to do"
+    exit 0
+fi
+mkdir -p .setup/wheels
+: >"$log"
+
+# ------------------------------------------------------------------------------- system packages
+
+# missing PACKAGE…: those that dpkg does not have
+missing() {
+    local package
+    for package; do
+        if [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" != installed ]; then
+            printf '%s ' "$package"
+        fi
+    done
+}
+apt_install() { # RUNLEVEL=1: install, but start no service
+    export DEBIAN_FRONTEND=noninteractive RUNLEVEL=1
+    apt-get install -y --no-install-recommends "$@" </dev/null ||
+        { apt-get update && apt-get install -y --no-install-recommends "$@" </dev/null; }
+}
+system_packages() {
+    local wanted=''
+    if ! find_python; then wanted="python3 python3-venv python3-dev"; fi
+    if [ -n "${python:-}" ] && [[ $python = /usr/bin/* ]]; then
+        # Debian's own interpreter comes without these; pyenv, conda and modules bring them along.
+        if ! has_venv; then wanted+=" $(basename "$python")-venv"; fi
+        if ! has_headers; then wanted+=" $(basename "$python")-dev"; fi
+    fi
+    if ! find_parallel_hdf5 || ! has_mpi; then wanted+=" $SYSTEM"; fi
+    wanted=$(missing $wanted)
+    if [ -n "$wanted" ]; then
+        step "system packages: ${wanted% }" apt_install $wanted || warn "apt-get could not install ${wanted% }"
+    fi
+}
+
+if can_apt; then system_packages; fi
+find_python || die "Python 3.11 or newer is missing (say which with PYTHON=…)"
+has_venv || die "the venv module of $python is missing (Debian: apt-get install python3-venv)"
+
+# --------------------------------------------------------------------------------- what to build
+
+why_serial=
+if ! find_parallel_hdf5; then
+    if [ -n "${HDF5_DIR:-}" ]; then
+        why_serial="HDF5_DIR=$HDF5_DIR is no parallel HDF5, or mpicc is not in PATH"
+    else
+        why_serial="no parallel HDF5 with its mpicc found (Debian: libhdf5-openmpi-dev; cluster: load its modules or set HDF5_DIR)"
+    fi
+elif ! has_headers; then
+    why_serial="the C headers of $python are missing (Debian: python3-dev)"
+fi
+if ! has_mpi; then why_serial=${why_serial:-"no mpirun in PATH"}; fi
+
+# ------------------------------------------------------------------------------- Python packages
+
+say "using $("$python" -V) ($python)"
+if [ -x "$venv/bin/python" ] &&
+    [ "$("$venv/bin/python" -c 'import sys; print(sys.version, sys.base_prefix)' 2>/dev/null)" != \
+        "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" ]; then
+    say "replacing .venv, which belongs to another Python"
+    rm -rf "$venv"
+fi
+if [ ! -x "$venv/bin/pip" ] || ! "$venv/bin/python" -m pip --version >/dev/null 2>&1; then
+    required "virtual environment .venv" "$python" -m venv "$venv"
+fi
+rm -f "$stamp"
+# Not the launcher's and not another installation's: what is in .venv is what is meant.
+unset PYTHONPATH PYTHONHOME
+export PIP_DISABLE_PIP_VERSION_CHECK=1
+pip() { "$venv/bin/python" -m pip --no-input "$@"; }
+locked() { grep -E "^($1)==" requirements.lock; }
+
+build_h5py() {
+    # Two compile jobs and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
+    # Without isolation, or the build would first compile an old mpi4py from source.
+    local config=$root/.setup/build.cfg
+    printf '[build_ext]\nparallel = 2\n' >"$config"
+    DIST_EXTRA_CONFIG=$config CC=$compiler HDF5_MPI=ON HDF5_DIR=$hdf5 CFLAGS='-O1 -g0 -w' \
+        "$venv/bin/python" -m pip --no-input wheel --no-cache-dir --no-build-isolation --no-deps \
+        --no-binary=h5py --wheel-dir "$wheels.new" "h5py==$H5PY" &&
+        rm -rf "$wheels" && mv "$wheels.new" "$wheels"
+}
+
+required "Python packages: build tools" pip install --quiet $(locked 'setuptools|Cython|numpy|pkgconfig|packaging|mpi4py')
+build=
+if [ -z "$why_serial" ]; then
+    # One folder for each combination: a serial wheel or one of another MPI must not be taken for it.
+    wheels=.setup/wheels/$({
+        "$venv/bin/python" -c 'import sys, numpy; print(sys.version, numpy.__version__)'
+        echo "$H5PY" "$hdf5" "$compiler"
+        "$compiler" -show 2>/dev/null
+        grep -Es 'define H5_VERS_INFO' "$hdf5/include/H5public.h"
+        "${MPIRUN:-mpirun}" --version 2>/dev/null | head -n 1
+    } | sha256sum | cut -c 1-12)
+    if compgen -G "$wheels/h5py-*.whl" >/dev/null; then
+        say "h5py for $hdf5: built before, in $wheels"
+    else
+        say "h5py for $hdf5: building in the background (1-4 min)"
+        rm -rf "$wheels.new"
+        start=$SECONDS
+        build_h5py >.setup/h5py.log 2>&1 &
+        build=$!
+    fi
+fi
+required "Python packages: the rest of requirements.lock" pip install --quiet $(grep -Ev '^(#|h5py==)' requirements.lock)
+
+if [ -n "$build" ]; then
+    printf 'setup: h5py ... '
+    if wait "$build"; then
+        printf '%d s\n' $((SECONDS - start))
+    else
+        printf 'failed\n'
+        tail -n 15 .setup/h5py.log
+        why_serial="h5py could not be built against $hdf5 (see .setup/h5py.log)"
+    fi
+fi
+install_h5py() { # WHAT… from a wheel, whatever is installed now
+    pip install --quiet --no-deps --force-reinstall "$@"
+}
+has_mpi_h5py() { "$venv/bin/python" -c 'import h5py, sys; sys.exit(not h5py.get_config().mpi)' 2>>"$log"; }
+if [ -z "$why_serial" ]; then
+    step "installing h5py with parallel HDF5" install_h5py "$wheels"/h5py-*.whl || true
+    has_mpi_h5py || why_serial="the h5py in $wheels has no MPI or cannot be loaded"
+fi
+if [ -n "$why_serial" ]; then
+    required "installing h5py without MPI" install_h5py --only-binary=h5py "h5py==$H5PY"
+fi
+if ! has_mpi; then
+    step "no mpirun in PATH: one from the package mpich" pip install --quiet "mpich==$MPICH" ||
+        warn "no MPI: install one (Debian: openmpi-bin); hysteron run works in one process only"
+fi
+required "hysteron, editable" pip install --quiet --no-deps --no-build-isolation --editable .
+
+# ----------------------------------------------------------------- the mpirun that fits, and Slurm
+
+sees_two() { # MPIRUN: do two ranks that it starts see each other?
+    local sizes
+    sizes=$(
+        MPIRUN=$1
+        allow_ranks 2 1
+        cd /tmp && timeout 60 "$1" -n 2 "$venv/bin/python" -c \
+            'from mpi4py import MPI; print(MPI.COMM_WORLD.size, flush=True)' </dev/null 2>>"$log"
+    ) || return 1
+    [ "$(printf '%s\n' "$sizes" | sort -u)" = 2 ]
+}
+choose_launcher() {
+    local name path
+    rm -f "$venv/mpirun"
+    for name in ${MPIRUN:-} "$venv/bin/mpirun" mpirun mpiexec mpirun.openmpi mpirun.mpich; do
+        path=$(command -v "$name") || continue
+        if sees_two "$path"; then
+            printf '%s\n' "$path" >"$venv/mpirun"
+            return 0
+        fi
+    done
+    return 1
+}
+step "two ranks that see each other" choose_launcher ||
+    warn "no mpirun here starts ranks that mpi4py sees as one job: hysteron run works in one process only (hysteron doctor tells more)"
+
+if [ "$slurm" = yes ] && can_apt && ! command -v slurmctld >/dev/null; then
+    if ! step "system packages for the test of the batch script: $SLURM" apt_install $SLURM; then
+        # Tried once: the test is skipped and says so, and set-up stays quick.
+        touch .setup/no-slurm
+    fi
+fi
+
+if [ -n "$why_serial" ]; then
+    warn "no parallel writing, rank 0 writes the results file: $why_serial"
+fi
+digest >"$stamp"
+say "done in $SECONDS s (hysteron doctor tells what was found)"
