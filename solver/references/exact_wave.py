@@ -1,0 +1,131 @@
+"""The single wave as a method: Johnson's closed form behind the contract of a method.
+
+An oracle. It runs the loading path and the audit (:mod:`solver.loop`) with a solution that is exact
+to rounding, so whatever error is left belongs to them, and other methods can be held against it
+state by state. For a single wave only; the adhesive area is measured along the profile, as
+:class:`~solver.problem.Problem` defines it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from solver.jumps import Jump, classify
+from solver.method import Branch, ContactState, Fields, Method, Path
+from solver.problem import Problem
+from solver.profile import Array
+from solver.references.single_wave import SingleWave
+
+
+class ExactWave(Method):
+    """Johnson's single wave as a :class:`~solver.method.Method`.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its profile must be one wave over the whole period (harmonic 1 only).
+    states_per_step : int
+        States that ``follow`` returns along the branch, evenly spaced in the contact half-width,
+        in which p̄ and s are smooth even at the fold.
+
+    Raises
+    ------
+    ValueError
+        If the profile is not a single wave.
+    """
+
+    name: ClassVar[str] = "exact wave"
+
+    def __init__(self, problem: Problem, *, states_per_step: int = 32) -> None:
+        super().__init__(problem)
+        if problem.profile.highest_harmonic != 1:
+            raise ValueError("the exact wave needs a profile of harmonic 1 alone")
+        self.states_per_step = states_per_step
+        self.crest, amplitude = problem.profile.highest_point
+        self.wave = SingleWave(
+            amplitude,
+            problem.profile.period,
+            problem.half_space.modulus,
+            problem.work_of_adhesion,
+            measure="arc",
+        )
+
+    def follow(self, state: ContactState, separation: float) -> Path:
+        """Follow the stable branch; see :class:`~solver.method.Method`."""
+        branch: Branch = "loading" if separation <= state.separation else "unloading"
+        states: list[ContactState] = []
+        jumps: list[Jump] = []
+        if not state.patches:
+            if separation > self.wave.amplitude or self._contact_width(separation) == 0:
+                return Path((self.detached(separation),), ())
+            before = self.detached(self.wave.amplitude)
+            state = self._state(self.wave.touch_half_width)
+            states += [before, state]
+            if state.patches:
+                jumps.append(self._jump(branch, before, state))
+            if separation == self.wave.amplitude:
+                return Path(tuple(states), tuple(jumps))
+        a_from, a_to = state.internal, self._contact_width(separation)
+        way = np.linspace(a_from, a_to, self.states_per_step + 1)[1:]
+        states += [self._state(float(a)) for a in way[:-1]]
+        if separation > self.wave.loop.fold_separation:
+            before = self._state(self.wave.fold_half_width)
+            after = self.detached(self.wave.loop.fold_separation)
+            states += [before, after, self.detached(separation)]
+            if before.patches:
+                jumps.append(self._jump(branch, before, after))
+        else:
+            states.append(self._state(a_to, separation))
+        return Path(tuple(states), tuple(jumps))
+
+    def fields(self, state: ContactState, n: int) -> Fields:
+        """Exact fields on n nodes; a node that falls on an edge has the stress 0."""
+        x = self.problem.profile.period * np.arange(n) / n
+        height = self.problem.profile.at(x)
+        if not state.patches:
+            zero = np.zeros(n)
+            return Fields(x, height, zero, zero, state.separation - height)
+        gap = self.wave.gap(x - self.crest, state.internal)
+        stress = self.wave.stress(x - self.crest, state.internal)
+        return Fields(x, height, stress, gap + height - state.separation, gap)
+
+    def describe(self) -> dict[str, Any]:
+        """Return the only choice there is."""
+        return {"states_per_step": self.states_per_step}
+
+    def _contact_width(self, separation: float) -> float:
+        """Half-width at ``separation``, or at the end of the branch beyond it."""
+        return self.wave.half_width(min(separation, self.wave.loop.fold_separation))
+
+    def _state(self, a: float, separation: float | None = None) -> ContactState:
+        s = float(self.wave.separation(a)) if separation is None else separation
+        if a == 0:
+            return self.detached(s)
+        left = (self.crest - a) % self.wave.period
+        edges: Array = np.array([[left, left + 2 * a]])
+        adhesion = float(self.wave.adhesion_energy(a))
+        return ContactState(
+            separation=s,
+            edges=edges,
+            mean_stress=float(self.wave.mean_stress(a)),
+            elastic_energy=float(self.wave.energy(a)) - adhesion,
+            adhesion_energy=adhesion,
+            contact_fraction=2 * a / self.wave.period,
+            internal=a,
+        )
+
+    def _jump(self, branch: Branch, before: ContactState, after: ContactState) -> Jump:
+        kind, length = classify(before.edges, after.edges, self.wave.period)
+        return Jump(
+            branch=branch,
+            separation=before.separation,
+            energy_drop=(before.energy - after.energy) / self.wave.period,
+            kind=kind,
+            patches_before=before.patches,
+            patches_after=after.patches,
+            contact_before=before.contact_fraction,
+            contact_after=after.contact_fraction,
+            patch_length=length,
+        )
