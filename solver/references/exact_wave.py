@@ -67,7 +67,8 @@ class ExactWave(Method):
                 jumps.append(self._jump(branch, before, state))
             if separation == self.wave.amplitude:
                 return Path(tuple(states), tuple(jumps))
-        a_from, a_to = state.internal, self._contact_width(separation)
+        a_from = state.internal or 0.0  # without adhesion contact grows from a point
+        a_to = self._contact_width(separation)
         way = np.linspace(a_from, a_to, self.states_per_step + 1)[1:]
         states += [self._state(float(a)) for a in way[:-1]]
         if separation > self.wave.loop.fold_separation:
