@@ -1,0 +1,68 @@
+"""Real Fourier transforms whose bits depend on the input alone.
+
+FFTW plans that are measured differ from run to run, and so do the last bits of their results; a
+contact at the edge of its stability can tell them apart. Hence estimated plans and one thread.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pyfftw
+from numpy.typing import NDArray
+
+from solver.profile import Array
+
+
+class RealFourier:
+    """Pair of real transforms of n values on buffers of its own.
+
+    Parameters
+    ----------
+    n : int
+        Number of values, at least 2.
+
+    Attributes
+    ----------
+    values : array, shape (n,)
+        Input of :meth:`forward`, output of :meth:`inverse`.
+    spectrum : complex array, shape (n // 2 + 1,)
+        Output of :meth:`forward`, input of :meth:`inverse` (which destroys it).
+    """
+
+    def __init__(self, n: int) -> None:
+        self.n = n
+        self.values: Array = pyfftw.zeros_aligned(n, dtype=np.float64)
+        self.spectrum: NDArray[np.complex128] = pyfftw.zeros_aligned(n // 2 + 1, dtype=np.complex128)
+        options = {"flags": ("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"), "threads": 1}
+        self._forward = pyfftw.FFTW(self.values, self.spectrum, **options)
+        self._inverse = pyfftw.FFTW(
+            self.spectrum, self.values, direction="FFTW_BACKWARD", **options
+        )
+
+    def forward(self) -> None:
+        """Transform ``values`` to ``spectrum``: Σ_j f_j exp(-2πi jk/n), without a factor."""
+        self._forward.execute()
+
+    def inverse(self) -> None:
+        """Transform ``spectrum`` to ``values``: n times the inverse of :meth:`forward`."""
+        self._inverse.execute()
+
+    def multiply(self, symbol: Array, field: Array) -> Array:
+        """Apply a circulant operator to a field.
+
+        Parameters
+        ----------
+        symbol : array, shape (n // 2 + 1,)
+            Real eigenvalues of the operator, divided by n.
+        field : array, shape (n,)
+
+        Returns
+        -------
+        array, shape (n,)
+            The buffer ``values``: it holds until the next transform.
+        """
+        self.values[:] = field
+        self._forward.execute()
+        np.multiply(self.spectrum, symbol, out=self.spectrum)
+        self._inverse.execute()
+        return self.values
