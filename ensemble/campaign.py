@@ -331,5 +331,5 @@ def _check_together(source: str, campaign: Campaign) -> None:
     if length > _LONGEST_AXIS:
         raise InputError(
             f"{source}: [cycle] unloading_until is {cycle.unloading_until}: with these load steps "
-            f"the unloading curve would have {length:.0f} values, at most {_LONGEST_AXIS} are allowed"
+            f"the unloading curve has {length:.0f} values, and at most {_LONGEST_AXIS} are allowed"
         )

@@ -125,7 +125,7 @@ class Results:
         ----------
         name : str
         rows : slice or ascending int array, optional
-            All rows if not given. Rows are read one stretch at a time: memory is that of the result.
+            All rows if not given. Memory is that of the result.
         """
         with _damage(self.path):
             dataset = self._file[name]
@@ -218,7 +218,7 @@ class Writer:
 
 
 class _RowWriter:
-    """Writes rows of one dataset through h5py's low level: 5 times faster than ``dataset[row] =``."""
+    """Writes rows of one dataset through h5py's low level: faster than ``dataset[row] =``."""
 
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._id = dataset.id
@@ -333,10 +333,8 @@ def _describe(
 
 
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
-    place = {
-        (t.hurst, t.work_of_adhesion, t.realisation): i for i, t in enumerate(campaign.tasks())
-    }
-    target = np.array([place[t.hurst, t.work_of_adhesion, t.realisation] for t in old.tasks()])
+    place = {task: row for row, task in enumerate(campaign.tasks())}
+    target = np.array([place[task] for task in old.tasks()])
     for column in COLUMNS:
         if column in TASK_COLUMNS:
             continue

@@ -63,7 +63,7 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class TaskResult:
-    """One row of the results file; every attribute is the dataset of its name (docs/results-file.md).
+    """One row of the results file; each attribute is the dataset of its name.
 
     Curves have the shape of the campaign's penetration axes, the catalogue of jumps that of
     ``output.jumps``.
@@ -206,7 +206,7 @@ def _catalogue(loop: LoopResult, capacity: int) -> dict[str, Any]:
     kept = [loop.jumps[i] for i in np.sort(np.argsort(-drops, kind="stable")[:capacity])]
 
     def column(value: Any, dtype: type, empty: float) -> NDArray[Any]:
-        out = np.full(capacity, empty, dtype)
+        out: NDArray[Any] = np.full(capacity, empty, dtype)
         out[: len(kept)] = [value(j) for j in kept]
         return out
 
