@@ -1,0 +1,62 @@
+"""Which MPI, HDF5, FFTW and writer this installation uses, and why; exit code 1 if not usable."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+
+from ensemble.doctor import Diagnosis, examine
+from ensemble.errors import InputError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--json", action="store_true", help="the findings as JSON on stdout")
+    parser.add_argument(
+        "--in",
+        dest="directory",
+        type=Path,
+        metavar="DIR",
+        help="try parallel writing in DIR, on the file system of the campaign (default: a "
+        "temporary folder)",
+    )
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Print what was found; 0 if campaigns can run here."""
+    if args.directory is not None and not os.access(args.directory, os.W_OK | os.X_OK):
+        raise InputError(f"--in {args.directory} is no folder that can be written to.")
+    diagnosis = examine(args.directory)
+    if args.json:
+        print(json.dumps(diagnosis.as_dict(), indent=2))
+    else:
+        print(_text(diagnosis))
+    return 0 if diagnosis.usable else 1
+
+
+def _text(diagnosis: Diagnosis) -> str:
+    versions = dict(diagnosis.versions)
+    rows = [
+        ("hysteron", f"{versions.pop('hysteron')}, Python {versions.pop('python')}"),
+        ("MPI", f"{versions.pop('mpi')} (mpi4py {versions.pop('mpi4py')})"),
+        ("mpirun", _join(diagnosis.mpirun, diagnosis.mpirun_version) or "none"),
+        ("HDF5", f"{versions.pop('hdf5')} (h5py {versions.pop('h5py')})"),
+        ("FFTW", f"{versions.pop('fftw')} (pyfftw {versions.pop('pyfftw')})"),
+        *versions.items(),
+        ("cores", str(diagnosis.cores)),
+        ("writer", f"{diagnosis.writer}: {diagnosis.why}"),
+    ]
+    lines = [f"{name:<10}{text}" for name, text in rows]
+    lines.append("")
+    for check in diagnosis.checks:
+        mark = "ok  " if check.ok else "FAIL" if check.needed else "note"
+        lines.append(f"{mark}  {check.name}: {check.text}")
+    lines.append("")
+    lines.append("usable" if diagnosis.usable else "not usable as it is: see FAIL above")
+    return "\n".join(lines)
+
+
+def _join(path: str, version: str) -> str:
+    return f"{path} ({version})" if path and version else path

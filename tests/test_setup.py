@@ -1,0 +1,106 @@
+"""Set-up, launch scripts and packaging: what can be checked without installing anything."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SCRIPTS = sorted([*ROOT.glob("jobs/*.sh"), *ROOT.glob("tools/*.sh"), ROOT / ".ci" / "run"])
+# Distribution names that differ from what is imported, and what other packages need to find.
+IMPORTED_AS = {"PyYAML": "yaml"}
+LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
+
+
+def project() -> dict[str, object]:
+    return dict(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"])
+
+
+def names(requirements: list[str]) -> set[str]:
+    return {re.split(r"[^\w.-]", text)[0].lower() for text in requirements}
+
+
+def locked() -> dict[str, str]:
+    lines = (ROOT / "requirements.lock").read_text().splitlines()
+    pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
+    return {name.lower().replace("_", "-"): version for name, version in pairs}
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_script_is_well_formed(script: Path) -> None:
+    subprocess.run(["bash", "-n", script], check=True)
+    text = script.read_text()
+    assert "\r" not in text
+    if script.name != "mpi.sh":  # that one is sourced
+        assert text.startswith("#!/")
+        assert os.access(script, os.X_OK)
+    if shutil.which("shellcheck"):
+        subprocess.run(["shellcheck", "-S", "error", "-x", script], cwd=ROOT, check=True)
+
+
+def test_batch_scripts_force_no_rules_on_a_cluster() -> None:
+    """Running as root or with more ranks than cores is for this machine's owner to allow."""
+    for name in ("slurm.sh", "pbs.sh"):
+        text = (ROOT / "jobs" / name).read_text()
+        assert "ALLOW_RUN_AS_ROOT" not in text
+        assert "oversubscribe" not in text
+        assert "tools/mpi.sh" not in text
+
+
+def test_dependencies_are_what_is_imported() -> None:
+    imported: set[str] = set()
+    for package in ("solver", "ensemble"):
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name.split(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    imported.add(node.module.split(".")[0])
+    imported -= set(sys.stdlib_module_names) | {"solver", "ensemble"}
+    declared = names(list(project()["dependencies"]))  # type: ignore[call-overload]
+    assert imported | LOADED_BY_NAME == {IMPORTED_AS.get(name, name) for name in declared}
+
+
+def test_lock_holds_all_that_is_declared_and_nothing_of_this_machine() -> None:
+    extras = project()["optional-dependencies"]
+    assert isinstance(extras, dict)
+    declared = names(list(project()["dependencies"])) | names(extras["dev"])  # type: ignore[call-overload]
+    assert declared <= set(locked())
+    # What building h5py without isolation needs in the environment.
+    assert {"setuptools", "cython", "pkgconfig", "packaging", "numpy", "mpi4py"} <= set(locked())
+    text = (ROOT / "requirements.lock").read_text()
+    assert "://" not in text
+    assert "@" not in text
+
+
+def test_make_help_lists_every_target() -> None:
+    done = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    for target in ("setup", "run", "test", "lint", "bench", "clean", "help"):
+        assert f"make {target} " in done.stdout
+
+
+def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
+    stamp = Path(sys.prefix, "hysteron-setup")
+    if not stamp.exists() or Path(sys.prefix).parent != ROOT:
+        pytest.skip("these tests do not run in the .venv that tools/setup.sh made")
+    before = stamp.stat().st_mtime_ns
+    env = {k: v for k, v in os.environ.items() if k not in ("VIRTUAL_ENV", "PYTHONHOME")}
+    done = subprocess.run(
+        [ROOT / "tools" / "setup.sh"], env=env, capture_output=True, text=True, check=True
+    )
+    assert "nothing to do" in done.stdout
+    assert stamp.stat().st_mtime_ns == before
+
+
+def test_local_script_asks_for_a_campaign() -> None:
+    done = subprocess.run([ROOT / "jobs" / "local.sh"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "usage: jobs/local.sh CAMPAIGN.toml" in done.stderr
