@@ -18,7 +18,7 @@ from solver.jumps import JUMP_KINDS, SMALL_SCALE
 
 Array = NDArray[np.float64]
 
-BINS_PER_DECADE = 4
+BINS_PER_DECADE = 2
 # Energy drops outside these bounds (J/m²) are counted in the outermost bin.
 SMALLEST, LARGEST = 1e-16, 1e2
 BIN_EDGES: Array = np.logspace(

@@ -1,0 +1,26 @@
+"""Tables, curves and figures of a results file, finished or not."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("file", metavar="FILE.h5", type=Path, help="results file of a campaign")
+    parser.add_argument(
+        "--to",
+        metavar="DIR",
+        type=Path,
+        required=True,
+        help="directory for losses.csv, curves.nc, the figures and report.md",
+    )
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Write the report; returns 0."""
+    from ensemble.report import write_report
+
+    write_report(args.file, args.to)
+    return 0

@@ -1,0 +1,73 @@
+"""The report of a campaign, from its results file alone: tables, curves, figures, one page."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import IO
+
+from ensemble.aggregate import Aggregate, aggregate
+from ensemble.errors import InputError
+
+
+def write_report(
+    path: Path | str, directory: Path | str, stream: IO[str] | None = None
+) -> Aggregate:
+    """Write ``losses.csv``, ``curves.nc``, the figures and ``report.md``; print the tables.
+
+    Parameters
+    ----------
+    path : path
+        The results file, finished or not.
+    directory : path
+        Made if missing; files of the same names are replaced.
+    stream : text stream, optional
+        Where the tables go; standard output by default.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to report, or the directory cannot be written.
+    """
+    data = aggregate(path)
+    directory = Path(directory)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        _write_files(data, directory)
+    except OSError as error:
+        raise InputError(f"{directory} cannot be written: {error.strerror or error}") from error
+    _print_summary(data, directory, stream or sys.stdout)
+    return data
+
+
+def _write_files(data: Aggregate, directory: Path) -> None:
+    # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
+    from ensemble.report import tables
+    from ensemble.report.curves import write_curves
+    from ensemble.report.figures import LOOPS, LOSSES, MECHANISMS
+    from ensemble.report.figures.style import save, style
+    from ensemble.report.page import write_page
+
+    tables.losses(data).write_csv(directory / "losses.csv")
+    tables.paired(data).write_csv(directory / "growth.csv")
+    tables.jumps(data).write_csv(directory / "jumps.csv")
+    write_curves(data, directory / "curves.nc")
+    sections = (("loops", LOOPS), ("losses", LOSSES), ("mechanisms", MECHANISMS))
+    for _, illustrations in sections:
+        for item in illustrations:
+            with style():
+                figure = item.draw(data)
+            save(figure, directory / item.name)
+    page = write_page(data, sections)
+    (directory / "report.md").write_text(page, encoding="utf-8")
+
+
+def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
+    from ensemble.report import findings, tables
+
+    tables.losses(data).print(stream)
+    print(file=stream)
+    tables.mechanisms(data).print(stream)
+    for sentence in (*findings.missing(data), *findings.quality(data)):
+        print(sentence, file=stream)
+    print(f"report: {directory / 'report.md'}", file=stream)

@@ -1,0 +1,86 @@
+"""The figures of the report; what each shows, and the function that draws it from an aggregate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from ensemble.aggregate import Aggregate
+from ensemble.report.figures import loops, losses
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """One figure of the report.
+
+    Attributes
+    ----------
+    name : str
+        Stem of its files.
+    title : str
+    caption : str
+        What it shows, as a sentence or two.
+    draw : callable
+    """
+
+    name: str
+    title: str
+    caption: str
+    draw: Callable[[Aggregate], Figure]
+
+
+LOOPS = (
+    Illustration(
+        "fig6_contact_against_stress",
+        "Contact fraction against mean stress (paper's Fig. 6)",
+        "Means over realisations, taken at equal penetration; σ~ = 2p̄/(E* q0 h_max) with each "
+        "realisation's own h_max, compression positive.",
+        loops.contact_against_stress,
+    ),
+    Illustration(
+        "fig7_loop_against_penetration",
+        "Mean stress and contact fraction against penetration (paper's Fig. 7)",
+        "Lines: means over realisations; shading: one standard deviation of a single realisation. "
+        "A realisation that has detached counts with zero.",
+        loops.loop_against_penetration,
+    ),
+)
+LOSSES = (
+    Illustration(
+        "table1_losses",
+        "Loss against work of adhesion (paper's Table 1)",
+        "Means with 95 % intervals; stars: the paper's values, as far as they are known. The "
+        "curves are moved apart a little so that the intervals can be told apart.",
+        losses.loss_against_adhesion,
+    ),
+    Illustration(
+        "loss_against_m2",
+        "Loss against mean square slope",
+        "Means with 95 % intervals.",
+        losses.loss_against_slope,
+    ),
+)
+MECHANISMS = (
+    Illustration(
+        "loss_by_mechanism",
+        "Loss by mechanism",
+        "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
+        "large scale: patches appear, merge, split, vanish or pull off. Figures above the bars: "
+        "share of the small scale.",
+        losses.loss_by_mechanism,
+    ),
+    Illustration(
+        "jump_energies",
+        "Distribution of the energy drops",
+        "Jumps of one loop per decade of energy drop, mean over realisations.",
+        losses.jump_energies,
+    ),
+    Illustration(
+        "pull_off_stress",
+        "Pull-off stress",
+        "Largest mean tension on unloading, means with 95 % intervals.",
+        losses.pull_off,
+    ),
+)

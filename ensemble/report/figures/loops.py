@@ -1,0 +1,132 @@
+"""Averaged loops: contact fraction against stress (Fig. 6), both against penetration (Fig. 7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ensemble.aggregate import Aggregate, Cell
+from ensemble.aggregate_curves import BRANCHES
+from ensemble.report.figures.style import (
+    LINE_OF_BRANCH,
+    MM,
+    MOST_CURVES,
+    MOST_PANELS,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    gamma_label,
+    label_panel,
+    legend_above,
+    look,
+    new_figure,
+    panels,
+    spread_out,
+)
+
+_MARKERS_PER_CURVE = 8
+
+
+def contact_against_stress(data: Aggregate) -> Figure:
+    """Fig. 6: A/A0 against σ~/sqrt(m2), one panel for each H, means over realisations."""
+    hursts = spread_out(data.hursts, MOST_PANELS)
+    figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 46 * len(hursts)) * MM, sharex=True)
+    column = [row[0] for row in panels(figure, len(hursts), 1)]
+    for axes, hurst in zip(column, hursts, strict=True):
+        for k, cell in _curves_of(data, hurst):
+            for branch in BRANCHES:
+                axes.plot(
+                    cell.curves[f"{branch}_stress_slope"].mean,
+                    cell.curves[f"{branch}_contact_fraction"].mean,
+                    linestyle=LINE_OF_BRANCH[branch],
+                    color=look(k).colour,
+                    marker=look(k).marker,
+                    markevery=_markers(data, cell, branch, k),
+                    label=f"{gamma_label(cell.work_of_adhesion)}, {branch}",
+                )
+        label_panel(axes, f"H = {hurst:g}")
+        axes.set_ylabel("contact fraction $A/A_0$")
+        axes.set_ylim(bottom=0)
+    column[-1].set_xlabel(r"mean stress $\tilde\sigma/\sqrt{m_2}$")
+    _legend(data, figure, 3)
+    return figure
+
+
+def loop_against_penetration(data: Aggregate) -> Figure:
+    """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations."""
+    hursts = spread_out(data.hursts, MOST_PANELS)
+    height = (13 + 46 * len(hursts)) * MM
+    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True)
+    grid = panels(figure, len(hursts), 2)
+    for row, hurst in zip(grid, hursts, strict=True):
+        for axes, name in zip(row, ("stress", "contact_fraction"), strict=True):
+            for k, cell in _curves_of(data, hurst):
+                for branch in BRANCHES:
+                    _with_spread(axes, data, cell, branch, name, k)
+            label_panel(axes, f"H = {hurst:g}")
+        row[0].set_ylabel(r"mean stress $\tilde\sigma$")
+        row[0].axhline(0, color="0.5", linewidth=0.5)
+        row[1].set_ylabel("contact fraction $A/A_0$")
+        row[1].set_ylim(bottom=0)
+    for axes in grid[-1]:
+        axes.set_xlabel(r"penetration $\tilde\Delta = \Delta/h_\mathrm{max}$")
+    _legend(data, figure, 6)
+    return figure
+
+
+def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, Cell]]:
+    """Cells of one H that have finished tasks, each with the place of its γ among those shown."""
+    shown = spread_out(data.works_of_adhesion, MOST_CURVES)
+    cells = ((k, data.cell(hurst, gamma)) for k, gamma in enumerate(shown))
+    return [(k, cell) for k, cell in cells if cell is not None and cell.done]
+
+
+def _in_contact(data: Aggregate, cell: Cell, branch: str) -> slice:
+    """The part of a branch up to one step after the last realisation has detached."""
+    fraction = cell.curves[f"{branch}_contact_fraction"].mean
+    touching = np.flatnonzero(fraction > 0)
+    if branch == "loading" or not touching.size:
+        return slice(0, fraction.size)
+    return slice(0, min(fraction.size, int(touching[-1]) + 2))
+
+
+def _markers(data: Aggregate, cell: Cell, branch: str, k: int) -> tuple[int, int]:
+    """Few markers, staggered, so that they tell curves apart and hide none."""
+    part = _in_contact(data, cell, branch)
+    every = max(1, (part.stop - part.start) // _MARKERS_PER_CURVE)
+    return (k * every // MOST_CURVES, every)
+
+
+def _with_spread(axes: Axes, data: Aggregate, cell: Cell, branch: str, name: str, k: int) -> None:
+    part = _in_contact(data, cell, branch)
+    axis = getattr(data.campaign, f"{branch}_penetration")[part]
+    curve = cell.curves[f"{branch}_{name}"]
+    mean, std = curve.mean[part], curve.std[part]
+    axes.plot(
+        axis,
+        mean,
+        linestyle=LINE_OF_BRANCH[branch],
+        color=look(k).colour,
+        marker=look(k).marker,
+        markevery=_markers(data, cell, branch, k),
+        label=f"{gamma_label(cell.work_of_adhesion)}, {branch}",
+    )
+    if cell.done > 1:
+        axes.fill_between(
+            axis, mean - std, mean + std, color=look(k).colour, alpha=0.18, linewidth=0
+        )
+
+
+def _legend(data: Aggregate, figure: Figure, columns: int) -> None:
+    """One entry for each γ, one for each branch."""
+    shown = spread_out(data.works_of_adhesion, MOST_CURVES)
+    handles = [
+        Line2D([], [], color=look(k).colour, marker=look(k).marker, label=gamma_label(gamma))
+        for k, gamma in enumerate(shown)
+    ]
+    handles += [
+        Line2D([], [], color="0.3", linestyle=LINE_OF_BRANCH[branch], label=branch)
+        for branch in BRANCHES
+    ]
+    legend_above(figure, handles, columns)

@@ -1,0 +1,234 @@
+"""Losses: Table 1 as a figure, against m2, by mechanism; jumps and pull-off."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ensemble.aggregate import Aggregate, Cell, stress_scale
+from ensemble.aggregate_jumps import BIN_EDGES, BINS_PER_DECADE
+from ensemble.report import paper
+from ensemble.report.figures.style import (
+    LINES,
+    MM,
+    MOST_CURVES,
+    MOST_PANELS,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    gamma_label,
+    label_panel,
+    legend_above,
+    look,
+    new_figure,
+    panels,
+    spread_out,
+)
+from ensemble.statistics import Estimate
+
+
+def loss_against_adhesion(data: Aggregate) -> Figure:
+    """Table 1 as a figure: W~ against γ for each H with intervals, the paper's values beside."""
+    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    axes = figure.axes[0]
+    hursts = spread_out(data.hursts, MOST_CURVES)
+    for k, hurst in enumerate(hursts):
+        cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
+        _errorbar(
+            axes,
+            np.array([cell.work_of_adhesion for cell in cells]),
+            [cell.estimates["loss_dimensionless"] for cell in cells],
+            k,
+            f"H = {hurst:g}",
+            offset=(k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion),
+        )
+        known = [(g, paper.table_1(hurst, g)) for g in data.works_of_adhesion]
+        quoted = [(g, value) for g, value in known if value is not None]
+        if quoted:
+            axes.plot(
+                *zip(*quoted, strict=True),
+                linestyle="none",
+                marker="*",
+                markersize=8,
+                markerfacecolor="white",
+                markeredgecolor=look(k).colour,
+                label=f"H = {hurst:g}, paper",
+            )
+    axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
+    axes.set_ylabel(r"loss $\tilde W = \oint\tilde\sigma\,\mathrm{d}\tilde\Delta$")
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="upper left")
+    return figure
+
+
+def loss_against_slope(data: Aggregate) -> Figure:
+    """W~ against the mean square slope m2, one curve for each γ, with intervals."""
+    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    axes = figure.axes[0]
+    for k, gamma in enumerate(spread_out(data.works_of_adhesion, MOST_CURVES)):
+        cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
+        cells.sort(key=lambda cell: cell.estimates["m2"].mean)
+        _errorbar(
+            axes,
+            np.array([cell.estimates["m2"].mean for cell in cells]),
+            [cell.estimates["loss_dimensionless"] for cell in cells],
+            k,
+            gamma_label(gamma),
+        )
+    axes.set_xlabel("mean square slope $m_2$")
+    axes.set_ylabel(r"loss $\tilde W$")
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="best")
+    return figure
+
+
+def loss_by_mechanism(data: Aggregate) -> Figure:
+    """Sum of the drops at small-scale and at large-scale jumps, for each (H, γ)."""
+    figure = new_figure(1, 1, ONE_COLUMN, 65 * MM)
+    axes = figure.axes[0]
+    cells = _cells(data)
+    place = np.arange(len(cells))
+    large = np.array([cell.estimates["loss_large_scale"].mean for cell in cells])
+    small = np.array([cell.estimates["loss_small_scale"].mean for cell in cells])
+    axes.bar(place, large, color="#56B4E9", edgecolor="black", linewidth=0.5, label="large scale")
+    axes.bar(
+        place,
+        small,
+        bottom=large,
+        color="#E69F00",
+        edgecolor="black",
+        linewidth=0.5,
+        hatch="////",
+        label="small scale",
+    )
+    for x, cell, top in zip(place, cells, large + small, strict=True):
+        share = cell.estimates["small_scale_share"].mean
+        axes.annotate(
+            f"{100 * share:.0f} %", (x, top), (0, 2), textcoords="offset points", ha="center"
+        )
+    axes.set_xticks(place, [f"{cell.hurst:g}\n{cell.work_of_adhesion:g}" for cell in cells])
+    axes.set_xlabel(r"$H$ (upper line), $\gamma$ in J/m² (lower line)")
+    axes.set_ylabel("sum of drops (J/m²)")
+    axes.set_ylim(0, 1.12 * float((large + small).max(initial=0)) or 1)
+    axes.grid(False, axis="x")
+    legend_above(figure, axes.get_legend_handles_labels()[0], 2)
+    return figure
+
+
+def jump_energies(data: Aggregate) -> Figure:
+    """Jumps per loop and decade of energy drop: large scale left, small scale right."""
+    hursts = spread_out(data.hursts, MOST_PANELS)
+    shown = spread_out(data.works_of_adhesion, MOST_CURVES)
+    height = (13 + 44 * len(hursts)) * MM
+    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
+    grid = panels(figure, len(hursts), 2)
+    for row, hurst in zip(grid, hursts, strict=True):
+        for axes, small in zip(row, (False, True), strict=True):
+            for k, gamma in enumerate(shown):
+                cell = data.cell(hurst, gamma)
+                if cell is not None and cell.done:
+                    _jump_density(axes, data, cell, small, k)
+            label_panel(axes, f"H = {hurst:g}, {'small' if small else 'large'} scale")
+        row[0].set_ylabel("jumps per loop and decade")
+    for axes in grid[-1]:
+        axes.set_xlabel("energy drop of one jump (J/m²)")
+    grid[0][0].set_xscale("log")
+    grid[0][0].set_yscale("log")
+    handles = [
+        Line2D([], [], color=look(k).colour, linestyle=LINES[k], label=gamma_label(gamma))
+        for k, gamma in enumerate(shown)
+    ]
+    legend_above(figure, handles, len(handles))
+    return figure
+
+
+def _jump_density(axes: Axes, data: Aggregate, cell: Cell, small: bool, k: int) -> None:
+    found = data.jumps
+    histogram = found.histogram[data.cells.index(cell)]
+    density = histogram[found.small_scale == small].sum(axis=0) * BINS_PER_DECADE / cell.done
+    part = _occupied(found.histogram)
+    axes.stairs(
+        np.where(density > 0, density, np.nan)[part],
+        BIN_EDGES[part.start : part.stop + 1],
+        baseline=None,
+        color=look(k).colour,
+        linestyle=LINES[k],
+        linewidth=1.4,
+        label=gamma_label(cell.work_of_adhesion),
+    )
+
+
+def pull_off(data: Aggregate) -> Figure:
+    """Largest mean tension on unloading against γ, for each H, with intervals."""
+    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    axes = figure.axes[0]
+    for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES)):
+        cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
+        _errorbar(
+            axes,
+            np.array([cell.work_of_adhesion for cell in cells]),
+            [cell.estimates["pull_off_stress"] for cell in cells],
+            k,
+            f"H = {hurst:g}",
+            unit=1e3,
+        )
+    axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
+    axes.set_ylabel("pull-off stress (kPa)")
+    axes.set_ylim(bottom=0)
+    axes.legend(loc="best")
+    _second_scale(axes, data)
+    return figure
+
+
+def _second_scale(axes: Axes, data: Aggregate) -> None:
+    """Beside kPa, σ~ at the mean h_max of all cells."""
+    h_max = np.concatenate([cell.values["h_max"] for cell in data.cells])
+    scale = float(stress_scale(data.campaign, h_max.mean(keepdims=True))[0])
+
+    def dimensionless(kilopascal: Any) -> Any:
+        return 1e3 * kilopascal / scale
+
+    def in_kilopascal(stress: Any) -> Any:
+        return stress * scale / 1e3
+
+    axes.tick_params(right=False)
+    right = axes.secondary_yaxis("right", functions=(dimensionless, in_kilopascal))
+    right.set_ylabel(r"$\tilde\sigma$ at the mean $h_\mathrm{max}$")
+
+
+def _cells(data: Aggregate) -> list[Cell]:
+    hursts = spread_out(data.hursts, MOST_CURVES)
+    gammas = spread_out(data.works_of_adhesion, MOST_CURVES)
+    return [c for c in data.cells if c.done and c.hurst in hursts and c.work_of_adhesion in gammas]
+
+
+def _occupied(histogram: np.ndarray) -> slice:
+    """The bins from the first to the last that holds a jump of any cell."""
+    filled = np.flatnonzero(histogram.sum(axis=(0, 1)))
+    return slice(int(filled[0]), int(filled[-1]) + 1) if filled.size else slice(0, 1)
+
+
+def _errorbar(
+    axes: Axes,
+    x: np.ndarray,
+    found: list[Estimate],
+    k: int,
+    label: str,
+    offset: float = 0.0,
+    unit: float = 1.0,
+) -> None:
+    mean = np.array([estimate.mean for estimate in found]) / unit
+    low = np.array([estimate.low for estimate in found]) / unit
+    high = np.array([estimate.high for estimate in found]) / unit
+    axes.errorbar(
+        x + offset,
+        mean,
+        yerr=np.nan_to_num(np.array([mean - low, high - mean])),
+        color=look(k).colour,
+        marker=look(k).marker,
+        linestyle=LINES[k],
+        label=label,
+    )

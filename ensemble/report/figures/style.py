@@ -1,0 +1,106 @@
+"""What all figures share: sizes, the look of each γ and branch, how a figure is saved.
+
+Figures are built on ``matplotlib.figure.Figure`` itself: no pyplot, no global backend, no window.
+Every γ differs by colour (Okabe & Ito), marker and darkness, every branch by line style, so that a
+figure can be read in grey and by colour-blind people.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+STYLE = Path(__file__).parent.parent / "hysteron.mplstyle"
+
+MM = 1 / 25.4  # inches
+ONE_COLUMN = 85 * MM
+TWO_COLUMNS = 175 * MM
+
+# A panel with more curves than this cannot be read; panels beyond it make no page.
+MOST_CURVES = 4
+MOST_PANELS = 4
+
+LINES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))
+LINE_OF_BRANCH: dict[str, Any] = {"loading": "-", "unloading": LINES[1]}
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour, marker and hatch of one curve."""
+
+    colour: str
+    marker: str
+    hatch: str
+
+
+# Okabe & Ito's colours, in an order in which the darkness of neighbours differs.
+LOOKS = (
+    Look("#E69F00", "o", ""),
+    Look("#0072B2", "s", "////"),
+    Look("#000000", "^", "...."),
+    Look("#CC79A7", "D", "xxxx"),
+)
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Use the style file inside the block only."""
+    with mpl.rc_context(fname=str(STYLE)):
+        yield
+
+
+def look(k: int) -> Look:
+    """Return the look of the k-th curve of a panel."""
+    return LOOKS[k % len(LOOKS)]
+
+
+def spread_out(values: Sequence[float], most: int) -> list[float]:
+    """At most so many of the values, evenly spread, first and last included."""
+    if len(values) <= most:
+        return list(values)
+    return [values[round(k)] for k in np.linspace(0, len(values) - 1, most)]
+
+
+def new_figure(rows: int, columns: int, width: float, height: float, **options: Any) -> Figure:
+    """Return a figure of the given width and height (inches) with a grid of panels."""
+    figure = Figure(figsize=(width, height))
+    figure.subplots(rows, columns, squeeze=False, **options)
+    return figure
+
+
+def panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
+    """Return the panels of :func:`new_figure`, row by row."""
+    axes = figure.axes[: rows * columns]
+    return [axes[k * columns : (k + 1) * columns] for k in range(rows)]
+
+
+def legend_above(figure: Figure, handles: Sequence[Any], columns: int) -> None:
+    """Put the legend above the panels, where it hides no data."""
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+def label_panel(axes: Axes, text: str) -> None:
+    """Write what a panel shows into its upper left corner."""
+    axes.set_title(text, loc="left", pad=3)
+
+
+def gamma_label(work_of_adhesion: float) -> str:
+    """Return the legend of one γ."""
+    return rf"$\gamma$ = {work_of_adhesion:g} J/m²"
+
+
+def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
+    """Save a figure as PNG (300 dpi) and PDF; the same figure gives the same bytes."""
+    png, pdf = stem.with_suffix(".png"), stem.with_suffix(".pdf")
+    with style():
+        figure.savefig(png, metadata={"Software": None})
+        figure.savefig(pdf, metadata={"CreationDate": None, "Producer": None, "Creator": None})
+    return png, pdf

@@ -1,0 +1,116 @@
+"""A table: once for people (terminal, Markdown), once for programs (CSV)."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+Value = float | int | str | None
+Format = Callable[[Any], str]
+BLANK = "–"
+
+
+def number(digits: int = 4) -> Format:
+    """Show a number with so many significant digits."""
+    return lambda value: f"{value:#.{digits}g}".rstrip(".")
+
+
+def plain(value: Any) -> str:
+    """Show a value as it is."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def fixed(digits: int) -> Format:
+    """Show a number with so many digits after the point."""
+    return lambda value: f"{value:.{digits}f}"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column.
+
+    Attributes
+    ----------
+    name : str
+        In the CSV file, with its unit in brackets unless dimensionless.
+    heading : str
+        For people; empty if the column is for the CSV file only.
+    show : callable
+        Turns a value into text.
+    """
+
+    name: str
+    heading: str = ""
+    show: Format = plain
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of values; None and NaN are blank."""
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Value, ...], ...]
+
+    def write_csv(self, path: Path) -> None:
+        """Write every column, at full precision, one row of names first."""
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow([column.name for column in self.columns])
+            writer.writerows([[_exact(value) for value in row] for row in self.rows])
+
+    def markdown(self) -> str:
+        """Return the columns that have a heading as a Markdown table."""
+        shown = self._shown()
+        rule = ["---:"] * len(shown[0])
+        return "\n".join("| " + " | ".join(row) + " |" for row in (shown[0], rule, *shown[1:]))
+
+    def print(self, stream: IO[str]) -> None:
+        """Print the columns that have a heading: rich on a terminal, plain lines elsewhere."""
+        shown = self._shown()
+        if stream.isatty():
+            from rich.console import Console
+            from rich.table import Table as RichTable
+
+            table = RichTable(title=self.title, title_justify="left")
+            for heading in shown[0]:
+                table.add_column(heading, justify="right")
+            for row in shown[1:]:
+                table.add_row(*row)
+            Console(file=stream).print(table)
+            return
+        widths = [max(len(cell) for cell in column) for column in zip(*shown, strict=True)]
+        print(self.title, file=stream)
+        for row in shown:
+            cells = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+            print("  ".join(cells).rstrip(), file=stream)
+
+    def _shown(self) -> list[list[str]]:
+        kept = [(k, column) for k, column in enumerate(self.columns) if column.heading]
+        body = [
+            [BLANK if _missing(row[k]) else column.show(row[k]) for k, column in kept]
+            for row in self.rows
+        ]
+        return [[column.heading for _, column in kept], *body]
+
+
+def make_table(title: str, columns: Sequence[Column], rows: Sequence[Sequence[Value]]) -> Table:
+    """Build a table; every row must have as many values as there are columns."""
+    for row in rows:
+        if len(row) != len(columns):
+            raise ValueError(f"a row has {len(row)} values, and there are {len(columns)} columns")
+    return Table(title, tuple(columns), tuple(tuple(row) for row in rows))
+
+
+def _missing(value: Value) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))
+
+
+def _exact(value: Value) -> str:
+    if _missing(value):
+        return ""
+    return repr(value) if isinstance(value, float) else str(value)
