@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ensemble.errors import InputError
 from solver.jumps import JUMP_KINDS, Jump
 from solver.loop import LoopResult, Progress, run_loop
 from solver.material import HalfSpace
+from solver.method import Method
 from solver.methods import make_method
 from solver.problem import Problem
 from solver.profile import Array, self_affine_profile
@@ -127,6 +129,29 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
     return Problem(profile, half_space, task.work_of_adhesion)
 
 
+def check_task(campaign: Campaign, task: Task) -> None:
+    """Refuse a campaign of which a task cannot be set up, before any work.
+
+    Raises
+    ------
+    InputError
+        With the solver's sentence.
+    """
+    try:
+        _make_method(campaign, task)
+    except (ValueError, NotImplementedError, ArithmeticError) as error:
+        raise InputError(f"this campaign cannot be computed: {error}") from error
+
+
+def _make_method(campaign: Campaign, task: Task) -> Method:
+    return make_method(
+        campaign.solver.method,
+        make_problem(campaign, task),
+        accuracy=campaign.solver.accuracy,
+        nodes_per_wave=campaign.solver.nodes_per_wave,
+    )
+
+
 def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -> TaskResult:
     """Compute one loop. No ranks, no files: the same in a notebook and on rank 317.
 
@@ -138,15 +163,8 @@ def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -
         Called after each load step; it may raise to give the task up.
     """
     wall, cpu = time.perf_counter(), time.process_time()
-    solver = campaign.solver
-    method = make_method(
-        solver.method,
-        make_problem(campaign, task),
-        accuracy=solver.accuracy,
-        nodes_per_wave=solver.nodes_per_wave,
-    )
     loop = run_loop(
-        method,
+        _make_method(campaign, task),
         max_penetration=campaign.cycle.max_penetration,
         load_steps=campaign.cycle.load_steps,
         progress=progress,

@@ -1,0 +1,148 @@
+"""Run or resume a campaign; under mpirun, rank 0 hands out and the others work.
+
+A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
+refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 75 stopped early (a signal,
+the walltime): run the same command again to resume.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from ensemble.errors import InputError
+
+DONE, SOME_FAILED, BAD_INPUT, RESUME = 0, 1, 2, 75
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
+    parser.add_argument(
+        "--out", metavar="FILE.h5", help="results file (default: the campaign's name, here)"
+    )
+    parser.add_argument(
+        "--walltime",
+        metavar="TIME",
+        help="stop in time for this walltime, as 3600, 1h30m or 12:00:00 "
+        "(default: what Slurm or Torque say)",
+    )
+    parser.add_argument(
+        "--max-failures",
+        metavar="N",
+        default="20",
+        help="stop after so many failed tasks; 0: never (default: 20)",
+    )
+    parser.add_argument(
+        "--redo",
+        metavar="WHICH",
+        help="compute tasks again: those that failed (failed), or done ones too (all)",
+    )
+    for name, text in (
+        ("--hurst", "with --redo: only tasks of this H; may be repeated"),
+        ("--work-of-adhesion", "with --redo: only tasks of this γ in J/m²; may be repeated"),
+        ("--realisation", "with --redo: only this realisation; may be repeated"),
+    ):
+        parser.add_argument(name, metavar="VALUE", action="append", default=[], help=text)
+    parser.add_argument(
+        "--patience",
+        metavar="SECONDS",
+        default="10",
+        help="how long to wait for another run to let go of FILE.h5 (default: 10)",
+    )
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Run; returns the exit code, the same on every rank."""
+    from ensemble.ranks import end_job_on_exception, launched, world
+
+    started = time.time()
+    first = launched()[1] == 0
+    try:
+        comm = world()
+        if comm is not None:
+            first = comm.rank == 0
+            end_job_on_exception(comm)
+        return _run(args, comm, started)
+    except InputError as error:
+        if first:
+            print(f"hysteron run: {error}", file=sys.stderr, flush=True)
+        return BAD_INPUT
+
+
+def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
+    from ensemble.campaign import load_campaign
+    from ensemble.dispatch import Overdue
+    from ensemble.interrupt import deadline, parse_duration
+    from ensemble.progress import duration
+    from ensemble.ranks import together
+    from ensemble.run import Options, run_campaign
+
+    # One rank reads: a file that changes meanwhile must not split the job.
+    campaign = together(comm, lambda: load_campaign(args.campaign))
+    path = Path(args.out or f"{Path(args.campaign).stem}.h5")
+    most = _number("--max-failures", args.max_failures, whole=True)
+    options = Options(
+        redo=_selection(args),
+        max_failures=int(most) or None,
+        deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),
+        patience=_number("--patience", args.patience),
+    )
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    try:
+        summary = run_campaign(campaign, path, comm, options, say)
+    except Overdue as error:
+        # Nobody can be waited for; what was given up anyway is lost, the results file is sound.
+        say(f"hysteron run: {error}; run the same command again to resume")
+        comm.Abort(RESUME)
+        return RESUME
+    if comm is None or comm.rank == 0:
+        failed = f", {summary.failed} failed" if summary.failed else ""
+        say(
+            f"{path}: {summary.done} of {summary.total} tasks done{failed}; "
+            f"{summary.computed} computed in {duration(summary.seconds)}"
+        )
+        if summary.failed:
+            say(f"why they failed: hysteron status {path}; again: hysteron run … --redo failed")
+        if summary.stopped:
+            say(
+                f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "
+                "run the same command again to resume"
+            )
+    too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
+    if summary.pending and not too_many:
+        return RESUME
+    return SOME_FAILED if summary.failed else DONE
+
+
+def _selection(args: argparse.Namespace) -> Any:
+    from ensemble.run import Selection
+
+    hurst = tuple(_number("--hurst", v) for v in args.hurst)
+    gamma = tuple(_number("--work-of-adhesion", v) for v in args.work_of_adhesion)
+    realisation = tuple(int(_number("--realisation", v, whole=True)) for v in args.realisation)
+    if args.redo is None:
+        if hurst or gamma or realisation:
+            raise InputError("--hurst, --work-of-adhesion and --realisation choose among --redo")
+        return None
+    if args.redo not in ("failed", "all"):
+        raise InputError(f"--redo is {args.redo!r}: it must be failed or all")
+    return Selection(args.redo, hurst, gamma, realisation)
+
+
+def _number(option: str, text: str, *, whole: bool = False) -> float:
+    """Read an option's number here and not in argparse, which every rank would complain from."""
+    try:
+        value = int(text) if whole else float(text)
+    except ValueError:
+        value = -1
+    if not 0 <= value < 2**31:
+        kind = "whole number" if whole else "number"
+        raise InputError(f"{option} is {text!r}: it must be a {kind} that is not negative")
+    return value

@@ -1,0 +1,99 @@
+"""What ends a run from outside: signals, and the walltime of the batch system."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+from collections.abc import Mapping
+from types import FrameType
+from typing import Any, Self
+
+from ensemble.errors import InputError
+
+SIGNALS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
+# Before the walltime ends, what is in flight is given up and the file closed: this long before (s),
+# but at most this share of the walltime.
+RESERVE, RESERVE_SHARE = 30.0, 0.1
+
+_CLOCK = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(\d+):(\d+)")
+_UNITS = re.compile(r"(?:(\d+)d)?(?:(\d+)h)?(?:(\d+)m)?(?:(\d+(?:\.\d*)?)s?)?")
+
+
+class StopSignals:
+    """Notes SIGTERM, SIGUSR1 and SIGINT instead of dying from them; a context manager.
+
+    A second SIGINT (Ctrl-C) interrupts at once.
+
+    Attributes
+    ----------
+    received : str or None
+        Name of the first signal that came.
+    """
+
+    def __init__(self) -> None:
+        self.received: str | None = None
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Self:
+        for number in SIGNALS:
+            self._before[number] = signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _note(self, number: int, _: FrameType | None) -> None:
+        if self.received == "SIGINT" and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        self.received = signal.Signals(number).name
+
+
+def parse_duration(text: str) -> float:
+    """Return the seconds of "90", "90s", "1h30m", "45:00", "12:00:00" or "2-00:00:00".
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or not positive.
+    """
+    word = text.strip()
+    seconds = 0.0
+    match = _CLOCK.fullmatch(word) or _UNITS.fullmatch(word)
+    if match:
+        days, hours, minutes, rest = (float(part or 0) for part in match.groups())
+        seconds = ((24 * days + hours) * 60 + minutes) * 60 + rest
+    if not 0 < seconds < 1e9:
+        raise InputError(
+            f"walltime is {text!r}: it must be a positive time as 3600, 1h30m or 12:00:00"
+        )
+    return seconds
+
+
+def deadline(
+    walltime: float | None, started: float, environ: Mapping[str, str] = os.environ
+) -> float | None:
+    """Return when to give up what is in flight, as ``time.time()`` counts; None if never.
+
+    Parameters
+    ----------
+    walltime : float, optional
+        Seconds from ``started``. If not given, the batch system is asked: Slurm tells when the job
+        ends, Torque how long it may run.
+    started : float
+        When this process started.
+    """
+    if walltime is not None:
+        return started + walltime - min(RESERVE, RESERVE_SHARE * walltime)
+    try:
+        end = float(environ["SLURM_JOB_END_TIME"])
+    except (KeyError, ValueError):
+        pass
+    else:
+        return end - min(RESERVE, RESERVE_SHARE * max(0.0, end - started))
+    try:
+        limit = float(environ["PBS_WALLTIME"])
+    except (KeyError, ValueError):
+        return None
+    return started + limit - min(RESERVE, RESERVE_SHARE * limit)
