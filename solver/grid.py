@@ -299,7 +299,7 @@ class _Steps:
             return relaxed, True
         smooth = 0.5 * work * (change if self.branch == "loading" else -change)
         # One node more or less at each edge is the grid's own unrest, not curvature.
-        unrest = abs(smooth) * min(1.0, 2 * len(before_edges(frozen)) / max(flips, 1))
+        unrest = 0.25 * abs(smooth) * min(1.0, 2 * len(before_edges(frozen)) / max(flips, 1))
         allowed = 0.3 * accuracy * self.adhesion_scale * stride / self.h_max + unrest
         if abs(drop - smooth) > allowed and divisible:
             return None, False

@@ -38,7 +38,9 @@ class Contact:
     residual : float
         max |h - s - v| over Ω, in m.
     elastic_energy : float
-        In J/m; its error is of second order in the residual.
+        In J/m, from below; its error is of second order in the residual.
+    energy_error : float
+        Estimate from above of that error, in J/m.
     """
 
     separation: float
@@ -47,6 +49,7 @@ class Contact:
     displacement: Array
     residual: float = 0.0
     elastic_energy: float = 0.0
+    energy_error: float = 0.0
 
     def copy(self) -> Contact:
         """Return a copy that shares no array with this one."""
@@ -57,6 +60,7 @@ class Contact:
             self.displacement.copy(),
             self.residual,
             self.elastic_energy,
+            self.energy_error,
         )
 
 
@@ -140,6 +144,10 @@ class ContactSolver:
             )
         contact.displacement = displacement
         contact.residual = largest
+        if rz == 0.0 and largest > 0.0:
+            rz = float(residual @ elastic.precondition(residual))
+        # That of the last but one iterate: the preconditioner stands in for the inverse of V.
+        contact.energy_error = 0.5 * elastic.dx * rz
         # max over σ of ∫σ(h - s) - ½∫σv is the elastic energy: errors enter quadratically.
         contact.elastic_energy = elastic.dx * float(
             stress @ target - 0.5 * (stress @ displacement)

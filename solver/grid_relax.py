@@ -114,6 +114,15 @@ class Relaxation:
                 self.sweeps += 1
                 continue
             energy = self.energy(current)
+            if (
+                anchor is not None
+                and moves
+                and energy >= anchor_energy - current.energy_error
+                and current.residual > self.tight
+            ):
+                # Unsolved stress has too little energy: no decision on it when it is close.
+                self.solver.solve(current, self.tight)
+                continue
             if anchor is not None and moves and energy >= anchor_energy:
                 # The last sweep did not pay: take it back and try fewer edges, shorter steps.
                 self.rejected += 1
@@ -136,7 +145,6 @@ class Relaxation:
             if not moves:
                 if current.residual > self.tight:
                     self.solver.solve(current, self.tight)
-                    anchor = None
                     continue
                 if not self._nucleate(current):
                     return current
