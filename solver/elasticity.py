@@ -65,7 +65,7 @@ class ElasticGrid:
 
     def energy(self, stress: Array, displacement: Array) -> float:
         """½∫σ v dx over one period, in J/m."""
-        return 0.5 * self.dx * float(stress @ displacement)
+        return 0.5 * self.dx * float(np.einsum("i,i->", stress, displacement))
 
 
 def full_contact_stress(profile: Profile, modulus: float, n: int) -> Array:

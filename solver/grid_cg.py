@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.elasticity import ElasticGrid
+from solver.grid_kernels import advance, dot, turn
 from solver.profile import Array
 
 Mask = NDArray[np.bool_]
@@ -114,7 +115,6 @@ class ContactSolver:
         target = self.height - contact.separation
         displacement = elastic.displacement(stress).copy()
         residual = (target - displacement) * inside
-        correction = np.empty_like(residual)
         direction = np.zeros_like(residual)
         rz_before = 0.0
         rz = 0.0
@@ -122,20 +122,15 @@ class ContactSolver:
         for _ in range(_MAX_ITERATIONS):
             if largest <= tolerance:
                 break
-            np.multiply(elastic.precondition(residual), inside, out=correction)
-            rz = float(residual @ correction)
-            direction *= rz / rz_before if rz_before else 0.0
-            direction += correction
+            correction = elastic.precondition(residual)
+            rz = dot(residual, correction)
+            turn(direction, inside, correction, rz / rz_before if rz_before else 0.0)
             response = elastic.displacement(direction)
-            step = rz / float(direction @ response)
-            np.multiply(direction, step, out=correction)
-            stress += correction
-            np.multiply(response, step, out=correction)
-            displacement += correction
-            correction *= inside
-            residual -= correction
+            step = rz / dot(direction, response)
+            largest = advance(
+                stress, displacement, residual, direction, response, inside, step
+            )
             rz_before = rz
-            largest = float(np.abs(residual).max())
             self.iterations += 1
         else:
             raise RuntimeError(
@@ -145,10 +140,10 @@ class ContactSolver:
         contact.displacement = displacement
         contact.residual = largest
         if rz == 0.0 and largest > 0.0:
-            rz = float(residual @ elastic.precondition(residual))
+            rz = dot(residual, elastic.precondition(residual))
         # That of the last but one iterate: the preconditioner stands in for the inverse of V.
         contact.energy_error = 0.5 * elastic.dx * rz
         # max over σ of ∫σ(h - s) - ½∫σv is the elastic energy: errors enter quadratically.
-        contact.elastic_energy = elastic.dx * float(
-            stress @ target - 0.5 * (stress @ displacement)
+        contact.elastic_energy = elastic.dx * (
+            dot(stress, target) - 0.5 * dot(stress, displacement)
         )

@@ -17,34 +17,55 @@ from functools import lru_cache
 
 import numpy as np
 
+from solver.grid_kernels import inverse_form
 from solver.profile import Array
 
-# Blocks of one node at the ends of a patch, and the growth of the ones behind them.
-_SINGLE_NODES = 6
-_GROWTH = 1.6
+# Blocks of one node at the end of a patch that faces the node, and the growth of those behind them.
+_SINGLE_NODES = 5
+_GROWTH = 1.8
 # Lengths up to this many nodes are taken exactly, longer ones rounded in equal ratios.
 _EXACT_LENGTH = 24
-_RATIO = 1.05
+_RATIO = 1.08
 
 
 @lru_cache(maxsize=None)
-def _block_ends(length: int) -> tuple[int, ...]:
-    """Offsets of the block ends of a patch of ``length`` nodes, symmetric, from 0 to length."""
-    half: list[int] = [0]
+def _growing(length: int) -> tuple[int, ...]:
+    """Offsets of block ends that grow away from offset 0, up to ``length``."""
+    ends = [0]
     width = 1.0
-    while half[-1] + round(width) <= length // 2:
-        half.append(half[-1] + round(width))
-        if len(half) > _SINGLE_NODES:
+    while ends[-1] + round(width) <= length:
+        ends.append(ends[-1] + round(width))
+        if len(ends) > _SINGLE_NODES:
             width *= _GROWTH
-    return tuple(sorted(set(half) | {length - offset for offset in half}))
+    return tuple(ends)
+
+
+@lru_cache(maxsize=None)
+def _fine_near(length: int) -> tuple[int, ...]:
+    """Block ends of a patch of ``length`` nodes, fine at offset 0 only."""
+    ends = _growing(length)
+    return ends if ends[-1] == length else (*ends, length)
+
+
+@lru_cache(maxsize=None)
+def _fine_both(length: int) -> tuple[int, ...]:
+    """Block ends of a patch of ``length`` nodes, fine at both ends."""
+    half = _growing(length // 2)
+    return tuple(sorted({*half, *(length - offset for offset in half)}))
+
+
+_rounded_known: dict[int, int] = {}
 
 
 def _rounded(length: int) -> int:
     """Length on a scale of equal ratios, exact below ``_EXACT_LENGTH``."""
     if length <= _EXACT_LENGTH:
         return length
-    steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
-    return round(_EXACT_LENGTH * _RATIO**steps)
+    known = _rounded_known.get(length)
+    if known is None:
+        steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
+        known = _rounded_known[length] = round(_EXACT_LENGTH * _RATIO**steps)
+    return known
 
 
 class EdgeCompliance:
@@ -102,29 +123,31 @@ class EdgeCompliance:
 
     def _compute(self, key: tuple[int, ...]) -> float:
         """Schur complement of the node at 0; the patch lies at -1, -2, …"""
-        patches = [(-key[0], 0)]
+        low: list[int] = []
+        high: list[int] = []
+
+        def add(start: int, sign: int, ends: tuple[int, ...]) -> None:
+            places = sorted(start + sign * offset for offset in ends)
+            low.extend(places[:-1])
+            high.extend(places[1:])
+
+        add(0, -1, _fine_both(key[0]))
         if len(key) > 1:
             width, gap, next_width, other_gap, other_width = key
             # A lumped neighbour must not reach round the period.
             reach = self.n // 3
             if gap < reach:
-                patches.append((gap, min(gap + next_width, reach)))
-            start = -width - other_gap
-            if -start < reach:
-                patches.append((max(start - other_width, -reach), start))
-        low: list[int] = []
-        high: list[int] = []
-        for first, stop in patches:
-            ends = [first + offset for offset in _block_ends(stop - first)]
-            low += ends[:-1]
-            high += ends[1:]
+                add(gap, 1, _fine_near(min(next_width, reach - gap)))
+            start = width + other_gap
+            if start < reach:
+                add(-start, -1, _fine_near(min(other_width, reach - start)))
         if not low:
             return self._self
         a = np.array(low)
         b = np.array(high)
         v = self._block(a[:, None], b[:, None], a[None, :], b[None, :])
         to_node = self._block(a, b, np.array(0), np.array(1))
-        return self._self - float(to_node @ np.linalg.solve(v, to_node))
+        return self._self - float(inverse_form(v, to_node))
 
     def _block(self, a: Array, b: Array, c: Array, d: Array) -> Array:
         """Sum of V over the nodes a … b-1 and c … d-1."""

@@ -85,7 +85,7 @@ class Relaxation:
 
     def adhesion_energy(self, contact: Contact) -> float:
         """-Σ γ sqrt(1 + h'²) dx over the contact nodes, in J/m."""
-        return -self.elastic.dx * float(self.adhesion @ contact.mask)
+        return -self.elastic.dx * float(np.sum(self.adhesion[contact.mask]))
 
     def energy(self, contact: Contact) -> float:
         """U in J/m, per period."""
