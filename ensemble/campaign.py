@@ -293,7 +293,7 @@ def _read_table(source: str, name: Table, entries: object) -> Any:
     for key in entries:
         if key not in known:
             raise InputError(
-                f"{source}: [{name}] {key} is unknown; the keys of [{name}] are {', '.join(known)}"
+                f"{source}: [{name}] {_spelt(key)} is unknown; the keys of [{name}] are {', '.join(known)}"
             )
     values = {
         key: known[key].metadata["rule"](f"{source}: [{name}] {key}", value)
@@ -306,6 +306,10 @@ def _read_table(source: str, name: Table, entries: object) -> Any:
                 f"it must be {entry.metadata['rule'].text}"
             )
     return kind(**values)
+
+
+def _spelt(key: str) -> str:
+    return key if key.isidentifier() else shown(key)
 
 
 def _check_together(source: str, campaign: Campaign) -> None:

@@ -5,3 +5,7 @@ from __future__ import annotations
 
 class InputError(Exception):
     """A bad value, file or option. The text names the value and the rule in one sentence."""
+
+
+class WriteError(Exception):
+    """A row could not be written: the disk is full, say. What was written before is sound."""

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.campaign import Campaign, parse_campaign
-from ensemble.errors import InputError
+from ensemble.errors import InputError, WriteError
 from ensemble.schema import (
     COLUMNS,
     DONE,
@@ -205,11 +205,15 @@ class Writer:
             self._write(row, {c.name: c.fill for c in cleared}, PENDING)
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
-        for name, value in values.items():
-            self._datasets[name].write(row, value)
-        self._flush()
-        self._datasets["status"].write(row, status)
-        self._flush()
+        try:
+            for name, value in values.items():
+                self._datasets[name].write(row, value)
+            self._flush()
+            self._datasets["status"].write(row, status)
+            self._flush()
+        except (OSError, RuntimeError) as error:
+            reason = _reason(error) if isinstance(error, OSError) else str(error).split("(")[0]
+            raise WriteError(f"row {row} of {self.path} could not be written: {reason}") from error
 
     def _flush(self) -> None:
         # Parallel HDF5 keeps no data back; the serial driver does, in any order.
@@ -377,4 +381,4 @@ def _damage(path: Path) -> Iterator[None]:
 
 def _reason(error: OSError) -> str:
     """Return the reason of an error, without h5py's call stack."""
-    return error.strerror or os.strerror(error.errno) if error.errno else str(error).split("(")[0]
+    return os.strerror(error.errno) if error.errno else str(error).split("(")[0].strip()

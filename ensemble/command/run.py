@@ -1,8 +1,8 @@
 """Run or resume a campaign; under mpirun, rank 0 hands out and the others work.
 
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
-refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 75 stopped early (a signal,
-the walltime): run the same command again to resume.
+refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 74 the results file could
+not be written, 75 stopped early (a signal, the walltime): run the same command again to resume.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, WriteError
 
-DONE, SOME_FAILED, BAD_INPUT, RESUME = 0, 1, 2, 75
+DONE, SOME_FAILED, BAD_INPUT, WRITE_FAILED, RESUME = 0, 1, 2, 74, 75
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,6 +61,7 @@ def execute(args: argparse.Namespace) -> int:
 
     started = time.time()
     first = launched()[1] == 0
+    comm = None
     try:
         comm = world()
         if comm is not None:
@@ -71,6 +72,11 @@ def execute(args: argparse.Namespace) -> int:
         if first:
             print(f"hysteron run: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT
+    except WriteError as error:
+        print(f"hysteron run: {error}; what was done is kept", file=sys.stderr, flush=True)
+        if comm is not None:
+            comm.Abort(WRITE_FAILED)  # the other ranks know nothing of it
+        return WRITE_FAILED
 
 
 def _run(args: argparse.Namespace, comm: Any, started: float) -> int:

@@ -1,0 +1,68 @@
+"""``python fake_run.py BEHAVIOUR run …``: the command line with tasks that cost what a test wants.
+
+BEHAVIOUR is a list of words, tasks given as H:γ:realisation with ``*`` for any:
+``step=SECONDS`` time of a load step, ``fail=TASK`` raise, ``hang=TASK`` never reach the next load
+step, ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+import ensemble.run
+from ensemble.campaign import Campaign
+from ensemble.schema import RESULT_COLUMNS, scales, shape_of
+from ensemble.task import Task, TaskResult
+
+
+def matches(pattern: str | None, task: Task) -> bool:
+    if pattern is None:
+        return False
+    values = (task.hurst, task.work_of_adhesion, task.realisation)
+    return all(p == "*" or float(p) == v for p, v in zip(pattern.split(":"), values, strict=True))
+
+
+def fake_result(campaign: Campaign, task: Task) -> TaskResult:
+    """Numbers that depend on the task alone."""
+    mixed = [task.seed, round(1e6 * task.hurst), round(1e6 * task.work_of_adhesion)]
+    rng = np.random.default_rng(mixed)
+    sizes = {s.name: s.values.size for s in scales(campaign)}
+    values = {}
+    for column in RESULT_COLUMNS:
+        shape = shape_of(column, sizes)[1:]
+        drawn = rng.random(shape) if column.dtype == "f8" else rng.integers(0, 2, shape)
+        values[column.name] = np.asarray(drawn, column.dtype)
+    return TaskResult(**{k: v if v.ndim else v.item() for k, v in values.items()})
+
+
+def install(behaviour: str) -> None:
+    settings = dict(word.split("=", 1) for word in behaviour.split())
+
+    def run_task(campaign, task, progress=None):
+        if "log" in settings:
+            with open(settings["log"], "a") as log:
+                log.write(f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}\n")
+        if matches(settings.get("crash"), task):
+            ensemble.run._Session._write = None
+        while matches(settings.get("hang"), task):
+            time.sleep(0.01)
+        for _ in range(campaign.cycle.load_steps):
+            time.sleep(float(settings.get("step", 0)))
+            if progress is not None:
+                progress("loading", 0.0, None)
+        if matches(settings.get("fail"), task):
+            raise FloatingPointError("the sum of γ diverged")
+        return fake_result(campaign, task)
+
+    ensemble.run.run_task = run_task
+    ensemble.run.check_task = lambda campaign, task: None
+
+
+if __name__ == "__main__":
+    from ensemble.command import main
+
+    install(sys.argv[1])
+    sys.exit(main(sys.argv[2:]))
