@@ -1,0 +1,264 @@
+"""One loading-unloading loop of one profile: its losses, its jumps and its energy audit.
+
+The profile is either given as heights (one period, equally spaced, band-limited interpolation
+between them) or self-affine with random phases. Lengths in m, stresses in Pa.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ensemble.errors import InputError
+from ensemble.loop_record import (
+    FieldStates,
+    check_writable,
+    loop_document,
+    loop_summary,
+    write_json,
+    write_npz,
+)
+from solver.loop import Progress, check_cycle, run_loop
+from solver.material import HalfSpace
+from solver.method import Branch, ContactState, Method
+from solver.methods import METHOD_NAMES, make_method
+from solver.problem import Problem
+from solver.profile import Array, Profile, profile_from_heights, self_affine_profile
+
+# The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
+_PERIOD, _N0, _RATIO, _H_RMS = 2e-3 * np.pi, 10, 100, 1e-6
+_FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
+_SECONDS_BETWEEN_LINES = 5.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``hysteron loop``."""
+    shape = parser.add_argument_group("profile (either --heights or --hurst)")
+    shape.add_argument("--heights", type=Path, metavar="FILE", help=".npy or .csv: heights in m")
+    shape.add_argument("--hurst", type=float, metavar="H", help="Hurst exponent, 0 < H < 1")
+    shape.add_argument("--seed", type=int, metavar="K", help="seed of the phases (default 0)")
+    shape.add_argument(
+        "--period", type=float, metavar="L", help="period in m (default with --hurst: 2π mm)"
+    )
+    shape.add_argument("--n0", type=int, help=f"lowest harmonic (default {_N0})")
+    shape.add_argument("--ratio", type=int, help=f"highest over lowest harmonic (default {_RATIO})")
+    shape.add_argument(
+        "--h-rms", type=float, metavar="M", help=f"rms height in m (default {_H_RMS:g})"
+    )
+    shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
+    shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
+    shape.add_argument("--amplitudes", metavar="KIND", help="deterministic (default) or rayleigh")
+    contact = parser.add_argument_group("contact and cycle")
+    contact.add_argument(
+        "--work-of-adhesion", type=float, default=0.04, metavar="G", help="J/m² (default 0.04)"
+    )
+    contact.add_argument("--young", type=float, default=1e6, metavar="E", help="Pa (default 1e6)")
+    contact.add_argument("--poisson", type=float, default=0.5, metavar="NU", help="(default 0.5)")
+    contact.add_argument(
+        "--max-penetration", type=float, default=0.9, metavar="D", help="Δ/h_max (default 0.9)"
+    )
+    contact.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+    method = parser.add_argument_group("method")
+    method.add_argument(
+        "--method", default="grid", metavar="NAME", help=f"{', '.join(METHOD_NAMES)} (default grid)"
+    )
+    method.add_argument(
+        "--accuracy", type=float, default=1e-3, help="relative error of the loss (default 1e-3)"
+    )
+    method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
+    output = parser.add_argument_group("output")
+    output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")
+    output.add_argument("--fields", type=Path, metavar="FILE.npz", help="stress, shape and gap")
+    output.add_argument(
+        "--field-penetrations",
+        nargs="+",
+        type=float,
+        metavar="D",
+        help="Δ/h_max of the fields on both branches (default: quarters of --max-penetration)",
+    )
+    output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
+    output.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Run the loop and write what was asked for."""
+    with _bad_input():
+        profile = _given_heights(args) if _wants_heights(args) else _self_affine(args)
+        half_space = HalfSpace(args.young, args.poisson)
+        problem = Problem(profile, half_space, args.work_of_adhesion)
+        check_cycle(args.max_penetration, args.load_steps)
+    for path in (args.json, args.fields):
+        if path is not None:
+            check_writable(path)
+    penetrations = _field_penetrations(args)
+    with _bad_input():
+        method = make_method(
+            args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
+        )
+    picked = FieldStates(method, penetrations)
+    nodes = _field_nodes(args, method) if penetrations else 0
+    result = run_loop(
+        method,
+        max_penetration=args.max_penetration,
+        load_steps=args.load_steps,
+        progress=None if args.quiet else _progress(args.max_penetration / args.load_steps),
+        on_state=picked.visit if penetrations else None,
+    )
+    if args.json is not None:
+        write_json(args.json, loop_document(result))
+    if penetrations:
+        write_npz(args.fields, picked.collect(nodes))
+    print(loop_summary(result))
+    for path in (args.json, args.fields):
+        if path is not None:
+            print(f"wrote       {path}")
+    return 0
+
+
+# ---------------------------------------------------------------------- input
+
+
+@contextmanager
+def _bad_input() -> Iterator[None]:
+    """Turn the refusals of the solver's constructors into the user's errors; nothing else."""
+    try:
+        yield
+    except (ValueError, NotImplementedError) as error:
+        raise InputError(str(error)) from None
+
+
+def _wants_heights(args: argparse.Namespace) -> bool:
+    if (args.heights is None) == (args.hurst is None):
+        both = "neither is" if args.hurst is None else "both are"
+        raise InputError(f"give either --heights or --hurst: {both} given")
+    if args.heights is None:
+        return False
+    if args.period is None:
+        raise InputError("--heights needs --period, the length of the period in m")
+    for name in ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes"):
+        if getattr(args, name) is not None:
+            option = "--" + name.replace("_", "-")
+            raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
+    return True
+
+
+def _given_heights(args: argparse.Namespace) -> Profile:
+    return profile_from_heights(_read_heights(args.heights), args.period)
+
+
+def _self_affine(args: argparse.Namespace) -> Profile:
+    norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
+    if all(value is None for value in norms.values()):
+        norms["h_rms"] = _H_RMS
+    return self_affine_profile(
+        args.hurst,
+        period=_PERIOD if args.period is None else args.period,
+        n0=_N0 if args.n0 is None else args.n0,
+        ratio=_RATIO if args.ratio is None else args.ratio,
+        seed=0 if args.seed is None else args.seed,
+        amplitudes=args.amplitudes or "deterministic",
+        **norms,
+    )
+
+
+def _read_heights(path: Path) -> Array:
+    """Heights of a .npy (one row) or a .csv (one column, or one row) in m.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read as one row of numbers.
+    """
+    if path.suffix not in (".npy", ".csv"):
+        raise InputError(f"heights file {path}: it must be a .npy or a .csv file")
+    table: Any
+    try:
+        if path.suffix == ".npy":
+            table = np.load(path, allow_pickle=False)
+        else:
+            lines = path.read_text(encoding="utf-8").split("\n")
+            rows = [line.split(",") for line in lines if line.strip() and line.strip()[0] != "#"]
+            if len({len(row) for row in rows}) > 1:
+                raise ValueError("its lines differ in length")
+            table = np.array([[float(word) for word in row] for row in rows])
+    except OSError as error:
+        raise InputError(f"cannot read heights file {path}: {error.strerror or error}") from None
+    except (ValueError, EOFError) as error:
+        raise InputError(f"heights file {path} is not a table of numbers: {error}") from None
+    if table.dtype.kind not in "fiu":
+        raise InputError(f"heights file {path} holds {table.dtype}: heights are real numbers")
+    if table.ndim > 2 or (table.ndim == 2 and 1 not in table.shape):
+        shape = " × ".join(str(size) for size in table.shape)
+        raise InputError(
+            f"heights file {path} holds {shape} numbers: it must hold one column (or one row), "
+            "the heights of one period"
+        )
+    return np.asarray(table, dtype=float).reshape(-1)
+
+
+def _field_penetrations(args: argparse.Namespace) -> list[float]:
+    """Penetrations of the fields; empty if no fields are wanted."""
+    if args.fields is None:
+        for name in ("field_penetrations", "field_nodes"):
+            if getattr(args, name) is not None:
+                raise InputError(f"--{name.replace('_', '-')} needs --fields, where to write them")
+        return []
+    if args.fields.suffix != ".npz":
+        raise InputError(f"--fields is {args.fields}: the name must end in .npz")
+    if args.field_penetrations is None:
+        return [part * args.max_penetration for part in _FIELD_PARTS]
+    wanted = [float(value) for value in args.field_penetrations]
+    for value in wanted:
+        if not (np.isfinite(value) and value <= args.max_penetration):
+            raise InputError(
+                f"--field-penetrations holds {value}: the loop goes no deeper than "
+                f"{args.max_penetration}"
+            )
+    return list(dict.fromkeys(wanted))
+
+
+def _field_nodes(args: argparse.Namespace, method: Method) -> int:
+    """Nodes of the fields: those asked for, else the method's own, else 32 per shortest wave."""
+    if args.field_nodes is None:
+        own = method.describe().get("nodes")
+        if own is not None:
+            return int(own)
+        return 1 << (32 * method.problem.profile.highest_harmonic - 1).bit_length()
+    with _bad_input():
+        # A method refuses a number of nodes here, not after the loop has been computed.
+        method.problem.profile.heights(args.field_nodes)
+        method.fields(method.detached(method.problem.separation(0.0)), args.field_nodes)
+    return int(args.field_nodes)
+
+
+# ---------------------------------------------------------------------- progress
+
+
+def _progress(step: float) -> Progress:
+    """Progress lines on stderr: one that is rewritten on a terminal, else one every few seconds."""
+    live = sys.stderr.isatty()
+    started = last = time.monotonic()
+
+    def show(branch: Branch, penetration: float, state: ContactState) -> None:
+        nonlocal last
+        now = time.monotonic()
+        done = branch == "unloading" and not state.patches
+        if not live and not done and now - last < _SECONDS_BETWEEN_LINES:
+            return
+        last = now
+        line = (
+            f"{branch:<9} step {round(penetration / step):>4}  Δ/h_max {penetration:+.3f}  "
+            f"A/A0 {state.contact_fraction:.4f}  patches {state.patches:>4}  "
+            f"{now - started:.0f} s"
+        )
+        end = "\n" if done or not live else ""
+        print(f"\r{line}" if live else line, end=end, file=sys.stderr, flush=True)
+
+    return show
