@@ -104,3 +104,67 @@ def test_local_script_asks_for_a_campaign() -> None:
     done = subprocess.run([ROOT / "jobs" / "local.sh"], capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "usage: jobs/local.sh CAMPAIGN.toml" in done.stderr
+
+
+# ------------------------------------------------------------------ the PBS script, with a stand-in
+
+
+def pbs(tmp_path: Path, code: int, **env: str) -> tuple[str, str]:
+    """Run jobs/pbs.sh where qstat, qsub and hysteron only say how they were called."""
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    calls = tmp_path / "calls"
+    for name, text in {
+        "hysteron": f'echo "hysteron $*" >>{calls}; [ "$1" = report ] || exit {code}',
+        "qsub": f'echo "qsub $*" >>{calls}',
+        "mpirun": f'echo "mpirun $1 $2" >>{calls}; shift 4; exec "$@"',
+        "qstat": "printf '    Resource_List.select = 2:ncpus=2:mpiprocs=2\\n"
+        "    Resource_List.nodect = 2\\n    Resource_List.nodes = 2\\n"
+        "    Resource_List.walltime = 01:30:00\\n    resources_used.walltime = 00:00:30\\n'",
+    }.items():
+        (tools / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tools / name).chmod(0o755)
+    (tmp_path / "nodes").write_text("a\na\nb\nb\n")
+    done = subprocess.run(
+        [ROOT / "jobs" / "pbs.sh"],
+        env={
+            "PATH": f"{tools}:/usr/bin:/bin",
+            "PBS_O_WORKDIR": str(tmp_path),
+            "PBS_NODEFILE": str(tmp_path / "nodes"),
+            "PBS_JOBID": "17.head",
+            "CAMPAIGN": "study.toml",
+        }
+        | env,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == code, done.stdout + done.stderr
+    return calls.read_text(), done.stdout
+
+
+def test_pbs_script_tells_the_run_its_time_and_reports(tmp_path: Path) -> None:
+    calls, _ = pbs(tmp_path, 0)
+    run = re.search(r"hysteron run study.toml --out study.h5 --walltime (\d+)", calls)
+    assert run is not None
+    assert 5240 <= int(run[1]) <= 5250  # an hour and a half, less 30 s and two minutes
+    assert "mpirun -n 4" in calls
+    assert "hysteron report study.h5 --to study" in calls
+    assert "qsub" not in calls
+
+
+def test_pbs_script_submits_its_continuation(tmp_path: Path) -> None:
+    calls, _ = pbs(tmp_path, 75)
+    (line,) = [line for line in calls.splitlines() if line.startswith("qsub")]
+    assert "-l select=2:ncpus=2:mpiprocs=2 -l walltime=01:30:00 -v CAMPAIGN=study.toml," in line
+    assert "nodes=" not in line
+    assert "RESTARTS=1" in line
+    assert line.endswith(" jobs/pbs.sh")
+    assert "report" not in calls
+
+
+def test_pbs_script_does_not_come_back_for_ever(tmp_path: Path) -> None:
+    calls, text = pbs(tmp_path, 75, RESTARTS="3", MAX_RESTARTS="3")
+    assert "qsub" not in calls
+    assert "not submitted again" in text

@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Sourced by the local scripts (never by the batch scripts): finds the mpirun that belongs to this
 # installation's MPI and lets it start more ranks than cores, also as root, where it has to.
 #

@@ -8,6 +8,8 @@
 #   PYTHON            the interpreter for .venv (default: python3)
 #   HDF5_DIR          a parallel HDF5 to build h5py against (default: looked for)
 #   HYSTERON_APT=no   never install system packages
+# Lists of packages are words on purpose.
+# shellcheck disable=SC2046,SC2086,SC2030,SC2031
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
