@@ -126,6 +126,18 @@ class OutputTable:
     """``[output]``: what is kept of a loop, besides losses and curves."""
 
     jumps: int = _key(whole_number(1, 100_000), "places in the catalogue of jumps of a task", 512)
+    field_penetrations: tuple[float, ...] | None = _key(
+        list_of(number_between(-1000, 1), may_be_empty=True),
+        "penetrations Δ/h_max at which spectra and gaps are kept, on both branches; by default a "
+        "third, two thirds and all of max_penetration",
+        None,
+    )
+    field_realisations: int = _key(
+        whole_number(0, 1000), "so many first realisations keep the fields themselves", 1
+    )
+    field_nodes: int = _key(
+        whole_number(16, 65_536), "most nodes of a field that is kept (a power of two is)", 4096
+    )
 
 
 Table = Literal["profile", "material", "sweep", "cycle", "solver", "output"]
@@ -331,6 +343,13 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [sweep] makes {campaign.task_count} tasks: "
             f"at most {_MOST_TASKS} are allowed"
         )
+    for value in campaign.output.field_penetrations or ():
+        if not cycle.unloading_until <= value <= cycle.max_penetration:
+            raise InputError(
+                f"{source}: [output] field_penetrations holds {value}: it must lie between "
+                f"unloading_until ({cycle.unloading_until:g}) and max_penetration "
+                f"({cycle.max_penetration:g})"
+            )
     length = cycle.load_steps * (1 - cycle.unloading_until / cycle.max_penetration)
     if length > _LONGEST_AXIS:
         raise InputError(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ensemble.campaign import Campaign
 from ensemble.errors import InputError
+from ensemble.fields import GAP_EDGES, HEIGHT_EDGES, field_plan
 from solver.jumps import JUMP_KINDS
 
 FILE_TYPE = "hysteron-results"
@@ -23,6 +24,10 @@ PENDING, DONE, FAILED = 0, 1, 2
 ERROR_LENGTH = 512
 
 _FLOAT, _COUNT, _FLAG = "f8", "i4", "i1"
+_FIELD = "f4"  # fields are looked at and averaged; seven digits are plenty
+
+# First dimension of the datasets that only the first realisations have rows of.
+KEPT = "field_task"
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ class Column:
     ----------
     name : str
     dims : tuple of str
-        Names of the dimensions, ``task`` first.
+        Names of the dimensions, ``task`` or ``field_task`` first.
     dtype : str
         numpy's name of the type.
     unit : str
@@ -83,6 +88,17 @@ def _jump(name: str, dtype: str, unit: str, meaning: str, **attributes: Any) -> 
     return Column(name, ("task", "jump"), dtype, unit, meaning, attributes)
 
 
+_STATES = ("field_branch", "field_penetration")
+
+
+def _reduced(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Column:
+    return Column(name, ("task", *dims), _FIELD, unit, meaning)
+
+
+def _kept(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Column:
+    return Column(name, (KEPT, *dims, "field_position"), _FIELD, unit, meaning)
+
+
 # What the task is, known before it runs.
 TASK_COLUMNS: tuple[Column, ...] = (
     _task("hurst", _FLOAT, "1", "Hurst exponent H"),
@@ -126,6 +142,24 @@ RESULT_COLUMNS: tuple[Column, ...] = (
     _jump("jump_contact_after", _FLOAT, "1", "contact fraction after the jump"),
     _jump("jump_patches_before", _COUNT, "1", "patches before the jump"),
     _jump("jump_patches_after", _COUNT, "1", "patches after the jump"),
+    _reduced("psd_height", ("wave_number",), "m3", "two-sided spectral density of the profile"),
+    _reduced("height_density", ("height_bin",), "1", "probability density of height/h_rms"),
+    _reduced(
+        "psd_displacement",
+        (*_STATES, "wave_number"),
+        "m3",
+        "two-sided spectral density of the deformed surface",
+    ),
+    _reduced(
+        "gap_density",
+        (*_STATES, "gap_bin"),
+        "1",
+        "probability density of gap/h_max, nodes in contact left out",
+    ),
+    _kept("field_height", (), "m", "height of the rigid profile"),
+    _kept("field_displacement", _STATES, "m", "displacement of the elastic surface"),
+    _kept("field_stress", _STATES, "Pa", "stress, compression positive"),
+    _kept("field_gap", _STATES, "m", "gap"),
 )
 COLUMNS: tuple[Column, ...] = TASK_COLUMNS + RUN_COLUMNS + RESULT_COLUMNS
 
@@ -140,8 +174,16 @@ class Scale:
     meaning: str
 
 
+def kept_rows(campaign: Campaign) -> NDArray[np.int64]:
+    """Return the rows of the tasks that keep their fields: the first realisations."""
+    realisations = campaign.sweep.realisations
+    rows = np.arange(campaign.task_count)
+    return rows[rows % realisations < campaign.output.field_realisations]
+
+
 def scales(campaign: Campaign) -> tuple[Scale, ...]:
     """Return the dimensions of a campaign's results file."""
+    plan = field_plan(campaign)
     return (
         Scale("task", np.arange(campaign.task_count), "1", "row of the task"),
         Scale(
@@ -157,6 +199,23 @@ def scales(campaign: Campaign) -> tuple[Scale, ...]:
             "penetration/h_max on unloading",
         ),
         Scale("jump", np.arange(campaign.output.jumps), "1", "place in the catalogue of jumps"),
+        Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin"),
+        Scale(
+            "gap_bin",
+            np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:]),
+            "1",
+            "gap/h_max, geometric middle of its bin",
+        ),
+        Scale(
+            "height_bin",
+            0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:]),
+            "1",
+            "height/h_rms, middle of its bin",
+        ),
+        Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
+        Scale("field_penetration", plan.penetration, "1", "penetration/h_max of a field"),
+        Scale("field_position", plan.position, "m", "position of a node of a kept field"),
+        Scale(KEPT, kept_rows(campaign), "1", "row of a task that keeps its fields"),
     )
 
 

@@ -32,6 +32,7 @@ from ensemble.schema import (
     FAILED,
     FILE_TYPE,
     FILE_VERSION,
+    KEPT,
     PENDING,
     RESULT_COLUMNS,
     TASK_COLUMNS,
@@ -45,6 +46,7 @@ from ensemble.schema import (
 from ensemble.task import Task, TaskResult
 
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
+_KEPT_NAMES = frozenset(c.name for c in COLUMNS if c.dims[0] == KEPT)
 
 
 class Results:
@@ -168,6 +170,7 @@ class Writer:
         options = {"locking": False} if comm is None else {"driver": "mpio", "comm": comm}
         self._file = h5py.File(self.path, "r+", **options)
         self._datasets = {c.name: _RowWriter(self._file[c.name]) for c in COLUMNS}
+        self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
 
     def __enter__(self) -> Self:
         return self
@@ -207,7 +210,9 @@ class Writer:
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
         try:
             for name, value in values.items():
-                self._datasets[name].write(row, value)
+                place = self._kept.get(row) if name in _KEPT_NAMES else row
+                if place is not None:
+                    self._datasets[name].write(place, value)
             self._flush()
             self._datasets["status"].write(row, status)
             self._flush()
@@ -234,6 +239,8 @@ class _RowWriter:
 
     def write(self, row: int, value: Any) -> None:
         block = np.empty((1, *self._shape), self._dtype)
+        if not block.size:
+            return
         block[0] = value
         self._space.select_hyperslab((row, *self._rest), (1, *self._shape))
         self._id.write(self._memory, self._space, block)
@@ -339,14 +346,17 @@ def _describe(
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
     place = {task: row for row, task in enumerate(campaign.tasks())}
     target = np.array([place[task] for task in old.tasks()])
+    # A task that kept its fields does so in the grown campaign: realisations are only added.
+    kept = np.searchsorted(file[KEPT][:], target[old.column(KEPT)])
     for column in COLUMNS:
         if column in TASK_COLUMNS:
             continue
         dataset = file[column.name]
+        targets = kept if column.name in _KEPT_NAMES else target
         width = max(1, int(np.prod(dataset.shape[1:])) * dataset.dtype.itemsize)
-        for first in range(0, len(target), max(1, _COPY_BYTES // width)):
+        for first in range(0, len(targets), max(1, _COPY_BYTES // width)):
             block = old.column(column.name, slice(first, first + max(1, _COPY_BYTES // width)))
-            rows = target[first : first + len(block)]
+            rows = targets[first : first + len(block)]
             for i, (start, stop) in _stretches(rows):
                 dataset[start:stop] = block[i : i + stop - start]
 

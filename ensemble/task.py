@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.errors import InputError
+from ensemble.fields import FieldRecorder, field_plan
 from solver.jumps import JUMP_KINDS, Jump
 from solver.loop import LoopResult, Progress, run_loop
 from solver.material import HalfSpace
@@ -68,7 +69,8 @@ class TaskResult:
     """One row of the results file; each attribute is the dataset of its name.
 
     Curves have the shape of the campaign's penetration axes, the catalogue of jumps that of
-    ``output.jumps``.
+    ``output.jumps``, fields that of the campaign's field plan (ensemble.fields). ``field_…`` are
+    None for tasks that keep no fields.
     """
 
     wall_time: float
@@ -105,6 +107,14 @@ class TaskResult:
     jump_contact_after: Array
     jump_patches_before: NDArray[np.int32]
     jump_patches_after: NDArray[np.int32]
+    psd_height: NDArray[np.float32]
+    height_density: NDArray[np.float32]
+    psd_displacement: NDArray[np.float32]
+    gap_density: NDArray[np.float32]
+    field_height: NDArray[np.float32] | None = None
+    field_displacement: NDArray[np.float32] | None = None
+    field_stress: NDArray[np.float32] | None = None
+    field_gap: NDArray[np.float32] | None = None
 
 
 def make_problem(campaign: Campaign, task: Task) -> Problem:
@@ -163,13 +173,17 @@ def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -
         Called after each load step; it may raise to give the task up.
     """
     wall, cpu = time.perf_counter(), time.process_time()
+    method = _make_method(campaign, task)
+    plan = field_plan(campaign)
+    recorder = FieldRecorder(plan, method, keep=task.realisation < plan.realisations)
     loop = run_loop(
-        _make_method(campaign, task),
+        method,
         max_penetration=campaign.cycle.max_penetration,
         load_steps=campaign.cycle.load_steps,
         progress=progress,
+        on_state=recorder.on_state,
     )
-    row = row_of(campaign, loop)
+    row = row_of(campaign, loop) | recorder.row()
     return TaskResult(
         wall_time=time.perf_counter() - wall, cpu_time=time.process_time() - cpu, **row
     )

@@ -22,7 +22,7 @@ from ensemble import schema
 from ensemble.campaign import parse_campaign
 from ensemble.errors import InputError
 from ensemble.lock import RunLock
-from ensemble.schema import COLUMNS, DONE, FAILED, PENDING, RESULT_COLUMNS, scales
+from ensemble.schema import COLUMNS, DONE, FAILED, KEPT, PENDING, RESULT_COLUMNS, scales
 from ensemble.store import Results, Writer, create
 
 
@@ -80,6 +80,8 @@ def test_rows_come_back_as_they_were_written(path, campaign):
     with Results(path) as results:
         assert results.status().tolist() == [0, 0, 0, DONE, 0, FAILED, 0, 0]
         for column in RESULT_COLUMNS:
+            if column.dims[0] == KEPT:  # tests/test_fields.py
+                continue
             value = np.asarray(getattr(result, column.name), column.dtype)
             assert results.column(column.name, slice(3, 4))[0].tobytes() == value.tobytes()
         assert results.column("rank")[3] == 7
@@ -120,6 +122,8 @@ def test_growing_keeps_every_row_in_its_place(path, campaign):
         rows = np.array([r for r, t in enumerate(results.tasks()) if t in place])
         olds = [place[t] for t in results.tasks() if t in place]
         for column in COLUMNS:
+            if column.dims[0] == KEPT:  # tests/test_fields.py
+                continue
             assert (
                 results.column(column.name, rows).tobytes() == before[column.name][olds].tobytes()
             )
