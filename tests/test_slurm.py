@@ -260,3 +260,21 @@ def test_a_job_at_its_time_limit_is_requeued_and_finishes(cluster: Cluster, stud
     begun = (study / "begun").read_text().split()
     assert len(set(begun)) == 40
     assert len(begun) <= 41
+
+
+def test_srun_passes_the_signal_on_too(cluster: Cluster, study: Path) -> None:
+    if "pmix" not in cluster.call("srun", "--mpi=list"):
+        pytest.skip("this Slurm has no PMIx")
+    cluster.env["LAUNCHER"] = "srun --mpi=pmix"
+    number = submit(cluster, study)
+    log = study / f"hysteron-{number}.log"
+    try:
+        wait_for(lambda: done_tasks(study) > 0, "a first task", 60)
+        # What Slurm does at the time limit (B: of --signal), without waiting for it.
+        cluster.call("scancel", "--batch", "--signal=USR1", number)
+        wait_for(lambda: cluster.job(number)["Restarts"] == "1", "requeued", 60)
+        assert "hysteron run ended with 75" in log.read_text()
+    except (AssertionError, TimeoutError) as error:
+        raise AssertionError(f"{error}\n{states(cluster, number, study)}") from error
+    finally:
+        cluster.call("scancel", number)
