@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.aggregate_curves import BRANCHES, Curve, average_curves
+from ensemble.aggregate_fields import FieldStatistics, aggregate_fields
 from ensemble.aggregate_jumps import JumpStatistics, aggregate_jumps
 from ensemble.campaign import Campaign
 from ensemble.errors import InputError
@@ -111,6 +112,8 @@ class Aggregate:
     paired : tuple of PairedDifference
     jumps : JumpStatistics
         In the order of the cells.
+    fields : FieldStatistics
+        In the order of the cells.
     failures : tuple of (int, str)
         Row and error text of the first failed tasks.
     """
@@ -121,6 +124,7 @@ class Aggregate:
     cells: tuple[Cell, ...]
     paired: tuple[PairedDifference, ...]
     jumps: JumpStatistics
+    fields: FieldStatistics
     failures: tuple[tuple[int, str], ...]
 
     @property
@@ -186,6 +190,7 @@ def aggregate(path: Path | str) -> Aggregate:
             cells=tuple(cells),
             paired=tuple(_paired(cells)),
             jumps=aggregate_jumps(results, rows),
+            fields=aggregate_fields(results, rows),
             failures=tuple(zip(failed.tolist(), results.errors(failed), strict=True)),
         )
 

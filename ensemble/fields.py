@@ -7,8 +7,8 @@ thinned to a bounded number of nodes.
 
 Conventions: the spectral density C of a field v is two-sided, ∫ C(q) dq over all q = mean(v²); on
 harmonics C(m q0) = |v_m|²/q0, and a bin holds the mean over its harmonics. Densities of gap (in
-units of h_max) and height (in units of h_rms) have unit integral over all nodes; nodes in contact
-have no gap, so that the density of the gap integrates to the fraction out of contact.
+units of h_max) and height (in units of h_rms) have unit integral over the period; contact has no
+gap, so that the density of the gap integrates to the fraction out of contact.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ BRANCHES: tuple[Branch, ...] = ("loading", "unloading")
 # Nodes per shortest wave: spectra then reach four times the highest wave number of the profile.
 NODES_PER_WAVE = 8
 _BINS_PER_DECADE = 12
+_PLACES_PER_NODE = 8
 
 # Gap in units of h_max: from far below the roughness to far above any gap before detachment.
 GAP_EDGES: Array = np.logspace(-4, 2, 6 * 16 + 1)
@@ -46,7 +47,7 @@ class FieldPlan:
     ----------
     period : float
         λ in m.
-    highest_harmonic : int
+    lowest_harmonic, highest_harmonic : int
     max_penetration : float
     load_steps : int
     wanted : tuple of float
@@ -58,6 +59,7 @@ class FieldPlan:
     """
 
     period: float
+    lowest_harmonic: int
     highest_harmonic: int
     max_penetration: float
     load_steps: int
@@ -97,6 +99,12 @@ class FieldPlan:
         top = self.nodes // 2
         count = max(2, int(np.ceil(np.log10(top) * _BINS_PER_DECADE)) + 1)
         return np.unique(np.rint(np.logspace(0, np.log10(top), count)).astype(np.int64))
+
+    @cached_property
+    def filled(self) -> NDArray[np.bool_]:
+        """Bins of the spectra in which the profile has every harmonic, shape (bins,)."""
+        first, last = self.harmonic_edges[:-1], self.harmonic_edges[1:] - 1
+        return np.asarray((first >= self.lowest_harmonic) & (last <= self.highest_harmonic))
 
     @cached_property
     def wave_number(self) -> Array:
@@ -142,6 +150,7 @@ def field_plan(campaign: Campaign) -> FieldPlan:
     wanted = output.field_penetrations
     return FieldPlan(
         period=profile.period,
+        lowest_harmonic=profile.n0,
         highest_harmonic=profile.n0 * profile.ratio,
         max_penetration=top,
         load_steps=cycle.load_steps,
@@ -194,10 +203,10 @@ class FieldRecorder:
     def _record(self, place: tuple[int, int], fields: Fields) -> None:
         plan, h_max = self._plan, self._method.problem.profile.h_max
         self._row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
-        gap = fields.gap / h_max
+        gap, parts = between_nodes(fields.gap / h_max)
         # Clipped, so that no gap is lost: the edges lie far outside what occurs.
-        open_gap = np.clip(gap[gap > 0], GAP_EDGES[0], GAP_EDGES[-1] * (1 - 1e-12))
-        self._row["gap_density"][place] = _density(open_gap, GAP_EDGES, total=gap.size)
+        gap = np.clip(gap, GAP_EDGES[0], GAP_EDGES[-1] * (1 - 1e-12))
+        self._row["gap_density"][place] = _density(gap, GAP_EDGES, total=parts)
         if self._keep:
             pick = slice(None, None, plan.stride)
             self._kept["field_displacement"][place] = fields.displacement[pick]
@@ -207,6 +216,36 @@ class FieldRecorder:
     def row(self) -> dict[str, NDArray[np.float32]]:
         """Return the values by dataset; NaN where a state had no contact."""
         return self._row | self._kept if self._keep else self._row
+
+
+def between_nodes(gap: Array) -> tuple[Array, int]:
+    """Gaps at equally spaced places between the nodes of a periodic grid.
+
+    Beside an edge of contact the gap rises like the square root of the distance, so steeply that
+    values at nodes alone would leave gaps in its distribution: there it is interpolated so,
+    elsewhere linearly.
+
+    Parameters
+    ----------
+    gap : array, shape (n,)
+        Zero in contact.
+
+    Returns
+    -------
+    values : array
+        Gaps at the places out of contact.
+    places : int
+        Number of all places, in contact or not.
+    """
+    u = (np.arange(_PLACES_PER_NODE) + 0.5) / _PLACES_PER_NODE
+    left = gap[:, None]
+    right = np.roll(gap, -1)[:, None]
+    values = np.where(
+        left == 0,
+        right * np.sqrt(u),
+        np.where(right == 0, left * np.sqrt(1 - u), left + (right - left) * u),
+    )
+    return values[values > 0], values.size
 
 
 def _density(values: Array, edges: Array, total: int | None = None) -> Array:

@@ -9,7 +9,7 @@ from fake_run import fake_result
 
 from ensemble.campaign import parse_campaign
 from ensemble.errors import InputError
-from ensemble.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan
+from ensemble.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, between_nodes, field_plan
 from ensemble.schema import COLUMNS, KEPT
 from ensemble.store import Results, Writer, create
 from ensemble.task import make_problem, run_task
@@ -83,7 +83,7 @@ def test_reductions_agree_with_the_states_of_the_loop():
     assert np.sum(row["height_density"] * np.diff(HEIGHT_EDGES)) == pytest.approx(1, rel=1e-6)
     for place, state in wanted.items():
         fields = method.fields(state, plan.nodes)
-        out_of_contact = np.mean(fields.gap > 0)
+        out_of_contact = np.mean((fields.gap > 0) | (np.roll(fields.gap, -1) > 0))
         density = row["gap_density"][place].astype(float)
         assert np.sum(density * np.diff(GAP_EDGES)) == pytest.approx(out_of_contact, rel=1e-6)
         middle = np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:]) * profile.h_max
@@ -94,6 +94,19 @@ def test_reductions_agree_with_the_states_of_the_loop():
         kept = row["field_gap"][place]
         assert kept.shape == (16,)
         np.testing.assert_array_equal(kept, fields.gap[:: plan.stride].astype(np.float32))
+
+
+def test_gaps_between_nodes_rise_like_a_square_root_beside_contact():
+    """For t = c sqrt(r) the density is 2t/c²; from the nodes alone it would be a row of spikes."""
+    r = np.maximum(np.arange(4096) - 2048.0, 0)
+    r[0] = r[-1]  # no second edge
+    values, places = between_nodes(np.sqrt(r))
+    assert values.size / places == pytest.approx(0.5, abs=1e-3)
+    edges = np.linspace(0, np.sqrt(2047), 46)
+    count = np.histogram(values, edges)[0]
+    expected = (edges[1:] ** 2 - edges[:-1] ** 2) * places / 4096
+    np.testing.assert_allclose(count[1:-1], expected[1:-1], rtol=0.15)
+    np.testing.assert_allclose(count[0], expected[0], rtol=0.3)
 
 
 def test_states_without_contact_are_not_a_number():

@@ -44,7 +44,7 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
     from ensemble.report import tables
     from ensemble.report.curves import write_curves
-    from ensemble.report.figures import LOOPS, LOSSES, MECHANISMS
+    from ensemble.report.figures import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
     from ensemble.report.figures.style import save, style
     from ensemble.report.page import write_page
 
@@ -52,7 +52,14 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     tables.paired(data).write_csv(directory / "growth.csv")
     tables.jumps(data).write_csv(directory / "jumps.csv")
     write_curves(data, directory / "curves.nc")
-    sections = (("loops", LOOPS), ("losses", LOSSES), ("mechanisms", MECHANISMS))
+    tables.slopes(data).write_csv(directory / "slopes.csv")
+    with_shapes = (*SHAPES, *HEIGHTS) if data.fields.penetration.size else HEIGHTS
+    sections = (
+        ("loops", LOOPS),
+        ("losses", LOSSES),
+        ("mechanisms", MECHANISMS),
+        ("fields", with_shapes),
+    )
     for _, illustrations in sections:
         for item in illustrations:
             with style():

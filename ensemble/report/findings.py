@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ensemble.aggregate import Aggregate, Cell
+from ensemble.aggregate_fields import fitted_slope
 from ensemble.report import paper
 
 
@@ -36,6 +37,7 @@ def agreement(data: Aggregate) -> list[str]:
         *_growth(data),
         *_order_in_slope(data),
         *_unloading_exceeds_loading(data),
+        *_spectrum(data),
     ]
 
 
@@ -152,6 +154,43 @@ def _unloading_exceeds_loading(data: Aggregate) -> list[str]:
         "At equal load the contact is larger on unloading than on loading everywhere, by a factor "
         f"of at least {least:.2f}; the paper says the same."
     ]
+
+
+def _spectrum(data: Aggregate) -> list[str]:
+    """Fitted slope of the loading spectrum at the deepest penetration, against -(2+H)."""
+    fields = data.fields
+    parts = []
+    for hurst in data.hursts:
+        cell = typical_cell(data, hurst)
+        if cell is None or not fields.penetration.size:
+            continue
+        density = fields.psd_displacement[data.cells.index(cell), 0, -1]
+        slope, error = fitted_slope(data.campaign, fields.wave_number, density)
+        if not np.isnan(slope):
+            parts.append(f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f} at {_name(cell)}")
+    if not parts:
+        return []
+    return [
+        "Slope of the loading spectrum of the deformed surface at small wave numbers and "
+        f"Δ/h_max = {fields.penetration[-1]:.2f}, fitted, against Persson's -(2+H): "
+        f"{'; '.join(parts)}."
+    ]
+
+
+def typical_cell(data: Aggregate, hurst: float | None = None) -> Cell | None:
+    """The cell that stands for all: middle H (unless given) and middle γ that have results."""
+    hursts = [hurst] if hurst is not None else _from_middle(data.hursts)
+    for h in hursts:
+        for gamma in _from_middle(data.works_of_adhesion):
+            cell = data.cell(h, gamma)
+            if cell is not None and cell.done:
+                return cell
+    return None
+
+
+def _from_middle(values: tuple[float, ...]) -> list[float]:
+    middle = (len(values) - 1) / 2
+    return [values[k] for k in sorted(range(len(values)), key=lambda k: abs(k - middle))]
 
 
 def area_ratio(cell: Cell) -> float | None:

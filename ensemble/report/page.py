@@ -45,6 +45,15 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     out += ["## Loops", *_show(figures.get("loops", ()))]
     if figures.get("fields"):
         out += ["## Shapes, spectra and distributions", *_show(figures["fields"])]
+        slopes = tables.slopes(data)
+        if slopes.rows:
+            out += [
+                "### Slope of the spectrum of the deformed surface",
+                "Power law fitted at small wave numbers: over the lowest decade of the profile's "
+                "spectrum, or its lower half if it is shorter than two decades; standard error "
+                "of the fit.",
+                slopes.markdown(),
+            ]
     out += [
         "## Mechanisms",
         "A jump is *small scale* if edges only run inside existing patches (spreading, receding), "

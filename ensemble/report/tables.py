@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ensemble.aggregate import Aggregate, Cell, stress_scale
+from ensemble.aggregate_curves import BRANCHES
+from ensemble.aggregate_fields import fitted_slope
 from ensemble.report import paper
 from ensemble.report.table import Column, Table, Value, fixed, make_table, number, plain
 from ensemble.statistics import Estimate, interval_method
@@ -234,3 +236,40 @@ def mechanisms(data: Aggregate) -> Table:
             ]
         )
     return make_table("Mechanisms and pull-off", columns, rows)
+
+
+def slopes(data: Aggregate) -> Table:
+    """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
+    columns = (
+        *_KEY,
+        Column("branch", "branch"),
+        Column("penetration", "Δ/h_max", fixed(2)),
+        Column("realisations", "n"),
+        Column("slope", "slope", fixed(2)),
+        Column("slope_sem", "s.e.", number(1)),
+        Column("slope_persson", "-(2+H)", fixed(2)),
+        Column("slope_profile", "-(2H+1)", fixed(2)),
+    )
+    fields = data.fields
+    rows: list[list[Value]] = []
+    for index, cell in enumerate(data.cells):
+        for b, branch in enumerate(BRANCHES):
+            for k, penetration in enumerate(fields.penetration.tolist()):
+                if not fields.in_contact[index, b, k]:
+                    continue
+                density = fields.psd_displacement[index, b, k]
+                slope, error = fitted_slope(data.campaign, fields.wave_number, density)
+                rows.append(
+                    [
+                        cell.hurst,
+                        cell.work_of_adhesion,
+                        branch,
+                        penetration,
+                        int(fields.in_contact[index, b, k]),
+                        slope,
+                        error,
+                        -(2 + cell.hurst),
+                        -(2 * cell.hurst + 1),
+                    ]
+                )
+    return make_table("Slope of the spectrum of the deformed surface", columns, rows)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from ensemble.aggregate import Aggregate
-from ensemble.report.figures import loops, losses
+from ensemble.report.figures import fields, loops, losses
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,45 @@ LOSSES = (
         "Loss against mean square slope",
         "Means with 95 % intervals.",
         losses.loss_against_slope,
+    ),
+)
+SHAPES = (
+    Illustration(
+        "fig3_shapes",
+        "Deformed shapes (paper's Fig. 3)",
+        "The first realisation that kept its fields, middle H and γ: rigid profile h - s and "
+        "elastic surface v on both branches, at the same separation. In contact the two coincide. "
+        "Right: one and a half of the longest waves around the highest point.",
+        fields.shapes,
+    ),
+    Illustration(
+        "fig4_spectra_loading",
+        "Spectral density on loading (paper's Fig. 4)",
+        "Two-sided, mean over the realisations in contact, middle γ. Thin lines: slopes of a "
+        "self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the profile's "
+        "highest wave number only the edges of contact have power.",
+        fields.spectra_on_loading,
+    ),
+    Illustration(
+        "fig5_spectra_unloading",
+        "Spectral density on unloading (paper's Fig. 5)",
+        "As before.",
+        fields.spectra_on_unloading,
+    ),
+    Illustration(
+        "fig8_gap_density",
+        "Probability density of the separation (paper's Fig. 8)",
+        "Gap outside contact, in units of each realisation's h_max; the integral is the fraction "
+        "out of contact. Middle γ.",
+        fields.gap_density,
+    ),
+)
+HEIGHTS = (
+    Illustration(
+        "fig9_height_density",
+        "Probability density of the heights (paper's Fig. 9)",
+        "Rigid profiles, mean over realisations, with the Gaussian of the same variance.",
+        fields.height_density,
     ),
 )
 MECHANISMS = (

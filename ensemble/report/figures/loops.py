@@ -22,6 +22,7 @@ from ensemble.report.figures.style import (
     look,
     new_figure,
     panels,
+    shown_gammas,
     spread_out,
 )
 
@@ -77,8 +78,7 @@ def loop_against_penetration(data: Aggregate) -> Figure:
 
 def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, Cell]]:
     """Cells of one H that have finished tasks, each with the place of its γ among those shown."""
-    shown = spread_out(data.works_of_adhesion, MOST_CURVES)
-    cells = ((k, data.cell(hurst, gamma)) for k, gamma in enumerate(shown))
+    cells = ((k, data.cell(hurst, gamma)) for k, gamma in shown_gammas(data))
     return [(k, cell) for k, cell in cells if cell is not None and cell.done]
 
 
@@ -120,10 +120,9 @@ def _with_spread(axes: Axes, data: Aggregate, cell: Cell, branch: str, name: str
 
 def _legend(data: Aggregate, figure: Figure, columns: int) -> None:
     """One entry for each γ, one for each branch."""
-    shown = spread_out(data.works_of_adhesion, MOST_CURVES)
     handles = [
         Line2D([], [], color=look(k).colour, marker=look(k).marker, label=gamma_label(gamma))
-        for k, gamma in enumerate(shown)
+        for k, gamma in shown_gammas(data)
     ]
     handles += [
         Line2D([], [], color="0.3", linestyle=LINE_OF_BRANCH[branch], label=branch)

@@ -25,6 +25,8 @@ from ensemble.report.figures.style import (
     look,
     new_figure,
     panels,
+    plain_decades,
+    shown_gammas,
     spread_out,
 )
 from ensemble.statistics import Estimate
@@ -68,7 +70,7 @@ def loss_against_slope(data: Aggregate) -> Figure:
     """W~ against the mean square slope m2, one curve for each γ, with intervals."""
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
     axes = figure.axes[0]
-    for k, gamma in enumerate(spread_out(data.works_of_adhesion, MOST_CURVES)):
+    for k, gamma in shown_gammas(data):
         cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
         cells.sort(key=lambda cell: cell.estimates["m2"].mean)
         _errorbar(
@@ -121,13 +123,13 @@ def loss_by_mechanism(data: Aggregate) -> Figure:
 def jump_energies(data: Aggregate) -> Figure:
     """Jumps per loop and decade of energy drop: large scale left, small scale right."""
     hursts = spread_out(data.hursts, MOST_PANELS)
-    shown = spread_out(data.works_of_adhesion, MOST_CURVES)
+    shown = shown_gammas(data)
     height = (13 + 44 * len(hursts)) * MM
     figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
     grid = panels(figure, len(hursts), 2)
     for row, hurst in zip(grid, hursts, strict=True):
         for axes, small in zip(row, (False, True), strict=True):
-            for k, gamma in enumerate(shown):
+            for k, gamma in shown:
                 cell = data.cell(hurst, gamma)
                 if cell is not None and cell.done:
                     _jump_density(axes, data, cell, small, k)
@@ -139,8 +141,9 @@ def jump_energies(data: Aggregate) -> Figure:
     grid[0][0].set_yscale("log")
     handles = [
         Line2D([], [], color=look(k).colour, linestyle=LINES[k], label=gamma_label(gamma))
-        for k, gamma in enumerate(shown)
+        for k, gamma in shown
     ]
+    plain_decades(figure.axes)
     legend_above(figure, handles, len(handles))
     return figure
 

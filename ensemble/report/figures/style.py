@@ -17,6 +17,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from ensemble.aggregate import Aggregate
 
 STYLE = Path(__file__).parent.parent / "hysteron.mplstyle"
 
@@ -69,6 +72,13 @@ def spread_out(values: Sequence[float], most: int) -> list[float]:
     return [values[round(k)] for k in np.linspace(0, len(values) - 1, most)]
 
 
+def shown_gammas(data: Aggregate) -> list[tuple[int, float]]:
+    """Works of adhesion that a figure shows, each with the place of its look; with results only."""
+    finished = {cell.work_of_adhesion for cell in data.cells if cell.done}
+    shown = spread_out(data.works_of_adhesion, MOST_CURVES)
+    return [(k, gamma) for k, gamma in enumerate(shown) if gamma in finished]
+
+
 def new_figure(rows: int, columns: int, width: float, height: float, **options: Any) -> Figure:
     """Return a figure of the given width and height (inches) with a grid of panels."""
     figure = Figure(figsize=(width, height))
@@ -80,6 +90,15 @@ def panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
     """Return the panels of :func:`new_figure`, row by row."""
     axes = figure.axes[: rows * columns]
     return [axes[k * columns : (k + 1) * columns] for k in range(rows)]
+
+
+def plain_decades(axes: Sequence[Axes]) -> None:
+    """Label whole decades of logarithmic axes only."""
+    for panel in axes:
+        for axis, scale in ((panel.xaxis, panel.get_xscale()), (panel.yaxis, panel.get_yscale())):
+            low, high = axis.get_view_interval()
+            if scale == "log" and high >= 20 * low:
+                axis.set_minor_formatter(NullFormatter())
 
 
 def legend_above(figure: Figure, handles: Sequence[Any], columns: int) -> None:

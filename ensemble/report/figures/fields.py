@@ -1,0 +1,277 @@
+"""Shapes (Fig. 3), spectra (Fig. 4 and 5), densities of gap (Fig. 8) and height (Fig. 9)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from ensemble.aggregate import Aggregate, Cell
+from ensemble.aggregate_curves import BRANCHES
+from ensemble.aggregate_fields import FieldStatistics, Shape
+from ensemble.fields import field_plan
+from ensemble.report.figures.style import (
+    LINE_OF_BRANCH,
+    LINES,
+    MM,
+    MOST_CURVES,
+    MOST_PANELS,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    label_panel,
+    legend_above,
+    look,
+    new_figure,
+    panels,
+    plain_decades,
+    spread_out,
+)
+from ensemble.report.findings import typical_cell
+
+# Colour of a branch where both are drawn over the rigid profile.
+_COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
+
+
+def shapes(data: Aggregate) -> Figure:
+    """Fig. 3: rigid profile and deformed surface of one realisation on both branches."""
+    cell = typical_cell(data)
+    assert cell is not None
+    fields = data.fields
+    shape = fields.shapes[data.cells.index(cell)]
+    chosen = shown_penetrations(fields, 3)
+    figure = new_figure(
+        len(chosen),
+        2,
+        TWO_COLUMNS,
+        (12 + 38 * len(chosen)) * MM,
+        sharex="col",
+        gridspec_kw={"width_ratios": [2, 1]},
+    )
+    if shape is None:
+        return figure
+    window = _window(data, fields, shape)
+    for (whole, detail), k in zip(panels(figure, len(chosen), 2), chosen, strict=True):
+        separation = shape.h_max * (1 - fields.penetration[k])
+        for axes, part in ((whole, slice(None)), (detail, window)):
+            _draw_shape(axes, fields, shape, k, separation, part)
+        label_panel(
+            whole,
+            rf"$\Delta/h_\mathrm{{max}}$ = {fields.penetration[k]:.2f}, "
+            f"separation $s$ = {1e6 * separation:.2f} µm",
+        )
+        label_panel(detail, "detail")
+        whole.set_ylabel("height (µm)")
+    for axes in panels(figure, len(chosen), 2)[-1]:
+        axes.set_xlabel("position $x$ (mm)")
+    handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h - s$")]
+    handles += [
+        Line2D(
+            [],
+            [],
+            color=_COLOUR_OF_BRANCH[branch],
+            linestyle=LINE_OF_BRANCH[branch],
+            label=f"elastic surface $v$, {branch}",
+        )
+        for branch in BRANCHES
+    ]
+    legend_above(figure, handles, 3)
+    return figure
+
+
+def spectra_on_loading(data: Aggregate) -> Figure:
+    """Fig. 4: spectral density of profile and deformed surface on loading."""
+    return _spectra(data, 0)
+
+
+def spectra_on_unloading(data: Aggregate) -> Figure:
+    """Fig. 5: the same on unloading."""
+    return _spectra(data, 1)
+
+
+def gap_density(data: Aggregate) -> Figure:
+    """Fig. 8: probability density of the gap, for each H at the middle γ."""
+    hursts = spread_out(data.hursts, MOST_PANELS)
+    figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 46 * len(hursts)) * MM, sharex=True)
+    fields = data.fields
+    chosen = shown_penetrations(fields, MOST_CURVES)
+    for (axes,), hurst in zip(panels(figure, len(hursts), 1), hursts, strict=True):
+        cell = typical_cell(data, hurst)
+        if cell is None:
+            continue
+        density = fields.gap_density[data.cells.index(cell)]
+        for place, k in enumerate(chosen):
+            for b, branch in enumerate(BRANCHES):
+                values = density[b, k]
+                if np.any(values > 0):
+                    axes.plot(
+                        fields.gap_bin,
+                        np.where(values > 0, values, np.nan),
+                        color=look(place).colour,
+                        linestyle=LINE_OF_BRANCH[branch],
+                        label=f"{fields.penetration[k]:.2f}, {branch}",
+                    )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylabel(r"density of $t/h_\mathrm{max}$")
+        label_panel(axes, _cell_label(cell))
+    figure.axes[len(hursts) - 1].set_xlabel(r"gap $t/h_\mathrm{max}$")
+    plain_decades(figure.axes)
+    legend_above(figure, _penetration_handles(fields, chosen, with_branches=True), 3)
+    return figure
+
+
+def height_density(data: Aggregate) -> Figure:
+    """Fig. 9: probability density of the heights of the rigid profiles, and the Gaussian."""
+    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    axes = figure.axes[0]
+    fields = data.fields
+    for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES)):
+        # All γ have the same profiles: the cell with most of them says all.
+        cell = max((c for c in data.cells if c.hurst == hurst), key=lambda c: c.done)
+        if cell.done:
+            density = fields.height_density[data.cells.index(cell)]
+            axes.plot(
+                fields.height_bin,
+                np.where(density > 0, density, np.nan),
+                color=look(k).colour,
+                linestyle="none",
+                marker=look(k).marker,
+                markersize=2.4,
+                label=f"H = {hurst:g}",
+            )
+    x = np.linspace(-4.5, 4.5, 200)
+    axes.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color="0.3", label="Gaussian")
+    axes.set_yscale("log")
+    axes.set_ylim(1e-4, 1)
+    axes.set_xlim(-4.5, 4.5)
+    axes.set_xlabel(r"height $h/h_\mathrm{rms}$")
+    axes.set_ylabel("probability density")
+    legend_above(figure, axes.get_legend_handles_labels()[0], 4)
+    return figure
+
+
+def shown_penetrations(fields: FieldStatistics, most: int) -> list[int]:
+    """Places of the penetrations that a figure shows, deepest first."""
+    places = list(range(fields.penetration.size))[::-1]
+    return [int(k) for k in spread_out(places, most)]
+
+
+def _spectra(data: Aggregate, b: int) -> Figure:
+    hursts = spread_out(data.hursts, MOST_PANELS)
+    figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 52 * len(hursts)) * MM, sharex=True)
+    fields = data.fields
+    present = field_plan(data.campaign).filled
+    chosen = shown_penetrations(fields, 3)
+    for (axes,), hurst in zip(panels(figure, len(hursts), 1), hursts, strict=True):
+        cell = typical_cell(data, hurst)
+        if cell is None:
+            continue
+        index = data.cells.index(cell)
+        rigid = fields.psd_height[index]
+        axes.loglog(
+            fields.wave_number[present], rigid[present], color="0.55", linewidth=2, label="rigid"
+        )
+        for place, k in enumerate(chosen):
+            values = fields.psd_displacement[index, b, k]
+            if np.any(values > 0):
+                axes.loglog(
+                    fields.wave_number,
+                    np.where(values > 0, values, np.nan),
+                    color=look(place).colour,
+                    linestyle=LINES[place],
+                    marker=look(place).marker,
+                    markersize=2,
+                    markevery=4,
+                    label=f"{fields.penetration[k]:.2f}",
+                )
+        _reference_slopes(axes, hurst, rigid[present], fields.wave_number[present])
+        axes.set_ylabel(r"spectral density $C(q)$ (m³)")
+        label_panel(axes, _cell_label(cell))
+    plain_decades(figure.axes[: len(hursts)])
+    figure.axes[len(hursts) - 1].set_xlabel("wave number $q$ (rad/m)")
+    handles = [Line2D([], [], color="0.55", linewidth=2, label="rigid profile")]
+    handles += _penetration_handles(fields, chosen, with_branches=False)
+    handles += [
+        Line2D([], [], color="0.3", linewidth=0.7, linestyle=":", label="$q^{-(2H+1)}$"),
+        Line2D([], [], color="0.3", linewidth=0.7, linestyle="-.", label="$q^{-(2+H)}$"),
+    ]
+    legend_above(figure, handles, 3)
+    return figure
+
+
+def _reference_slopes(axes: Axes, hurst: float, rigid: np.ndarray, q: np.ndarray) -> None:
+    """Lines q^-(2H+1) below and q^-(2+H) above the data, over the profile's own wave numbers."""
+    ends = np.array([q[0], q[-1]])
+    for exponent, factor, line in ((2 * hurst + 1, 0.2, ":"), (2 + hurst, 5.0, "-.")):
+        axes.loglog(
+            ends,
+            factor * rigid[0] * (ends / q[0]) ** -exponent,
+            color="0.3",
+            linewidth=0.7,
+            linestyle=line,
+            label=f"slope {-exponent:.1f}",
+        )
+
+
+def _draw_shape(
+    axes: Axes,
+    fields: FieldStatistics,
+    shape: Shape,
+    k: int,
+    separation: float,
+    part: slice,
+) -> None:
+    x = 1e3 * fields.position[part]
+    rigid = 1e6 * (shape.height[part] - separation)
+    axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
+    axes.plot(x, rigid, color="0.4", linewidth=0.5, label="rigid")
+    for b, branch in enumerate(BRANCHES):
+        surface = 1e6 * shape.displacement[b, k][part]
+        if np.all(np.isfinite(surface)):
+            axes.plot(
+                x,
+                surface,
+                color=_COLOUR_OF_BRANCH[branch],
+                linestyle=LINE_OF_BRANCH[branch],
+                linewidth=0.9,
+                label=branch,
+            )
+    axes.set_xlim(x[0], x[-1])
+
+
+def _window(data: Aggregate, fields: FieldStatistics, shape: Shape) -> slice:
+    """One and a half of the longest waves around the highest point, inside the period."""
+    nodes = fields.position.size
+    half = max(4, round(0.75 * nodes / data.campaign.profile.n0))
+    top = int(np.argmax(shape.height))
+    start = min(max(0, top - half), max(0, nodes - 2 * half))
+    return slice(start, min(nodes, start + 2 * half))
+
+
+def _penetration_handles(
+    fields: FieldStatistics, chosen: list[int], *, with_branches: bool
+) -> list[Line2D]:
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=look(place).colour,
+            linestyle="-" if with_branches else LINES[place],
+            marker="" if with_branches else look(place).marker,
+            label=rf"$\Delta/h_\mathrm{{max}}$ = {fields.penetration[k]:.2f}",
+        )
+        for place, k in enumerate(chosen)
+    ]
+    if with_branches:
+        handles += [
+            Line2D([], [], color="0.3", linestyle=LINE_OF_BRANCH[branch], label=branch)
+            for branch in BRANCHES
+        ]
+    return handles
+
+
+def _cell_label(cell: Cell) -> str:
+    return rf"H = {cell.hurst:g}, $\gamma$ = {cell.work_of_adhesion:g} J/m²"
