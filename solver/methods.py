@@ -43,4 +43,10 @@ def make_method(
         from solver.grid import GridMethod
 
         return GridMethod(problem, nodes_per_wave=nodes_per_wave, **options)
-    raise NotImplementedError(f"method {name!r} is not available yet")
+    from solver.sharp import SharpMethod
+
+    if nodes_per_wave is not None:
+        raise ValueError(
+            f"nodes_per_wave is {nodes_per_wave!r}: it belongs to the method 'grid' alone"
+        )
+    return SharpMethod(problem, **options)

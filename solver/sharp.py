@@ -1,0 +1,352 @@
+"""Method ``sharp``: contact edges are real numbers; no grid in the mechanics.
+
+The elastic field of given edges is that of :mod:`solver.sharp_gaps`; this module follows the edges
+along the loading path. Along a stable branch it steps in the separation with a tangent predictor
+and Newton's corrector; where the corrector finds no stable equilibrium within reach, the step is cut
+down to the wanted resolution of a jump, and the edges then descend in energy at fixed separation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from solver.jumps import Jump, classify
+from solver.method import Branch, ContactState, Fields, Method, Path
+from solver.problem import Problem
+from solver.profile import Array
+from solver.sharp_fields import fields_of
+from solver.sharp_gaps import GapField
+from solver.sharp_opening import work_of_gaps
+from solver.sharp_path import EdgeMechanics, outward, without_gaps, without_patches
+from solver.sharp_source import StressSource
+from solver.sharp_touch import Nucleation, Touch
+
+_PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
+_CORRECTED = 0.05  # longest correction of a prediction, in λ_min
+_NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
+_DESCENT_LIMIT = 1_000_000
+_FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
+_RESOLUTION = 0.02  # resolution of a jump's separation, in units of accuracy·h_max
+_FIELD_ACCURACY = 1e-3  # accuracy of the field in units of the accuracy of the loss
+_BEND = 1e-3  # largest relative error of the trapezoidal rule over one step
+_QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten that rule
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A stable equilibrium on a branch: q0 s, field and tangent."""
+
+    at: float
+    field: GapField
+    tangent: Array
+
+
+class SharpMethod(Method):
+    """Real-valued edges; see the module's text.
+
+    Parameters
+    ----------
+    problem : Problem
+    accuracy : float
+        Wanted relative error of the loss: sets the accuracy of the field, the resolution of the
+        separation of jumps and the density of the states.
+    """
+
+    name = "sharp"
+
+    def __init__(self, problem: Problem, *, accuracy: float = 1e-3) -> None:
+        super().__init__(problem)
+        profile, modulus = problem.profile, problem.half_space.modulus
+        self.accuracy = accuracy
+        self.q0 = profile.q0
+        self.source = StressSource(profile)
+        critical = 4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus))
+        self.edges = EdgeMechanics(
+            self.source, critical, float(np.clip(_FIELD_ACCURACY * accuracy, 1e-14, 1e-5))
+        )
+        self.nucleation = Nucleation(problem, self.edges)
+        self.h_max = profile.h_max * self.q0
+        self.resolution = _RESOLUTION * accuracy * self.h_max
+        self._bend = min(_BEND, 0.3 * np.sqrt(accuracy))
+        m = np.arange(profile.coefficients.size)
+        h = np.abs(profile.coefficients * self.q0) ** 2
+        self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
+
+    def describe(self) -> dict[str, Any]:
+        """Accuracy, tolerances and counters."""
+        return {
+            "accuracy": self.accuracy,
+            "field_tolerance": self.edges.tolerance,
+            "jump_resolution": self.resolution / self.h_max,
+            **asdict(self.edges.count),
+        }
+
+    def fields(self, state: ContactState, n: int) -> Fields:
+        """Stress, displacement and gap of ``state`` on n nodes, by quadrature over the gaps."""
+        field = None
+        if state.patches:
+            field = self.edges.field(state.internal, state.separation * self.q0)
+        return fields_of(self.problem, field, state.separation, n)
+
+    def follow(self, state: ContactState, separation: float) -> Path:
+        """Follow the quasi-static path; see the contract."""
+        branch: Branch = "loading" if separation <= state.separation else "unloading"
+        events = list(self._events(state, separation, branch))
+        return Path(
+            tuple(e for e in events if isinstance(e, ContactState)),
+            tuple(e for e in events if isinstance(e, Jump)),
+        )
+
+    # ------------------------------------------------------------------ states
+
+    def _state(
+        self, field: GapField | None, at: float, separation: float | None = None
+    ) -> ContactState:
+        """Contact state of a field (None: no contact) at q0 s = ``at``."""
+        separation = at / self.q0 if separation is None else separation
+        if field is None:
+            return self.detached(separation)
+        self.edges.count.energies += 1
+        half = self.problem.half_space.modulus / 2
+        gaps = field.gaps
+        left = np.append(gaps[-1, 1] - 2 * np.pi, gaps[:-1, 1])  # of the patch before each gap
+        right = gaps[:, 0]
+        measure = self.source.measure_between(left, right)
+        turn = np.floor(left / (2 * np.pi)) * 2 * np.pi
+        patches = np.stack([left - turn, right - turn], axis=1) / self.q0
+        elastic = self._full_energy + 0.5 * work_of_gaps(field) - np.pi * at * field.pressure
+        return ContactState(
+            separation=separation,
+            edges=patches[np.argsort(patches[:, 0])],
+            mean_stress=field.pressure * half,
+            elastic_energy=elastic * half / self.q0**2,
+            adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
+            contact_fraction=float((right - left).sum() / (2 * np.pi)),
+            internal=gaps,
+        )
+
+    def _slope(self, point: _Point) -> float:
+        """dp/d(q0 s) along the branch."""
+        motion = outward(point.field.gaps) * self._rate(point)
+        return float(point.field.pressure_by_separation + point.field.derivatives[1] @ motion)
+
+    @staticmethod
+    def _rate(point: _Point) -> Array:
+        """dn/d(q0 s) of every edge along the branch."""
+        by_separation = point.field.opening_by_separation.ravel()
+        return -np.asarray(np.linalg.solve(point.tangent, by_separation))
+
+    # ------------------------------------------------------------------ following
+
+    def _events(
+        self, state: ContactState, separation: float, branch: Branch
+    ) -> Generator[ContactState | Jump, None, None]:
+        at, target = state.separation * self.q0, separation * self.q0
+        gaps: Array = state.internal if state.patches else np.empty((0, 2))
+        if not len(gaps) and branch == "loading" and target <= self.h_max:
+            at = self.h_max
+            yield self.detached(self.problem.profile.h_max)
+            highest = self.nucleation.highest_points()
+            gaps = yield from self._jump(gaps, at, branch, touches=highest)
+        while len(gaps) and at != target:
+            point = self._equilibrium(gaps, at)
+            if point is None:
+                gaps = yield from self._jump(gaps, at, branch)
+            else:
+                at, gaps = yield from self._branch(point, target, separation, branch)
+        if not len(gaps) and at != target:
+            yield self.detached(separation)
+
+    def _branch(
+        self, point: _Point, target: float, separation: float, branch: Branch
+    ) -> Generator[ContactState | Jump, None, tuple[float, Array]]:
+        """Walk along a stable branch to the target or through its next jump."""
+        wanted = np.inf
+        slope = self._slope(point)
+        shown = (point.at, slope)
+        look, trail = (
+            point.at,
+            [point],
+        )  # where to look for touches next; the way since the last look
+        while point.at != target:
+            step = self._next_step(point, target, wanted)
+            reached = self._advance(point, step, target)
+            if reached is None:
+                if abs(step) > self.resolution:
+                    wanted = max(0.25 * abs(step), 0.999 * self.resolution)
+                    continue
+                yield self._state(point.field, point.at)
+                at = target if step == target - point.at else point.at + step
+                gaps = yield from self._jump(point.field.gaps, at, branch)
+                return at, gaps
+            slope = self._slope(reached)
+            error = self._trapezoid_error(shown, reached, slope)
+            if error > 4 and abs(step) > self.resolution:
+                wanted = 0.5 * abs(step)
+                continue
+            if branch == "loading":
+                trail.append(reached)
+                if reached.at <= look or reached.at == target:
+                    touched, clearance = self._touched(trail)
+                    if touched is not None:
+                        point, touches = touched
+                        yield self._state(point.field, point.at)
+                        gaps = yield from self._jump(
+                            point.field.gaps, point.at, branch, touches=touches
+                        )
+                        return point.at, gaps
+                    look, trail = reached.at - clearance / _FASTEST_CLOSING, [reached]
+            small = self._without_small(reached.field.gaps)
+            if small is not None:
+                yield self._state(reached.field, reached.at)
+                gaps = yield from self._jump(reached.field.gaps, reached.at, branch, start=small)
+                return reached.at, gaps
+            point, wanted = reached, 2 * abs(step)
+            if point.at == target:
+                yield self._state(point.field, target, separation)
+            elif error > 1:
+                yield self._state(point.field, point.at)
+                shown = (point.at, slope)
+        return target, point.field.gaps
+
+    def _next_step(self, point: _Point, target: float, wanted: float) -> float:
+        """Next step in q0 s: no edge moves too far by prediction, the target is not passed."""
+        fastest = float(np.abs(self._rate(point)).max())
+        size = min(wanted, _PREDICTED * self.edges.wave / max(fastest, 1e-300))
+        size = max(size, 0.999 * self.resolution)
+        left = target - point.at
+        return left if size >= abs(left) else float(np.copysign(size, left))
+
+    def _advance(self, point: _Point, step: float, target: float) -> _Point | None:
+        """Predict and correct; None if no stable equilibrium is within reach."""
+        motion = outward(point.field.gaps) * self._rate(point) * step
+        if np.abs(motion).max() > 2 * _PREDICTED * self.edges.wave:
+            return None
+        at = target if step == target - point.at else point.at + step
+        return self._equilibrium(point.field.gaps + motion.reshape(-1, 2), at)
+
+    def _equilibrium(self, gaps: Array, at: float) -> _Point | None:
+        found = self.edges.equilibrium(gaps, at, _CORRECTED * self.edges.wave)
+        return None if found is None else _Point(at, *found)
+
+    def _trapezoid_error(self, shown: tuple[float, float], point: _Point, slope: float) -> float:
+        """Error of the trapezoidal rule since the last state shown, in units of what is allowed."""
+        span = abs(point.at - shown[0])
+        scale = max(abs(point.field.pressure), _QUIET * self.h_max)  # p = h_max is σ~ = 1
+        return float(span * abs(slope - shown[1]) / 12 / (self._bend * scale))
+
+    # ------------------------------------------------------------------ jumps
+
+    def _jump(
+        self,
+        gaps: Array,
+        at: float,
+        branch: Branch,
+        start: Array | None = None,
+        touches: list[Touch] | None = None,
+    ) -> Generator[ContactState | Jump, None, Array]:
+        """Descend at fixed separation from ``gaps`` (or ``start``): before, jump, after."""
+        before = self._state(self.edges.field(gaps, at) if len(gaps) else None, at)
+        if len(gaps):
+            yield before
+        point = self._relax(gaps if start is None else start, at, touches or [])
+        while branch == "loading" and point is not None:
+            ready = self._ready(self.nucleation.minima(point.field))
+            if not ready:
+                break
+            point = self._relax(point.field.gaps, at, ready)
+        after = self._state(None if point is None else point.field, at)
+        period = self.problem.profile.period
+        drop = (before.energy - after.energy) / period
+        kind, length = classify(before.edges, after.edges, period)
+        yield Jump(
+            branch=branch,
+            separation=at / self.q0,
+            energy_drop=drop,
+            kind=kind,
+            patches_before=before.patches,
+            patches_after=after.patches,
+            contact_before=before.contact_fraction,
+            contact_after=after.contact_fraction,
+            patch_length=length,
+        )
+        yield after
+        return np.empty((0, 2)) if point is None else point.field.gaps
+
+    def _relax(self, gaps: Array, at: float, touches: list[Touch]) -> _Point | None:
+        """Descend to the next minimum of the energy; None when no contact is left."""
+        if touches:
+            gaps = self.nucleation.seeded(gaps, touches)
+        for _ in range(_DESCENT_LIMIT):
+            if not len(gaps):
+                return None
+            moved = self.edges.descend(gaps, at)
+            size = float(np.abs(moved - gaps).max())
+            gaps = moved
+            small = self._without_small(gaps)
+            if small is not None:
+                gaps = small
+            elif size < _NEAR * self.edges.wave:
+                point = self._equilibrium(gaps, at)
+                if point is not None:
+                    return point
+        raise RuntimeError(f"the descent at s = {at / self.q0} m did not end")
+
+    def _without_small(self, gaps: Array) -> Array | None:
+        """Edges without closed gaps or vanished patches, or None if there are none."""
+        length, patch = self.edges.widths(gaps)
+        if length.min() < self.edges.smallest and len(gaps) > 1:
+            return without_gaps(gaps, length >= self.edges.smallest)
+        if patch.min() < self.edges.smallest:
+            return without_patches(gaps, patch >= self.edges.smallest)
+        return None
+
+    # ------------------------------------------------------------------ touching
+
+    def _ready(self, minima: list[Touch]) -> list[Touch]:
+        return [t for t in minima if self.nucleation.clearance(t) <= 0]
+
+    def _touched(self, trail: list[_Point]) -> tuple[tuple[_Point, list[Touch]] | None, float]:
+        """First point of the trail at which surfaces touch inside a gap, with the touches.
+
+        Else None and the least clearance at the end of the trail. The trail starts at a point known
+        to be clear.
+        """
+        minima = self.nucleation.minima(trail[-1].field)
+        least = min((self.nucleation.clearance(t) for t in minima), default=np.inf)
+        if least > 0:
+            return None, least
+        clear_value = np.nan
+        hit, hit_minima, hit_value = trail[-1], minima, least
+        # over the points of the trail, then within one step of it
+        low, high = 0, len(trail) - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            minima = self.nucleation.minima(trail[middle].field)
+            value = min((self.nucleation.clearance(t) for t in minima), default=np.inf)
+            if value > 0:
+                low, clear_value = middle, value
+            else:
+                high, hit, hit_minima, hit_value = middle, trail[middle], minima, value
+        clear = trail[low].at
+        while clear - hit.at > self.resolution and hit_value < 0:
+            share = 0.5
+            if np.isfinite(clear_value):
+                # secant, kept off the ends
+                share = min(max(clear_value / (clear_value - hit_value), 0.02), 0.98)
+            aim = clear + (hit.at - clear) * share
+            motion = outward(hit.field.gaps) * self._rate(hit) * (aim - hit.at)
+            point = self._equilibrium(hit.field.gaps + motion.reshape(-1, 2), aim)
+            if point is None:
+                break
+            minima = self.nucleation.minima(point.field)
+            value = min((self.nucleation.clearance(t) for t in minima), default=np.inf)
+            if value > 0:
+                clear, clear_value = aim, value
+            else:
+                hit, hit_minima, hit_value = point, minima, value
+        return (hit, self._ready(hit_minima)), 0.0

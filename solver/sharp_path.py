@@ -1,0 +1,240 @@
+"""Moving real-valued edges: equilibrium by Newton, stability, and descent along a jump.
+
+The unknowns are the gap ends θ_e. An edge is in equilibrium where its opening C_e equals the
+critical one, C_c = 4 sqrt(q0 γ sqrt(1+h'²) / (π E*)) (Griffith); contact advances where C_e < C_c.
+With n_e the outward motion of the contact at edge e, the energy of the edges is stable where the
+matrix ∂(C_e - C_c)/∂n_f is positive definite (scaled by sqrt(C_e/C_f) it is symmetric: it is the
+Hessian of the energy divided by C).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from solver.profile import Array
+from solver.sharp_gaps import GapField
+from solver.sharp_source import StressSource
+
+_NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+
+
+@dataclass
+class Counters:
+    """What the work cost: field solutions, derivative solutions, fine openings and energies."""
+
+    fields: int = 0
+    derivatives: int = 0
+    energies: int = 0
+    openings: int = 0
+    newton_steps: int = 0
+    descent_steps: int = 0
+
+
+class EdgeMechanics:
+    """Openings, equilibrium and stability of the edges of one problem, in units of 1/q0.
+
+    Parameters
+    ----------
+    source : StressSource
+    critical : float
+        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
+    tolerance : float
+        Relative accuracy of the field.
+    """
+
+    def __init__(self, source: StressSource, critical: float, tolerance: float) -> None:
+        self.source, self.critical, self.tolerance = source, critical, tolerance
+        self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
+        self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
+        self.longest_step = 0.1 * self.wave  # longer steps leap over pinned minima
+        self.smallest = 0.005 * self.wave  # narrower patches and gaps are gone
+        self.count = Counters()
+
+    def field(self, gaps: Array, separation: float) -> GapField:
+        """Solve the field of these gaps."""
+        self.count.fields += 1
+        return GapField(self.source, gaps, separation, self.tolerance)
+
+    def residual(self, field: GapField) -> Array:
+        """C_e - C_c at every edge, shape (2L,); positive where contact recedes."""
+        measure, _ = self.source.measure_at(field.gaps.ravel())
+        return np.asarray(field.opening.ravel() - self.critical * np.sqrt(measure))
+
+    def tangent(self, field: GapField) -> Array:
+        """∂(C_e - C_c)/∂n_f, shape (2L, 2L), n the outward motion of the contact."""
+        self.count.derivatives += 1
+        by_edge, _ = field.derivatives
+        measure, slope = self.source.measure_at(field.gaps.ravel())
+        matrix = by_edge.copy()
+        matrix[np.diag_indices_from(matrix)] -= self.critical * slope / (2 * np.sqrt(measure))
+        return matrix * outward(field.gaps)
+
+    def symmetric(self, field: GapField, tangent: Array) -> tuple[Array, Array]:
+        """Scale factors d and the symmetric matrix d_e tangent_ef / d_f."""
+        c = field.opening.ravel()
+        floor = 1e-6 * max(self.critical, float(np.abs(c).max()))
+        d = np.sqrt(np.maximum(c, floor))
+        scaled = tangent * (d[:, None] / d[None, :])
+        return d, np.asarray((scaled + scaled.T) / 2)
+
+    def widths(self, gaps: Array) -> tuple[Array, Array]:
+        """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
+        return gaps[:, 1] - gaps[:, 0], np.append(gaps[1:, 0], gaps[0, 0] + 2 * np.pi) - gaps[:, 1]
+
+    def valid(self, gaps: Array) -> bool:
+        """Whether every gap and patch has a positive length."""
+        length, patch = self.widths(gaps)
+        return bool(length.min() > 0 and patch.min() > 0)
+
+    def equilibrium(
+        self, gaps: Array, separation: float, reach: float
+    ) -> tuple[GapField, Array] | None:
+        """Newton's iteration for C_e = C_c from nearby edges.
+
+        Returns the field and its tangent at the equilibrium, or None if an edge would move further
+        than ``reach`` (in θ), the iteration stalls, or the equilibrium is not stable.
+        """
+        start = gaps.ravel()
+        at = start.copy()
+        last = np.inf
+        sign = outward(gaps)
+        tangent = None
+        for _ in range(_NEWTON_LIMIT):
+            self.count.newton_steps += 1
+            trial = at.reshape(-1, 2)
+            if not self.valid(trial):
+                return None
+            field = self.field(trial, separation)
+            # A converged Newton iteration may reuse its tangent; the last one is always fresh.
+            tangent = self.tangent(field)
+            try:
+                step = -sign * np.linalg.solve(tangent, self.residual(field))
+            except np.linalg.LinAlgError:
+                return None
+            size = float(np.abs(step).max())
+            if not np.isfinite(size) or size > max(reach, self.settled) or size > 2 * last:
+                return None
+            if size <= self.settled:
+                return (field, tangent) if self.stable(field, tangent) else None
+            at = at + step
+            if np.abs(at - start).max() > reach:
+                return None
+            last = size
+        return None
+
+    def stable(self, field: GapField, tangent: Array) -> bool:
+        """Whether the equilibrium is a minimum of the energy."""
+        _, matrix = self.symmetric(field, tangent)
+        try:
+            np.linalg.cholesky(matrix)
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    def softness(self, field: GapField, tangent: Array) -> float:
+        """Smallest eigenvalue of the symmetric tangent; its square is linear in s near a fold."""
+        _, matrix = self.symmetric(field, tangent)
+        return float(eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0])
+
+    def descend(self, gaps: Array, separation: float) -> Array:
+        """Take one step of energy descent at fixed separation, no edge further than 0.1 λ_min.
+
+        A step solves (tangent + μ) n = C_c - C in the symmetric scaling with the least μ ≥ 0 that
+        makes the matrix positive definite and keeps the step within its limits: Newton's step
+        near a minimum, the gradient's direction far from one. A patch or gap loses at most half of
+        its length.
+        """
+        self.count.descent_steps += 1
+        field = self.field(gaps, separation)
+        residual = self.residual(field)
+        d, matrix = self.symmetric(field, self.tangent(field))
+        values, vectors = np.linalg.eigh(matrix)
+        pull = vectors.T @ (-residual * d)
+        limit = self._limits(gaps)
+
+        step: Array = _trust_step(values, vectors, pull, d, limit)
+        # Where the surfaces would overlap beside an edge there is nothing to weigh: contact advances.
+        step = np.where(field.opening.ravel() < -0.01 * self.critical, limit, step)
+        return np.asarray((gaps.ravel() + outward(gaps) * step).reshape(-1, 2))
+
+    def _limits(self, gaps: Array) -> Array:
+        """Longest step of each edge: 0.1 λ_min, and a quarter of the gap or patch it may close."""
+        length, patch = self.widths(gaps)
+        left = np.minimum(length, np.roll(patch, 1))
+        right = np.minimum(length, patch)
+        return np.minimum(self.longest_step, 0.25 * np.stack([left, right], axis=1).ravel())
+
+
+@njit(cache=True)
+def _trust_step(values, vectors, pull, d, limit):  # type: ignore[no-untyped-def]  # compiled
+    """(matrix + μ)^-1 pull in the symmetric scaling, with the least μ ≥ 0 that fits the limits."""
+    n = values.shape[0]
+    span = values[n - 1] - values[0] + max(abs(values[0]), abs(values[n - 1])) + 1e-300
+    base = 0.0 if values[0] > 1e-9 * span else -values[0] + 1e-9 * span
+    step = vectors @ (pull / (values + base)) / d
+    if _fits(step, limit):
+        return step
+    high = 1e-3 * span
+    step = vectors @ (pull / (values + base + high)) / d
+    while not _fits(step, limit):
+        high *= 8.0
+        step = vectors @ (pull / (values + base + high)) / d
+    low = high / 8.0
+    for _ in range(5):
+        middle = np.sqrt(low * high)
+        trial = vectors @ (pull / (values + base + middle)) / d
+        if _fits(trial, limit):
+            high = middle
+            step = trial
+        else:
+            low = middle
+    return step
+
+
+@njit(cache=True)
+def _fits(step, limit):  # type: ignore[no-untyped-def]  # compiled
+    return np.all(np.abs(step) <= limit)
+
+
+def outward(gaps: Array) -> Array:
+    """+1 at left gap ends, where contact grows to the right, -1 at right ones, shape (2L,)."""
+    return np.tile([1.0, -1.0], len(gaps))
+
+
+def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:
+    """Drop the closed gaps: their patches merge."""
+    return gaps[keep]
+
+
+def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
+    """Drop patches, ``keep`` telling of the patch to the right of each gap: their gaps join."""
+    if not keep.any():
+        return np.empty((0, 2))
+    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
+    lefts = gaps[np.roll(keep, 1), 0]
+    rights = gaps[keep, 1]
+    first = lefts[0]
+    rights = np.sort(np.where(rights <= first, rights + 2 * np.pi, rights))
+    return np.stack([lefts, rights], axis=1)
+
+
+def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
+    """Put patches of the given widths into gaps (no gaps at all: into the open surface)."""
+    if len(gaps) == 0:
+        order = np.argsort(centres)
+        left, right = (centres + widths / 2)[order], (centres - widths / 2)[order]
+        return np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1)
+    cuts = []
+    for left, right in gaps:
+        marks = [left]
+        for centre, width in sorted(zip(centres, widths, strict=True)):
+            if left < centre < right:
+                marks += [centre - width / 2, centre + width / 2]
+        marks.append(right)
+        cuts += [marks[i : i + 2] for i in range(0, len(marks), 2)]
+    return np.array(cuts)
