@@ -12,6 +12,7 @@ Knows shapes and units, and no ranks beyond opening. What makes it survive a kil
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -181,8 +182,9 @@ class Writer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        # Closing is collective: a rank that failed alone must not wait here for the others.
-        if self._serial or error is None:
+        # Closing is collective: a rank that failed alone must not wait here for the others. And
+        # HDF5 1.10 crashes when it closes a file that it cannot write to.
+        if error is None or (self._serial and not isinstance(error, WriteError)):
             self.close()
 
     def close(self) -> None:
@@ -217,8 +219,9 @@ class Writer:
             self._datasets["status"].write(row, status)
             self._flush()
         except (OSError, RuntimeError) as error:
-            reason = _reason(error) if isinstance(error, OSError) else str(error).split("(")[0]
-            raise WriteError(f"row {row} of {self.path} could not be written: {reason}") from error
+            raise WriteError(
+                f"row {row} of {self.path} could not be written: {_reason(error)}"
+            ) from error
 
     def _flush(self) -> None:
         # Parallel HDF5 keeps no data back; the serial driver does, in any order.
@@ -389,6 +392,9 @@ def _damage(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _reason(error: OSError) -> str:
-    """Return the reason of an error, without h5py's call stack."""
-    return os.strerror(error.errno) if error.errno else str(error).split("(")[0].strip()
+def _reason(error: Exception) -> str:
+    """Return the reason of an error in one line, without HDF5's particulars."""
+    if isinstance(error, OSError) and error.errno:
+        return os.strerror(error.errno)
+    told = re.search(r"error message = '([^']*)'", str(error))
+    return told.group(1) if told else " ".join(str(error).split("(")[0].split())

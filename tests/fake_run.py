@@ -2,13 +2,17 @@
 
 BEHAVIOUR is a list of words, tasks given as H:γ:realisation with ``*`` for any:
 ``step=SECONDS`` time of a load step, ``fail=TASK`` raise, ``hang=TASK`` never reach the next load
-step, ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's.
+step, ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's,
+``serial=1`` as if HDF5 had no MPI, ``full=BYTES`` no file may be written beyond so many bytes.
 """
 
 from __future__ import annotations
 
+import resource
+import signal
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -38,6 +42,18 @@ def fake_result(campaign: Campaign, task: Task) -> TaskResult:
     return TaskResult(**{k: v if v.ndim else v.item() for k, v in values.items()})
 
 
+def fill_the_disk(size: int) -> None:
+    """Let every write beyond ``size`` fail once rows are written."""
+    write = ensemble.run._Session._write
+
+    def limited(session, outcome):
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+        return write(session, outcome)
+
+    ensemble.run._Session._write = limited
+
+
 def install(behaviour: str) -> None:
     settings = dict(word.split("=", 1) for word in behaviour.split())
 
@@ -46,7 +62,7 @@ def install(behaviour: str) -> None:
             with open(settings["log"], "a") as log:
                 log.write(f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}\n")
         if matches(settings.get("crash"), task):
-            ensemble.run._Session._write = None
+            ensemble.run.Writer.write_result = None
         while matches(settings.get("hang"), task):
             time.sleep(0.01)
         for _ in range(campaign.cycle.load_steps):
@@ -57,6 +73,10 @@ def install(behaviour: str) -> None:
             raise FloatingPointError("the sum of γ diverged")
         return fake_result(campaign, task)
 
+    if "serial" in settings:
+        ensemble.run.h5py.get_config = lambda: SimpleNamespace(mpi=False)
+    if "full" in settings:
+        fill_the_disk(int(settings["full"]))
     ensemble.run.run_task = run_task
     ensemble.run.check_task = lambda campaign, task: None
 

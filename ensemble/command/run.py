@@ -1,21 +1,25 @@
 """Run or resume a campaign; under mpirun, rank 0 hands out and the others work.
 
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
-refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 74 the results file could
-not be written, 75 stopped early (a signal, the walltime): run the same command again to resume.
+refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of hysteron
+itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime): run the
+same command again to resume.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
+import traceback
 from pathlib import Path
 from typing import Any
 
 from ensemble.errors import InputError, WriteError
 
-DONE, SOME_FAILED, BAD_INPUT, WRITE_FAILED, RESUME = 0, 1, 2, 74, 75
+DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
+OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Run; returns the exit code, the same on every rank."""
-    from ensemble.ranks import end_job_on_exception, launched, world
+    from ensemble.ranks import launched, world
 
     started = time.time()
     first = launched()[1] == 0
@@ -66,7 +70,6 @@ def execute(args: argparse.Namespace) -> int:
         comm = world()
         if comm is not None:
             first = comm.rank == 0
-            end_job_on_exception(comm)
         return _run(args, comm, started)
     except InputError as error:
         if first:
@@ -74,9 +77,19 @@ def execute(args: argparse.Namespace) -> int:
         return BAD_INPUT
     except WriteError as error:
         print(f"hysteron run: {error}; what was done is kept", file=sys.stderr, flush=True)
-        if comm is not None:
-            comm.Abort(WRITE_FAILED)  # the other ranks know nothing of it
-        return WRITE_FAILED
+        _end_job(comm, WRITE_FAILED)
+        os._exit(WRITE_FAILED)  # at an orderly exit HDF5 would try to write again, and crash
+    except BaseException:
+        traceback.print_exc()
+        _end_job(comm, OUR_ERROR)
+        return OUR_ERROR
+
+
+def _end_job(comm: Any, code: int) -> None:
+    """End every rank: the others know nothing of this one's error and would wait for ever."""
+    sys.stderr.flush()
+    if comm is not None:
+        comm.Abort(code)
 
 
 def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
@@ -106,7 +119,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
     except Overdue as error:
         # Nobody can be waited for; what was given up anyway is lost, the results file is sound.
         say(f"hysteron run: {error}; run the same command again to resume")
-        comm.Abort(RESUME)
+        _end_job(comm, RESUME)
         return RESUME
     if comm is None or comm.rank == 0:
         failed = f", {summary.failed} failed" if summary.failed else ""

@@ -1,0 +1,161 @@
+"""Campaigns under mpirun: the same bits for any number of ranks, and what happens when some die."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import time
+
+import pytest
+from campaign_support import (
+    differences,
+    done_rows,
+    hysteron,
+    kill_all,
+    ranks_of,
+    start,
+    wait_until,
+    write_campaign,
+)
+
+pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun here")
+
+
+@pytest.fixture
+def whole(tmp_path):
+    """The fake campaign, undisturbed, by one process."""
+    out = tmp_path / "whole.h5"
+    assert hysteron("run", write_campaign(tmp_path), "--out", out, fake="").returncode == 0
+    return out
+
+
+def test_real_loops_have_the_same_bits_for_any_number_of_ranks(tmp_path):
+    path = write_campaign(tmp_path)
+    for ranks in (1, 2, 3, 4):
+        process = hysteron("run", path, "--out", tmp_path / f"{ranks}.h5", ranks=ranks)
+        assert process.returncode == 0, process.stderr
+    for ranks in (2, 3, 4):
+        assert differences(tmp_path / "1.h5", tmp_path / f"{ranks}.h5") == []
+
+
+def test_more_ranks_than_tasks(tmp_path, whole):
+    path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
+    process = hysteron("run", path, "--out", tmp_path / "r.h5", ranks=4, fake="")
+    assert process.returncode == 0
+    assert "2 of 2 tasks done; 2 computed" in process.stderr
+
+
+@pytest.mark.parametrize("victim", ["worker", "master", "all"])
+def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
+    path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
+    process = start("run", path, "--out", out, ranks=3, fake="step=0.05")
+    wait_until(lambda: done_rows(out) >= 3)
+    if victim == "all":
+        kill_all(process)
+    else:
+        ranks = ranks_of(process.pid)
+        os.kill(ranks[-1] if victim == "worker" else ranks[0], signal.SIGKILL)
+        process.wait(timeout=20)
+        assert process.returncode not in (0, 1, 2, 75)
+    process.communicate()
+    kept = done_rows(out)
+    resumed = hysteron("run", path, "--out", out, ranks=3, fake=f"log={log}")
+    assert resumed.returncode == 0, resumed.stderr
+    assert differences(out, whole) == []
+    # Ranks that outlived their launcher by a moment may have finished a row meanwhile.
+    assert 8 - kept - 2 <= len(log.read_text().splitlines()) <= 8 - kept
+
+
+@pytest.mark.parametrize("to", ["launcher", "one rank"])
+def test_a_signal_stops_every_rank_within_a_load_step(tmp_path, whole, to):
+    path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
+    process = start("run", path, "--out", out, ranks=3, fake="step=0.1 hang=0.8:0.04:1")
+    wait_until(lambda: done_rows(out) >= 2)
+    asked = time.monotonic()
+    os.kill(process.pid if to == "launcher" else ranks_of(process.pid)[-1], signal.SIGUSR1)
+    _, errors = process.communicate(timeout=20)
+    assert time.monotonic() - asked < 5
+    assert process.returncode == 75, errors
+    assert "stopped early: SIGUSR1 received" in errors
+    kept = done_rows(out)
+    resumed = hysteron("run", path, "--out", out, ranks=2, fake=f"log={log}")
+    assert resumed.returncode == 0, resumed.stderr
+    assert len(log.read_text().splitlines()) == 8 - kept
+    assert differences(out, whole) == []
+
+
+def test_an_error_that_is_not_a_tasks_ends_the_job(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = hysteron("run", path, "--out", out, ranks=3, fake="crash=0.8:0.01:0")
+    assert process.returncode == 70
+    assert "TypeError" in process.stderr
+
+
+def test_failures_and_growth_under_mpirun(tmp_path, whole):
+    path, out = write_campaign(tmp_path, realisations="1"), tmp_path / "r.h5"
+    process = hysteron("run", path, "--out", out, ranks=3, fake="fail=0.7:0.01:0")
+    assert process.returncode == 1
+    log = tmp_path / "log"
+    words = ("run", write_campaign(tmp_path), "--out", out, "--redo", "failed")
+    process = hysteron(*words, ranks=3, fake=f"log={log}")
+    assert process.returncode == 0, process.stderr
+    assert len(log.read_text().splitlines()) == 5
+    assert differences(out, whole) == []
+
+
+def test_the_rank_0_writer_writes_the_same_file(tmp_path, whole):
+    """As where HDF5 has no MPI."""
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = hysteron("run", path, "--out", out, ranks=3, fake="serial=1")
+    assert process.returncode == 0, process.stderr
+    assert differences(out, whole) == []
+    process = start("run", path, "--out", tmp_path / "k.h5", ranks=3, fake="serial=1 step=0.05")
+    wait_until(lambda: done_rows(tmp_path / "k.h5") >= 3)
+    kill_all(process)
+    process.communicate()
+    resumed = hysteron("run", path, "--out", tmp_path / "k.h5", ranks=3, fake="serial=1")
+    assert resumed.returncode == 0, resumed.stderr
+    assert differences(tmp_path / "k.h5", whole) == []
+
+
+def test_bad_input_is_told_once_and_every_rank_ends(tmp_path):
+    path, out = write_campaign(tmp_path, hurst="[1.5]"), tmp_path / "r.h5"
+    process = hysteron("run", path, "--out", out, ranks=3)
+    assert process.returncode == 2
+    ours = [line for line in process.stderr.splitlines() if "hysteron run:" in line]
+    assert len(ours) == 1
+    assert "hurst is [1.5]: it must be a list of different values" in ours[0]
+    assert [p.name for p in tmp_path.iterdir()] == ["c.toml"]
+
+
+def test_the_status_during_a_run_under_mpirun(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, ranks=3, fake="step=0.15")
+    wait_until(lambda: done_rows(out) >= 1)
+    status = json.loads(hysteron("status", out, "--json").stdout)
+    assert 1 <= status["done"] < 8
+    assert status["done"] + status["pending"] == 8
+    process.communicate(timeout=30)
+    assert process.returncode == 0
+
+
+def test_waiting_costs_the_master_next_to_nothing(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, ranks=3, fake="step=1")
+    wait_until(lambda: len(ranks_of(process.pid)) == 3 and out.exists())
+    time.sleep(1.0)
+    master = ranks_of(process.pid)[0]
+
+    def cpu() -> float:
+        with open(f"/proc/{master}/stat") as stat:
+            fields = stat.read().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    before = cpu()
+    time.sleep(2.5)
+    share = (cpu() - before) / 2.5
+    process.send_signal(signal.SIGUSR1)
+    process.communicate(timeout=20)
+    assert share < 0.03
