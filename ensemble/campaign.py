@@ -304,8 +304,9 @@ def _read_table(source: str, name: Table, entries: object) -> Any:
     known = {f.name: f for f in fields(kind)}
     for key in entries:
         if key not in known:
+            names = ", ".join(known)
             raise InputError(
-                f"{source}: [{name}] {_spelt(key)} is unknown; the keys of [{name}] are {', '.join(known)}"
+                f"{source}: [{name}] {_spelt(key)} is unknown; the keys of [{name}] are {names}"
             )
     values = {
         key: known[key].metadata["rule"](f"{source}: [{name}] {key}", value)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import pickle
 import sys
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -17,6 +18,7 @@ from ensemble.errors import InputError
 T = TypeVar("T")
 
 _TAG, _URGENT_TAG = 1, 2
+_PAUSE = 2e-3  # s
 
 # How launchers tell a process how many it is one of, and which one; the first that is set counts.
 # Slurm's SLURM_NTASKS is not among them: a batch script has it too, outside any launcher.
@@ -26,12 +28,13 @@ _LAUNCHERS = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK", "MVAPICH's mpirun"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID", "srun"),
 )
-# A process in whose environment none of these stands was started by itself: MPI is left alone, which
-# saves a second and, on some login nodes, the process. Ranks of a launcher that is unknown here are
-# kept apart by the lock of the results file.
-_HINTS = tuple(
-    "OMPI_COMM_WORLD_ PMIX_ PMI_ PMI1_ PMI2_ MPI_LOCAL MPIRUN_ MPIEXEC_ MV2_ HYDI_ HYDRA_ "
-    "I_MPI_HYDRA PALS_ ALPS_ JSM_ FLUX_TASK PJM_ PRTE_ PRRTE_ PSP_ SLURM_STEP_NUM_TASKS".split()
+# A process in whose environment none of these stands was started by itself: MPI is left alone,
+# which saves a second and, on some login nodes, the process. Ranks of a launcher that is unknown
+# here are kept apart by the lock of the results file.
+_HINTS = (
+    *("OMPI_COMM_WORLD_", "PMIX_", "PMI_", "PMI1_", "PMI2_", "MPI_LOCAL", "MPIRUN_", "MPIEXEC_"),
+    *("MV2_", "HYDI_", "HYDRA_", "I_MPI_HYDRA", "PALS_", "ALPS_", "JSM_", "FLUX_TASK", "PJM_"),
+    *("PRTE_", "PRRTE_", "PSP_", "SLURM_STEP_NUM_TASKS"),
 )
 
 
@@ -102,6 +105,10 @@ def together(comm: Any, function: Callable[[], T]) -> T:
             answer = (True, function())
         except InputError as error:
             answer = (False, str(error))
+    # A rank that waits in a broadcast burns a core, which rank 0 may need for its work.
+    arrived = comm.Ibarrier()
+    while not arrived.Test():
+        time.sleep(_PAUSE)
     good, value = comm.bcast(answer)
     if not good:
         raise InputError(value)
