@@ -8,6 +8,8 @@ import h5py
 import numpy as np
 
 from ensemble.campaign import Campaign, parse_campaign
+from ensemble.fields import GAP_EDGES, field_plan
+from ensemble.schema import kept_rows
 from ensemble.store import create
 from solver.jumps import JUMP_KINDS
 
@@ -31,6 +33,7 @@ load_steps = 20
 unloading_until = -2.0
 [output]
 jumps = {jumps}
+field_nodes = 256
 """
 
 
@@ -109,7 +112,34 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         ("jump_patches_after", rng.integers(0, 5, (n, slots)), -1, np.int32),
     ):
         out[name] = np.where(used, value, empty).astype(dtype)
-    return out
+    return out | _fields(campaign, hurst, h_max, rng)
+
+
+def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
+    """Power-law spectra -(2H+1) and -(2+H), Gaussian heights, exponential gaps, waves as shapes."""
+    plan = field_plan(campaign)
+    n, states = hurst.size, (2, plan.penetration.size)
+    q = plan.wave_number / (10 * 2 * np.pi / plan.period)
+    scatter = 1 + 0.1 * rng.standard_normal((n, *states, 1))
+    rigid = 1e-16 * q ** -(2 * hurst[:, None] + 1)
+    deformed = 0.2e-16 * scatter * (q ** -(2 + hurst[:, None]))[:, None, None, :]
+    height = np.linspace(-5, 5, 81)
+    height = np.exp(-(((height[1:] + height[:-1]) / 2) ** 2) / 2) / np.sqrt(2 * np.pi)
+    gap = np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:])
+    kept = kept_rows(campaign)
+    x = plan.position
+    wave = h_max[kept, None] * np.cos(10 * 2 * np.pi * x / plan.period)
+    surface = np.broadcast_to(0.5 * wave[:, None, None, :], (kept.size, *states, x.size))
+    return {
+        "psd_height": rigid,
+        "height_density": np.broadcast_to(height, (n, height.size)),
+        "psd_displacement": deformed,
+        "gap_density": np.broadcast_to(0.7 * np.exp(-gap), (n, *states, gap.size)),
+        "field_height": wave,
+        "field_displacement": surface,
+        "field_stress": np.zeros(surface.shape),
+        "field_gap": surface - wave[:, None, None, :] + h_max[kept, None, None, None],
+    }
 
 
 def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
