@@ -32,7 +32,9 @@ class RealFourier:
     def __init__(self, n: int) -> None:
         self.n = n
         self.values: Array = pyfftw.zeros_aligned(n, dtype=np.float64)
-        self.spectrum: NDArray[np.complex128] = pyfftw.zeros_aligned(n // 2 + 1, dtype=np.complex128)
+        self.spectrum: NDArray[np.complex128] = pyfftw.zeros_aligned(
+            n // 2 + 1, dtype=np.complex128
+        )
         options = {"flags": ("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"), "threads": 1}
         self._forward = pyfftw.FFTW(self.values, self.spectrum, **options)
         self._inverse = pyfftw.FFTW(

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from solver.elasticity import ElasticGrid
-from solver.grid_cg import Contact, ContactSolver
+from solver.grid_cg import EDGE_COMPLIANCE, Contact, ContactSolver
 from solver.grid_edges import Indices, patch_ranges
 from solver.grid_relax import Relaxation, ranges_mask
 from solver.jumps import Jump, classify
@@ -78,20 +78,20 @@ class GridMethod(Method):
         modulus = problem.half_space.modulus
         self.elastic = ElasticGrid(n, profile.period, modulus)
         self.height = profile.heights(n)
-        self.solver = ContactSolver(self.elastic, self.height)
         dx = self.elastic.dx
         gamma = problem.work_of_adhesion
-        # Gap that adhesion just closes beside an edge: the scale of every tolerance on a length.
-        closing = float(np.sqrt(2 * gamma * 1.73 * dx / modulus))
+        # Gap that adhesion just closes beside an edge: the unit of tolerances on lengths. Without
+        # adhesion it is what the curvature makes of half a node.
+        closing = float(np.sqrt(2 * gamma * EDGE_COMPLIANCE * dx / modulus))
         curved = 0.125 * dx**2 * float(np.sqrt(profile.m4))
-        self.closing_gap = max(closing, curved)
+        self.solver = ContactSolver(self.elastic, self.height, max(closing, curved))
         self.relaxation = Relaxation(
             self.elastic,
             self.solver,
             gamma * np.sqrt(1 + profile.slopes(n) ** 2),
             longest_step=max(1, int(0.1 * profile.shortest_wavelength / dx)),
-            loose=0.02 * self.closing_gap,
-            tight=1e-4 * self.closing_gap,
+            loose=0.02,
+            tight=1e-4,
         )
         self._counters = {"substeps": 0, "bisections": 0}
 
@@ -268,9 +268,9 @@ class _Steps:
         stride = abs(target - contact.separation)
         frozen = contact.copy()
         frozen.separation = target
-        method.solver.solve(frozen, method.relaxation.tight)
         if method.problem.work_of_adhesion == 0:
-            raise NotImplementedError
+            return method.relaxation.relax_without_adhesion(frozen), False
+        method.solver.solve(frozen, method.relaxation.tight)
         energy = self.energy(frozen)
         stress = float(frozen.stress.mean())
         work = self.period * stride
@@ -289,7 +289,7 @@ class _Steps:
         change = stress - float(relaxed.stress.mean())
         if jumped(self.energy(relaxed), relaxed):
             resolved = work * abs(change) <= max(
-                2 * accuracy * drop, 0.02 * accuracy * self.adhesion_scale
+                accuracy * drop, 0.02 * accuracy * self.adhesion_scale
             )
             if not resolved and stride > 0.01 * accuracy * self.h_max:
                 return None, False
@@ -299,7 +299,9 @@ class _Steps:
             return relaxed, True
         smooth = 0.5 * work * (change if self.branch == "loading" else -change)
         # One node more or less at each edge is the grid's own unrest, not curvature.
-        unrest = 0.25 * abs(smooth) * min(1.0, 2 * len(before_edges(frozen)) / max(flips, 1))
+        unrest = (
+            0.25 * abs(smooth) * min(1.0, 2 * patch_ranges(frozen.mask)[0].size / max(flips, 1))
+        )
         allowed = 0.3 * accuracy * self.adhesion_scale * stride / self.h_max + unrest
         if abs(drop - smooth) > allowed and divisible:
             return None, False
@@ -323,11 +325,6 @@ class _Steps:
                 patch_length=length,
             )
         )
-
-
-def before_edges(contact: Contact) -> Indices:
-    """First nodes of the patches."""
-    return patch_ranges(contact.mask)[0]
 
 
 def _node_count(harmonic: int, nodes_per_wave: int | None, nodes: int | None) -> int:

@@ -152,6 +152,4 @@ class EdgeCompliance:
     def _block(self, a: Array, b: Array, c: Array, d: Array) -> Array:
         """Sum of V over the nodes a … b-1 and c … d-1."""
         f = self._f
-        return np.asarray(
-            f[np.abs(b - c)] - f[np.abs(a - c)] - f[np.abs(b - d)] + f[np.abs(a - d)]
-        )
+        return np.asarray(f[np.abs(b - c)] - f[np.abs(a - c)] - f[np.abs(b - d)] + f[np.abs(a - d)])

@@ -120,8 +120,6 @@ def survey(
         growth[:] = np.inf
         overlap[:] = False
     stress = contact.stress[inner]
-    recession = np.where(
-        stress < 0, dx * (adhesion[inner] - 0.5 * stress**2 * s_recede), np.inf
-    )
+    recession = np.where(stress < 0, dx * (adhesion[inner] - 0.5 * stress**2 * s_recede), np.inf)
     both_widths = np.concatenate((width, width))
     return Edges(side, inner, outer, both_widths, gap, growth, recession, overlap)

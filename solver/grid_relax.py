@@ -30,6 +30,7 @@ _TIE = 1e-6
 # A move must release this share of γ' dx: below lies the error of S.
 _MARGIN = 1e-4
 _MAX_SWEEPS = 1_000_000
+_MAX_ACTIVE_SETS = 1000
 
 Abort = Callable[[float, Contact], bool]
 """Called with the energy (J/m) and the contact after each admissible sweep; True stops."""
@@ -54,11 +55,11 @@ class Relaxation:
     elastic : ElasticGrid
     solver : ContactSolver
     adhesion : array, shape (n,)
-        γ sqrt(1 + h'²) in J/m², positive.
+        γ sqrt(1 + h'²) in J/m².
     longest_step : int
         Longest step of an edge, in nodes.
     loose, tight : float
-        Residuals in m while edges run, and of a relaxed state.
+        Residuals while edges run, and of a relaxed state, in closing gaps.
     """
 
     def __init__(
@@ -78,7 +79,9 @@ class Relaxation:
         self.longest_step = longest_step
         self.loose = loose
         self.tight = tight
+        self._tight_residual = tight * solver.closing_gap
         self.tie_height = 1e-9 * float(np.abs(solver.height).max())
+        self._least_release = 0.1 * _MARGIN * elastic.dx * float(adhesion.min())
         self.sweeps = 0
         self.rejected = 0
         self.flips = 0
@@ -104,13 +107,15 @@ class Relaxation:
         anchor: Contact | None = None
         anchor_energy = np.inf
         caution = 0
+        tolerance = self.loose
+        tight_energy = np.inf
         moves: list[_Move] = []
         current = contact.copy()
         for _ in range(_MAX_SWEEPS):
             edges = self._survey(current)
             if edges.overlap.any():
                 self._join_overlaps(current, edges)
-                self.solver.solve(current, self.loose)
+                self.solver.solve(current, tolerance)
                 self.sweeps += 1
                 continue
             energy = self.energy(current)
@@ -118,12 +123,12 @@ class Relaxation:
                 anchor is not None
                 and moves
                 and energy >= anchor_energy - current.energy_error
-                and current.residual > self.tight
+                and current.residual > self._tight_residual
             ):
                 # Unsolved stress has too little energy: no decision on it when it is close.
                 self.solver.solve(current, self.tight)
                 continue
-            if anchor is not None and moves and energy >= anchor_energy:
+            if anchor is not None and moves and energy >= anchor_energy - self._least_release:
                 # The last sweep did not pay: take it back and try fewer edges, shorter steps.
                 self.rejected += 1
                 if len(moves) == 1 and moves[0].length == 1:
@@ -143,20 +148,52 @@ class Relaxation:
                 anchor_energy = energy
             moves = self._moves(edges, memory, blocked, caution)
             if not moves:
-                if current.residual > self.tight:
+                if current.residual > self._tight_residual:
                     self.solver.solve(current, self.tight)
+                    blocked.clear()
+                    energy = self.energy(current)
+                    if energy >= tight_energy - self._least_release:
+                        # Nothing was won since the last time: loosely solved states go in circles.
+                        tolerance = self.tight
+                    tight_energy = min(energy, tight_energy)
                     continue
                 if not self._nucleate(current):
                     return current
-                self.solver.solve(current, self.loose)
+                self.solver.solve(current, tolerance)
                 anchor = None
+                tight_energy = np.inf
                 memory.clear()
                 blocked.clear()
                 continue
             memory = self._apply(current, edges, moves)
-            self.solver.solve(current, self.loose)
+            self.solver.solve(current, tolerance)
             self.sweeps += 1
         raise RuntimeError("edges still move after a million sweeps")
+
+    def relax_without_adhesion(self, contact: Contact) -> Contact:
+        """Contact without adhesion: no tension, no overlap, one solution at every separation.
+
+        Without adhesion nothing holds the inside of a contact together, so nodes in tension leave
+        wherever they are and overlapping nodes join wherever they are, until the set stays
+        (primal-dual active set; Hintermüller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865).
+
+        Raises
+        ------
+        RuntimeError
+            If the contact set does not settle.
+        """
+        contact = contact.copy()
+        for _ in range(_MAX_ACTIVE_SETS):
+            self.solver.solve(contact, self.tight)
+            self.sweeps += 1
+            gap = contact.displacement - self.solver.height + contact.separation
+            kept = np.where(contact.mask, contact.stress >= 0, gap < -self._tight_residual)
+            changed = int(np.count_nonzero(kept != contact.mask))
+            if changed == 0:
+                return contact
+            self.flips += changed
+            contact.mask = kept
+        raise RuntimeError("the contact set without adhesion does not settle")
 
     # ------------------------------------------------------------------ moves
 
