@@ -243,10 +243,11 @@ def test_foreign_empty_and_missing_files_are_refused_in_one_sentence(tmp_path):
 
 MEMORY = """
 import resource, sys
-from ensemble import blocks
+from ensemble import blocks, statistics
 from ensemble.aggregate import aggregate
 blocks.HELD_AT_ONCE //= 20
 blocks._READ_AT_ONCE //= 20
+statistics._BATCH //= 20
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 data = aggregate(sys.argv[1])
 after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -278,4 +279,4 @@ def test_memory_does_not_grow_with_the_curves(tmp_path):
     ).stdout.split()
     assert int(out[0]) == done
     assert size > 70
-    assert float(out[1]) < 35, f"{out[1]} MB for a file of {size:.0f} MB"
+    assert float(out[1]) < 20, f"{out[1]} MB for a file of {size:.0f} MB"
