@@ -13,7 +13,7 @@ S is stationary with respect to the stress, so lumping costs about 1e-4 of it.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
@@ -28,7 +28,7 @@ _EXACT_LENGTH = 24
 _RATIO = 1.08
 
 
-@lru_cache(maxsize=None)
+@cache
 def _growing(length: int) -> tuple[int, ...]:
     """Offsets of block ends that grow away from offset 0, up to ``length``."""
     ends = [0]
@@ -40,14 +40,14 @@ def _growing(length: int) -> tuple[int, ...]:
     return tuple(ends)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _fine_near(length: int) -> tuple[int, ...]:
     """Block ends of a patch of ``length`` nodes, fine at offset 0 only."""
     ends = _growing(length)
     return ends if ends[-1] == length else (*ends, length)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _fine_both(length: int) -> tuple[int, ...]:
     """Block ends of a patch of ``length`` nodes, fine at both ends."""
     half = _growing(length // 2)
@@ -122,7 +122,7 @@ class EdgeCompliance:
         return known
 
     def _compute(self, key: tuple[int, ...]) -> float:
-        """Schur complement of the node at 0; the patch lies at -1, -2, …"""
+        """Schur complement of the node at 0; the patch lies at -1 and beyond."""
         low: list[int] = []
         high: list[int] = []
 

@@ -19,7 +19,7 @@ _VECTOR = numba.types.Array(numba.float64, 1, "C")
 _MATRIX = numba.types.Array(numba.float64, 2, "C")
 
 
-@numba.njit(numba.float64(_VECTOR, _VECTOR), **_OPTIONS)  # type: ignore[untyped-decorator]
+@numba.njit(numba.float64(_VECTOR, _VECTOR), **_OPTIONS)
 def dot(a: Array, b: Array) -> float:
     """Sum of a_i b_i."""
     total = 0.0
@@ -28,16 +28,14 @@ def dot(a: Array, b: Array) -> float:
     return total
 
 
-@numba.njit(  # type: ignore[untyped-decorator]
-    numba.void(_VECTOR, _VECTOR, _VECTOR, numba.float64), **_OPTIONS
-)
+@numba.njit(numba.void(_VECTOR, _VECTOR, _VECTOR, numba.float64), **_OPTIONS)
 def turn(direction: Array, inside: Array, correction: Array, factor: float) -> None:
     """Next search direction: the correction on Ω plus ``factor`` times the last direction."""
     for i in range(direction.size):
         direction[i] = inside[i] * correction[i] + factor * direction[i]
 
 
-@numba.njit(  # type: ignore[untyped-decorator]
+@numba.njit(
     numba.float64(_VECTOR, _VECTOR, _VECTOR, _VECTOR, _VECTOR, _VECTOR, numba.float64), **_OPTIONS
 )
 def advance(
@@ -59,7 +57,7 @@ def advance(
     return largest
 
 
-@numba.njit(numba.float64(_MATRIX, _VECTOR), nogil=True)  # type: ignore[untyped-decorator]
+@numba.njit(numba.float64(_MATRIX, _VECTOR), nogil=True)
 def inverse_form(matrix: Array, vector: Array) -> float:
     """bᵀ A⁻¹ b of a symmetric positive definite A by Cholesky; A's lower half is destroyed."""
     n = vector.size

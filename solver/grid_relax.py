@@ -234,13 +234,11 @@ class Relaxation:
             return moves
         moves = [_Move(m.edge, m.direction, 1, m.release, m.key) for m in moves]
         # 1: all edges by one node; 2, 3, …: the most unstable half, quarter, …
-        release = np.array([m.release for m in moves])
         keep = max(1, len(moves) >> (caution - 1))
-        least = np.sort(release)[-keep] * (1 - _TIE)
-        if caution > 1 and len(moves) >> (caution - 2) <= 1:
-            # Even the tied ones together did not pay: one of them, the leftmost.
-            return [moves[int(np.argmax(release >= least))]]
-        return [m for m, r in zip(moves, release, strict=True) if r >= least]
+        least = sorted(m.release for m in moves)[-keep] * (1 - _TIE)
+        urgent = [m for m in moves if m.release >= least]
+        # Even the tied ones together did not pay: one of them, the leftmost.
+        return urgent[:1] if caution > 1 and len(moves) >> (caution - 2) <= 1 else urgent
 
     def _apply(
         self, contact: Contact, edges: Edges, moves: list[_Move]
