@@ -121,5 +121,6 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     png, pdf = stem.with_suffix(".png"), stem.with_suffix(".pdf")
     with style():
         figure.savefig(png, metadata={"Software": None})
+        figure.set_layout_engine("none")  # the layout is found; finding it again takes as long
         figure.savefig(pdf, metadata={"CreationDate": None, "Producer": None, "Creator": None})
     return png, pdf
