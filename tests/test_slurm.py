@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import getpass
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -132,6 +133,13 @@ NodeName={node} NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
 PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
 """
     )
+    # Control groups are often missing where tests run. Later versions can do without, earlier ones
+    # need none as long as they look for the old kind.
+    version = subprocess.run(["slurmd", "-V"], env=os.environ | {"PATH": PATH}, capture_output=True)
+    found = re.search(rb"(\d+)\.(\d+)", version.stdout)
+    recent = found is not None and (int(found[1]), int(found[2])) >= (24, 5)
+    plugin = "disabled" if recent else "cgroup/v1"
+    (folder / "cgroup.conf").write_text(f"CgroupPlugin={plugin}\n")
     # As a user's shell: nothing of pytest's own batch job, if there is one.
     env = {k: v for k, v in doctor.launch_environment(3).items() if not k.startswith("SLURM")}
     env |= {"PATH": PATH, "SLURM_CONF": str(folder / "slurm.conf")}

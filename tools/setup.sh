@@ -133,17 +133,9 @@ key() {
 }
 digest() { key | sha256sum | cut -d ' ' -f 1; }
 
-slurm_ready() { [ "$slurm" = no ] || command -v slurmctld >/dev/null || ! can_apt || [ -e .setup/no-slurm ]; }
-
-if find_python && [ -x "$venv/bin/hysteron" ] && [ -e "$stamp" ] &&
-    [ "$(cat "$stamp")" = "$(digest)" ] && slurm_ready; then
-    say "nothing to do"
-    exit 0
-fi
-mkdir -p .setup/wheels
-: >"$log"
-
-# ------------------------------------------------------------------------------- system packages
+ready() {
+    find_python && [ -x "$venv/bin/hysteron" ] && [ -e "$stamp" ] && [ "$(cat "$stamp")" = "$(digest)" ]
+}
 
 # missing PACKAGE…: those that dpkg does not have
 missing() {
@@ -159,6 +151,25 @@ apt_install() { # RUNLEVEL=1: install, but start no service
     apt-get install -y --no-install-recommends "$@" </dev/null ||
         { apt-get update && apt-get install -y --no-install-recommends "$@" </dev/null; }
 }
+need_slurm() {
+    [ "$slurm" = yes ] && ! command -v slurmctld >/dev/null && [ ! -e .setup/no-slurm ] && can_apt
+}
+install_slurm() {
+    if ! step "system packages for the test of the batch script: $SLURM" apt_install $SLURM; then
+        # Tried once: the test is skipped and says so, and set-up stays quick.
+        touch .setup/no-slurm
+    fi
+}
+
+mkdir -p .setup/wheels
+if ready; then
+    if need_slurm; then install_slurm; else say "nothing to do"; fi
+    exit 0
+fi
+: >"$log"
+
+# ------------------------------------------------------------------------------- system packages
+
 system_packages() {
     local wanted=''
     if ! find_python; then wanted="python3 python3-venv python3-dev"; fi
@@ -300,12 +311,7 @@ choose_launcher() {
 step "two ranks that see each other" choose_launcher ||
     warn "no mpirun here starts ranks that mpi4py sees as one job: hysteron run works in one process only (hysteron doctor tells more)"
 
-if [ "$slurm" = yes ] && can_apt && ! command -v slurmctld >/dev/null; then
-    if ! step "system packages for the test of the batch script: $SLURM" apt_install $SLURM; then
-        # Tried once: the test is skipped and says so, and set-up stays quick.
-        touch .setup/no-slurm
-    fi
-fi
+if need_slurm; then install_slurm; fi
 
 if [ -n "$why_serial" ]; then
     warn "no parallel writing, rank 0 writes the results file: $why_serial"
