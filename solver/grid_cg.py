@@ -115,7 +115,7 @@ class ContactSolver:
         Raises
         ------
         RuntimeError
-            If the iteration stalls above the tolerance.
+            If there is no free node, or the iteration stalls above the tolerance.
         """
         self.solves += 1
         most = tolerance * self.closing_gap
@@ -138,12 +138,15 @@ class ContactSolver:
             rz = dot(residual, correction)
             turn(direction, inside, correction, rz / rz_before if rz_before else 0.0)
             response = elastic.displacement(direction)
-            step = rz / dot(direction, response)
+            curvature = dot(direction, response)
+            if curvature <= 0:
+                raise RuntimeError("no free node: full contact has no solution at a mean gap")
+            step = rz / curvature
             largest = advance(stress, displacement, residual, direction, response, inside, step)
-            # What one iteration adds to the energy bounds what the next ones will: they converge
-            # by more than a factor of two. A residual alone says little beside full contact, where
-            # V hardly resists a uniform one.
-            gain = 0.5 * elastic.dx * step * rz
+            # Twice what one iteration adds to the energy bounds what all later ones will: gains
+            # fall faster than by two thirds. A residual alone says little beside full contact,
+            # where V hardly resists a uniform one.
+            gain = elastic.dx * step * rz
             rz_before = rz
             self.iterations += 1
         else:

@@ -105,8 +105,10 @@ class EdgeCompliance:
         gap : int
             Free nodes from the patch to the next contact on the node's side, the node included.
         neighbours : (int, int, int) or None
-            Nodes of the next patch on the node's side, of the gap on the patch's other side, and of
-            the patch behind that; None if the patch is the only one of the period.
+            Contact nodes beyond the gap on the node's side, nodes of the gap on the patch's other
+            side, and contact nodes beyond that; None if the patch is the only one of the period.
+            They are the neighbours' nodes and, shared out between both sides, those of all other
+            patches, taken as if they followed without gaps: far away only their number counts.
         """
         key: tuple[int, ...]
         if neighbours is None:
@@ -134,13 +136,14 @@ class EdgeCompliance:
         add(0, -1, _fine_both(key[0]))
         if len(key) > 1:
             width, gap, next_width, other_gap, other_width = key
-            # A lumped neighbour must not reach round the period.
-            reach = self.n // 3
-            if gap < reach:
-                add(gap, 1, _fine_near(min(next_width, reach - gap)))
-            start = width + other_gap
-            if start < reach:
-                add(-start, -1, _fine_near(min(other_width, reach - start)))
+            # Rounded lengths must not reach round the period.
+            free = self.n - gap - width - other_gap
+            next_width = min(next_width, free)
+            other_width = min(other_width, free - next_width)
+            if next_width > 0:
+                add(gap, 1, _fine_near(next_width))
+            if other_width > 0:
+                add(-width - other_gap, -1, _fine_near(other_width))
         if not low:
             return self._self
         a = np.array(low)

@@ -100,9 +100,15 @@ def survey(
 
     s_grow = np.empty(2 * count)
     s_recede = np.empty(2 * count)
+    total = int(width.sum())
     w, gl, gr = width.tolist(), gap_left.tolist(), gap_right.tolist()
     for k in range(count):
         before, after = w[k - 1], w[(k + 1) % count]
+        if count == 2:  # one patch, on both sides
+            before, after = before // 2, after - after // 2
+        else:
+            rest = total - w[k] - before - after
+            before, after = before + rest // 2, after + rest - rest // 2
         for edge, near, near_gap, far_gap, far in (
             (k, before, gl[k], gr[k], after),
             (count + k, after, gr[k], gl[k], before),
@@ -115,7 +121,7 @@ def survey(
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < overlap_below
     # The last free node never joins: the mean gap is the separation, and it is positive.
-    free = n - int(width.sum())
+    free = n - total
     if free <= 1:
         growth[:] = np.inf
         overlap[:] = False

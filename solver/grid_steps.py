@@ -60,7 +60,8 @@ class Steps:
         accuracy = self.method.accuracy
         start = contact.separation
         step = separation - start
-        least = accuracy * self.h_max
+        # Below this stride a jump is run to its end: only then is it known how well it is located.
+        self.least = accuracy * self.h_max
         while contact.separation != separation:
             remaining = separation - contact.separation
             if abs(step) >= abs(remaining) * (1 - 1e-9):
@@ -69,7 +70,7 @@ class Steps:
                 target = contact.separation + step
             if abs(target - separation) < 1e-12 * self.h_max:
                 target = separation
-            after, located = self._substep(contact, target, abs(step) > least)
+            after, located = self._substep(contact, target, abs(step) > self.least)
             if after is None:
                 self.method.bisections += 1
                 step /= 2
@@ -114,10 +115,9 @@ class Steps:
         drop = energy - self.energy(relaxed)
         change = stress - float(relaxed.stress.mean())
         if jumped(self.energy(relaxed), relaxed):
-            resolved = work * abs(change) <= max(
-                accuracy * drop, 0.02 * accuracy * self.adhesion_scale
-            )
-            if not resolved and stride > 0.01 * accuracy * self.h_max:
+            allowed = max(2 * accuracy * drop, 0.02 * accuracy * self.adhesion_scale)
+            if work * abs(change) > allowed and stride > 0.01 * accuracy * self.h_max:
+                self.least = min(0.5 * stride, allowed / (self.period * abs(change)))
                 return None, False
             before = method.state(frozen)
             self.states.append(before)
