@@ -1,0 +1,87 @@
+"""The methods against exact references: error against bound, exit code 1 if one is exceeded."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from dataclasses import asdict
+
+from rich.console import Console
+from rich.table import Table
+
+from ensemble.errors import InputError
+from solver.validate import METHODS, Row, validate
+
+_EXCEEDED = 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``hysteron validate``."""
+    parser.add_argument(
+        "--method",
+        action="append",
+        metavar="NAME",
+        help=f"method to validate, may be repeated (default: {', '.join(METHODS)})",
+    )
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Run the references and print what came out."""
+    names = [name for name in METHODS if not args.method or name in args.method]
+    for name in args.method or ():
+        if name not in METHODS:
+            raise InputError(f"method is {name!r}: it must be one of {', '.join(METHODS)}")
+    rows = validate(names, on_row=_follow)
+    if args.json:
+        print(json.dumps([_record(row) for row in rows], indent=1, allow_nan=False))
+    elif sys.stdout.isatty():
+        Console().print(_table(rows))
+    else:
+        for row in rows:
+            print(_line(row))
+    failed = [row for row in rows if not row.passed]
+    if not args.json:
+        print(f"{len(rows) - len(failed)} of {len(rows)} claims hold")
+    return _EXCEEDED if failed else 0
+
+
+def _follow(row: Row) -> None:
+    """Show on stderr, if that is a terminal, how far the validation has come."""
+    if sys.stderr.isatty():
+        print(f"\r\033[K{row.method}: {row.claim}", end="", file=sys.stderr, flush=True)
+
+
+def _record(row: Row) -> dict[str, object]:
+    record: dict[str, object] = {**asdict(row), "passed": row.passed}
+    # JSON has no NaN: a method that did not get there has no error.
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in record.items()
+    }
+
+
+def _line(row: Row) -> str:
+    verdict = "ok  " if row.passed else "FAIL"
+    note = f"  ({row.note})" if row.note else ""
+    return (
+        f"{verdict}  {row.error:8.1e} <= {row.bound:7.1e}  {row.method:<5}  {row.claim}"
+        f"  [{row.resolution}]{note}"
+    )
+
+
+def _table(rows: list[Row]) -> Table:
+    table = Table(title="Methods against exact references", title_justify="left")
+    for heading in ("claim", "method", "resolution"):
+        table.add_column(heading)
+    for heading in ("error", "bound"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("")
+    table.add_column("note")
+    for row in rows:
+        verdict = "[green]ok[/green]" if row.passed else "[bold red]FAIL[/bold red]"
+        error, bound = f"{row.error:.1e}", f"{row.bound:.1e}"
+        table.add_row(row.claim, row.method, row.resolution, error, bound, verdict, row.note)
+    return table
