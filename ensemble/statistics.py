@@ -29,7 +29,7 @@ FEWEST_FOR_BOOTSTRAP = 5
 # Random numbers held at once by the bootstrap: bounds its memory to some 30 MB.
 _BATCH = 2_000_000
 # Random numbers drawn in all: thousands of realisations need fewer resamples, not hours.
-_DRAWS = 100_000_000
+_DRAWS = 20_000_000
 _FEWEST_RESAMPLES = 999
 
 
