@@ -15,6 +15,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = Path(__file__).resolve().parent
+MPIRUN = os.environ.get("MPIRUN") or "mpirun"
 
 # Time and place may differ between two runs of one campaign; nothing else may.
 TIMING = {"wall_time", "cpu_time", "rank"}
@@ -84,7 +85,7 @@ def environment(**extra: str) -> dict[str, str]:
 def command(words: Iterable[object], ranks: int = 0, fake: str | None = None) -> list[str]:
     """Return the command line of ``hysteron WORDS``, under mpirun if ranks are given."""
     entry = [str(TESTS / "fake_run.py"), fake] if fake is not None else ["-m", "ensemble"]
-    start = ["mpirun", "-n", str(ranks)] if ranks else []
+    start = [MPIRUN, "-n", str(ranks)] if ranks else []
     module = ["-m", "mpi4py"] if ranks else []
     return [*start, sys.executable, *module, *entry, *map(str, words)]
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
 import pytest
-from campaign_support import campaign_text
+from campaign_support import ROOT, campaign_text
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ensemble.campaign import compare, load_campaign, parse_campaign
+from ensemble.campaign import TABLES, compare, load_campaign, parse_campaign
 from ensemble.errors import InputError
+from ensemble.task import make_problem
 
 
 def refused(text: str) -> str:
@@ -32,6 +34,20 @@ def test_values_units_and_defaults():
     assert campaign.solver.time_limit is None
     assert campaign.profile.normalisation == {"h_rms": 1e-6}
     assert campaign.task_count == 8
+
+
+def test_the_documentation_describes_every_key_and_no_other():
+    text = (ROOT / "docs" / "campaign-file.md").read_text()
+    for name, table in TABLES.items():
+        section = text.split(f"## `[{name}]`")[1].split("\n## ")[0]
+        described = re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)
+        assert described == [f.name for f in dataclasses.fields(table)]
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.toml")), ids=lambda p: p.name)
+def test_the_campaigns_that_come_along_are_sound(path):
+    campaign = load_campaign(path)
+    make_problem(campaign, campaign.tasks()[0])
 
 
 BAD_VALUES = [

@@ -10,6 +10,7 @@ import time
 
 import pytest
 from campaign_support import (
+    MPIRUN,
     differences,
     done_rows,
     hysteron,
@@ -20,7 +21,7 @@ from campaign_support import (
     write_campaign,
 )
 
-pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun here")
+pytestmark = pytest.mark.skipif(shutil.which(MPIRUN) is None, reason="there is no mpirun here")
 
 
 @pytest.fixture
