@@ -2,8 +2,8 @@
 
 The elastic field of given edges is that of :mod:`solver.sharp_gaps`; this module follows the edges
 along the loading path. Along a stable branch it steps in the separation with a tangent predictor
-and Newton's corrector; where the corrector finds no stable equilibrium within reach, the step is cut
-down to the wanted resolution of a jump, and the edges then descend in energy at fixed separation.
+and Newton's corrector; where the corrector finds no stable equilibrium within reach, the step
+is cut down to the wanted resolution of a jump, and the edges then descend in energy at fixed separation.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's
 _DESCENT_LIMIT = 1_000_000
 _FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
 _RESOLUTION = 0.02  # resolution of a jump's separation, in units of accuracy·h_max
-_FIELD_ACCURACY = 1e-3  # accuracy of the field in units of the accuracy of the loss
+_FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
 _BEND = 1e-3  # largest relative error of the trapezoidal rule over one step
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten that rule
 
@@ -147,10 +147,13 @@ class SharpMethod(Method):
     ) -> Generator[ContactState | Jump, None, None]:
         at, target = state.separation * self.q0, separation * self.q0
         gaps: Array = state.internal if state.patches else np.empty((0, 2))
-        if not len(gaps) and branch == "loading" and target <= self.h_max:
-            at = self.h_max
-            yield self.detached(self.problem.profile.h_max)
-            highest = self.nucleation.highest_points()
+        if not len(gaps):
+            first, highest = self.nucleation.first_touch()
+            if branch == "unloading" or target > first:
+                yield self.detached(separation)
+                return
+            at = first
+            yield self.detached(at / self.q0)
             gaps = yield from self._jump(gaps, at, branch, touches=highest)
         while len(gaps) and at != target:
             point = self._equilibrium(gaps, at)
@@ -256,9 +259,10 @@ class SharpMethod(Method):
         point = self._relax(gaps if start is None else start, at, touches or [])
         while branch == "loading" and point is not None:
             ready = self._ready(self.nucleation.minima(point.field))
-            if not ready:
+            grown = self._relax(point.field.gaps, at, ready) if ready else None
+            if grown is None or self._same(grown.field.gaps, point.field.gaps):
                 break
-            point = self._relax(point.field.gaps, at, ready)
+            point = grown
         after = self._state(None if point is None else point.field, at)
         period = self.problem.profile.period
         drop = (before.energy - after.energy) / period
@@ -277,14 +281,21 @@ class SharpMethod(Method):
         yield after
         return np.empty((0, 2)) if point is None else point.field.gaps
 
+    def _same(self, one: Array, other: Array) -> bool:
+        """Whether two equilibria are one to the accuracy of Newton's iteration."""
+        return one.shape == other.shape and bool(
+            np.abs(one - other).max() < 100 * self.edges.settled
+        )
+
     def _relax(self, gaps: Array, at: float, touches: list[Touch]) -> _Point | None:
         """Descend to the next minimum of the energy; None when no contact is left."""
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
+        held = None
         for _ in range(_DESCENT_LIMIT):
             if not len(gaps):
                 return None
-            moved = self.edges.descend(gaps, at)
+            moved, held = self.edges.descend(gaps, at, held)
             size = float(np.abs(moved - gaps).max())
             gaps = moved
             small = self._without_small(gaps)

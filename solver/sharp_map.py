@@ -70,5 +70,5 @@ def theta_at(gap, eta):  # type: ignore[no-untyped-def]  # compiled
 
 
 def convergence(table: Array) -> Array:
-    """ln ρ of each gap: the error of M modes falls as ρ^-M."""
+    """Rate ln ρ of each gap: the error of M modes falls as ρ^-M."""
     return np.asarray(np.arcsinh(np.pi / (2 * table[:, ALPHA])))

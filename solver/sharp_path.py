@@ -9,7 +9,7 @@ Hessian of the energy divided by C).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -20,6 +20,7 @@ from solver.profile import Array
 from solver.sharp_gaps import GapField
 from solver.sharp_source import StressSource
 
+_REUSES = 8  # running steps that share one tangent
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
 
 
@@ -33,6 +34,17 @@ class Counters:
     openings: int = 0
     newton_steps: int = 0
     descent_steps: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Eigenvalues and eigenvectors of the symmetric tangent with its scale factors."""
+
+    d: Array
+    values: Array
+    vectors: Array
+    uses: int
+    last: Array | None  # the step taken with it
 
 
 class EdgeMechanics:
@@ -53,6 +65,9 @@ class EdgeMechanics:
         self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
         self.longest_step = 0.1 * self.wave  # longer steps leap over pinned minima
         self.smallest = 0.005 * self.wave  # narrower patches and gaps are gone
+        # an opening this far below zero is an overlap that descent cannot weigh
+        rough = np.sqrt(source.m2 * self.wave)
+        self.overlapping = 0.1 * max(critical, float(rough))
         self.count = Counters()
 
     def field(self, gaps: Array, separation: float) -> GapField:
@@ -77,8 +92,7 @@ class EdgeMechanics:
     def symmetric(self, field: GapField, tangent: Array) -> tuple[Array, Array]:
         """Scale factors d and the symmetric matrix d_e tangent_ef / d_f."""
         c = field.opening.ravel()
-        floor = 1e-6 * max(self.critical, float(np.abs(c).max()))
-        d = np.sqrt(np.maximum(c, floor))
+        d = np.sqrt(np.maximum(c, self.overlapping))
         scaled = tangent * (d[:, None] / d[None, :])
         return d, np.asarray((scaled + scaled.T) / 2)
 
@@ -141,26 +155,39 @@ class EdgeMechanics:
         _, matrix = self.symmetric(field, tangent)
         return float(eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0])
 
-    def descend(self, gaps: Array, separation: float) -> Array:
+    def descend(self, gaps: Array, separation: float, held: Modes | None) -> tuple[Array, Modes]:
         """Take one step of energy descent at fixed separation, no edge further than 0.1 λ_min.
 
         A step solves (tangent + μ) n = C_c - C in the symmetric scaling with the least μ ≥ 0 that
         makes the matrix positive definite and keeps the step within its limits: Newton's step
         near a minimum, the gradient's direction far from one. A patch or gap loses at most half of
-        its length.
+        its length. While edges run at their limits μ dominates and the tangent of a few steps
+        before (``held``) does as well, unless an edge turns; the openings are always fresh.
         """
         self.count.descent_steps += 1
         field = self.field(gaps, separation)
         residual = self.residual(field)
-        d, matrix = self.symmetric(field, self.tangent(field))
-        values, vectors = np.linalg.eigh(matrix)
-        pull = vectors.T @ (-residual * d)
         limit = self._limits(gaps)
+        step = None
+        if held is not None and held.uses < _REUSES and len(held.values) == residual.size:
+            step = self._trust(held, residual, limit)
+            fast = np.abs(step) > 0.2 * self.longest_step
+            if held.last is not None and np.any(fast & (step * held.last <= 0)):
+                step = None  # an edge turns: the held tangent is too old
+        if held is None or step is None:
+            d, matrix = self.symmetric(field, self.tangent(field))
+            held = Modes(d, *np.linalg.eigh(matrix), uses=0, last=None)
+            step = self._trust(held, residual, limit)
+        # Where surfaces would overlap beside an edge there is nothing to weigh: contact advances.
+        step = np.where(field.opening.ravel() < -self.overlapping, limit, step)
+        running = bool(np.any(np.abs(step) > 0.9 * self.longest_step))
+        held = replace(held, last=step, uses=held.uses + 1 if running else _REUSES)
+        return np.asarray((gaps.ravel() + outward(gaps) * step).reshape(-1, 2)), held
 
-        step: Array = _trust_step(values, vectors, pull, d, limit)
-        # Where the surfaces would overlap beside an edge there is nothing to weigh: contact advances.
-        step = np.where(field.opening.ravel() < -0.01 * self.critical, limit, step)
-        return np.asarray((gaps.ravel() + outward(gaps) * step).reshape(-1, 2))
+    @staticmethod
+    def _trust(modes: Modes, residual: Array, limit: Array) -> Array:
+        pull = modes.vectors.T @ (-residual * modes.d)
+        return np.asarray(_trust_step(modes.values, modes.vectors, pull, modes.d, limit))
 
     def _limits(self, gaps: Array) -> Array:
         """Longest step of each edge: 0.1 λ_min, and a quarter of the gap or patch it may close."""

@@ -64,6 +64,7 @@ class StressSource:
         self.x, self.w = x, w
         m = np.arange(profile.coefficients.size)
         h = profile.coefficients * profile.q0
+        self.m2 = profile.m2
         stress = self._on_panels(m * h)  # symbol |q| of the half-space
         slope = self._on_panels(1j * m * m * h)
         measure = np.sqrt(1 + self._on_panels(1j * m * h) ** 2)

@@ -37,8 +37,11 @@ class Nucleation:
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
 
-    def highest_points(self) -> list[Touch]:
-        """Where undeformed surfaces touch first: every maximum that equals h_max to rounding."""
+    def first_touch(self) -> tuple[float, list[Touch]]:
+        """Separation q0 s at which the first patches are put, and where.
+
+        That is at every maximum that equals h_max to rounding.
+        """
         profile = self.problem.profile
         n = 32 * profile.highest_harmonic
         h = profile.heights(n)
@@ -51,7 +54,9 @@ class Nucleation:
         x = x[profile.at(x) >= profile.h_max * (1 - _EQUAL)]
         curvature = -profile.at(x, 2) / profile.q0
         theta = x * profile.q0
-        return [Touch(float(a), 0.0, float(c)) for a, c in zip(theta, curvature, strict=True)]
+        highest = [Touch(float(a), 0.0, float(c)) for a, c in zip(theta, curvature, strict=True)]
+        overlap = max(self.clearance(t) for t in highest)
+        return profile.h_max * profile.q0 - overlap, highest
 
     def minima(self, field: GapField) -> list[Touch]:
         """Local minima of the opening inside the gaps."""
@@ -74,7 +79,9 @@ class Nucleation:
         """Opening left before a patch is put there; negative or zero when it is time."""
         width = self._width(touch)
         narrowest = 3 * self.edges.smallest
-        return touch.opening + (touch.curvature * width**2 if width <= narrowest else 0.0)
+        # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
+        # the surface follows it, 10 to 20 here.
+        return touch.opening + (4 * touch.curvature * width**2 if width <= narrowest else 0.0)
 
     def seeded(self, gaps: Array, touches: list[Touch]) -> Array:
         """Edges with a seed at each touch."""
