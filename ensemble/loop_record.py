@@ -170,6 +170,8 @@ class FieldStates:
         before = self._before.get((branch, wanted))
         if before is None or (branch == "unloading" and not before.patches):
             return self.method.detached(separation)
+        if before.patches and before.separation == separation:
+            return before
         return self.method.follow(before, separation).states[-1]
 
 

@@ -111,10 +111,11 @@ def execute(args: argparse.Namespace) -> int:
         progress=None if args.quiet else _progress(args.max_penetration / args.load_steps),
         on_state=picked.visit if penetrations else None,
     )
+    fields = picked.collect(nodes) if penetrations else {}  # everything is there before a file is
     if args.json is not None:
         write_json(args.json, loop_document(result))
-    if penetrations:
-        write_npz(args.fields, picked.collect(nodes))
+    if fields:
+        write_npz(args.fields, fields)
     print(loop_summary(result))
     for path in (args.json, args.fields):
         if path is not None:
