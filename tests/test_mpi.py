@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import random
 import shutil
 import signal
+import subprocess
 import time
 
 import pytest
@@ -20,6 +23,9 @@ from campaign_support import (
     wait_until,
     write_campaign,
 )
+
+from ensemble.schema import DONE
+from ensemble.store import Results
 
 pytestmark = pytest.mark.skipif(shutil.which(MPIRUN) is None, reason="there is no mpirun here")
 
@@ -67,6 +73,54 @@ def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
     assert differences(out, whole) == []
     # Ranks that outlived their launcher by a moment may have finished a row meanwhile.
     assert 8 - kept - 2 <= len(log.read_text().splitlines()) <= 8 - kept
+
+
+KILLS = int(os.environ.get("HYSTERON_KILLS", "0"))
+
+
+@pytest.mark.skipif(
+    KILLS == 0, reason="long: HYSTERON_KILLS=20 kills each of three victims 20 times"
+)
+@pytest.mark.parametrize("victim", ["worker", "master", "all"])
+def test_kills_at_random_moments(tmp_path, victim):
+    """The file opens after each kill, nothing done is computed again, and all bits are the same."""
+    random.seed(victim)
+    path, out, whole = write_campaign(tmp_path, realisations="4"), tmp_path / "r.h5", tmp_path / "w"
+    assert hysteron("run", path, "--out", whole, fake="").returncode == 0
+    killed = 0
+    while killed < KILLS:
+        done = rows_done(out)
+        log = tmp_path / f"log{killed}"
+        log.touch()
+        process = start("run", path, "--out", out, ranks=3, fake=f"step=0.06 log={log}")
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=random.uniform(0.3, 4.0))
+        ranks = ranks_of(process.pid)
+        if process.poll() is None and len(ranks) == 3:
+            killed += 1
+            if victim == "all":
+                kill_all(process)
+            else:
+                os.kill(ranks[-1] if victim == "worker" else ranks[0], signal.SIGKILL)
+        process.communicate(timeout=30)
+        assert not done & set(log.read_text().split())
+        if process.returncode == 0:
+            assert differences(out, whole) == []
+            out.unlink()
+    assert hysteron("run", path, "--out", out, ranks=3, fake="").returncode == 0
+    assert differences(out, whole) == []
+
+
+def rows_done(path) -> set[str]:
+    """Return the done tasks of a results file as the fake task's log has them."""
+    if not path.exists():
+        return set()
+    with Results(path) as results:
+        return {
+            f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}"
+            for task, status in zip(results.tasks(), results.status(), strict=True)
+            if status == DONE
+        }
 
 
 @pytest.mark.parametrize("to", ["launcher", "one rank"])

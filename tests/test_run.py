@@ -342,3 +342,28 @@ def test_the_fake_tasks_depend_on_nothing_but_the_task(tmp_path):
     one, two = (fake_result(campaign, campaign.tasks()[2]) for _ in range(2))
     np.testing.assert_array_equal(one.loading_energy, two.loading_energy)
     assert TESTS.is_dir()
+
+
+def test_watching_a_run_until_it_is_done(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    run_ = start("run", path, "--out", out, fake="step=0.05")
+    wait_until(lambda: done_rows(out) >= 1)
+    watch = hysteron("status", out, "--watch", "--interval", "0.2")
+    run_.communicate(timeout=20)
+    assert watch.returncode == 0
+    shown = [line for line in watch.stdout.splitlines() if " tasks, " in line]
+    assert "an hour, about" in shown[-2]
+    assert shown[-1].endswith("8 tasks, 8 done, 0 pending, 0 failed")
+    assert " ± " in watch.stdout.splitlines()[-1]  # the loss table has filled up
+    assert hysteron("status", out, "--watch", "--interval", "x").returncode == 2
+
+
+def test_the_losses_that_status_shows(tmp_path):
+    _, out = run(tmp_path)
+    status = json.loads(hysteron("status", out, "--json").stdout)
+    with h5py.File(out) as file:
+        mine = (file["hurst"][:] == 0.7) & (file["work_of_adhesion"][:] == 0.04)
+        loss = file["loss"][:][mine]
+    group = next(g for g in status["groups"] if (g["hurst"], g["work_of_adhesion"]) == (0.7, 0.04))
+    assert group["loss"] == pytest.approx(loss.mean())
+    assert group["loss_standard_error"] == pytest.approx(loss.std(ddof=1) / np.sqrt(2))
