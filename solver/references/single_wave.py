@@ -16,7 +16,7 @@ p1 = sqrt(2E*γ tan(πa/λ)/λ), and p1/p* = α sqrt(tan(πa/λ)), α² = 2γλ/
 
 The solvers of this package measure the adhesive area along the profile instead,
 γ' = γ sqrt(1 + h'²) (the *arc measure*). It raises γ' by at most the factor 1 + (A q0)²/2, so with
-W ∝ γ^κ, κ ≈ 1.2 to 1.35 in the range of α from 0.05 to 0.6, losses differ by less than
+W ∝ γ^κ, κ = 1.25 to 1.27 in the range of α from 0.05 to 0.6, losses differ by less than
 0.7 (A q0)²; at A q0 = 1e-4 that is 7e-9. Both measures are offered here, both exact.
 
 At fixed separation the loop has two jumps: at first touch (s = A) the contact runs from nothing to
