@@ -16,70 +16,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.aggregate_curves import BRANCHES, Curve, average_curves
+from ensemble.aggregate_cells import Cell, read_cells, stress_scale
+from ensemble.aggregate_curves import BRANCHES, average_curves
 from ensemble.aggregate_fields import FieldStatistics, aggregate_fields
 from ensemble.aggregate_jumps import JumpStatistics, aggregate_jumps
+from ensemble.beside import Companion, read_companion
 from ensemble.campaign import Campaign
-from ensemble.errors import InputError
-from ensemble.schema import DONE, FAILED
+from ensemble.schema import FAILED
 from ensemble.statistics import Estimate, estimates
 from ensemble.store import Results
-from solver.material import HalfSpace
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.intp]
 
-_PER_TASK = (
-    *("h_max", "h_rms", "m0", "m2", "m4"),
-    *("loss", "loss_dimensionless", "loss_from_drops", "loss_small_scale", "loss_large_scale"),
-    *("audit_residual", "pull_off_penetration", "pull_off_stress"),
-    *("wall_time", "cpu_time", "states", "jump_count"),
-)
-_WITH_INTERVAL = (
-    "loss",
-    "loss_dimensionless",
-    "loss_small_scale",
-    "loss_large_scale",
-    "small_scale_share",
-    "pull_off_stress",
-    "pull_off_penetration",
-)
 _MOST_FAILURES = 20
-
-
-@dataclass(frozen=True, eq=False)
-class Cell:
-    """All tasks of one (H, γ).
-
-    Attributes
-    ----------
-    hurst, work_of_adhesion : float
-        H; γ in J/m².
-    done, failed, pending : int
-        Tasks.
-    rows : int array, shape (done,)
-        Rows of the done tasks in the file, by realisation.
-    realisation : int array, shape (done,)
-    values : dict of array, each of shape (done,)
-        Per-task numbers under the names of the results file, and ``small_scale_share``
-        (loss_small_scale / loss_from_drops).
-    estimates : dict of Estimate
-        The same, averaged. Only losses and pull-off have an interval.
-    curves : dict of Curve
-        ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``stress`` (σ~),
-        ``stress_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``, ``energy`` (J/m).
-    """
-
-    hurst: float
-    work_of_adhesion: float
-    done: int
-    failed: int
-    pending: int
-    rows: Rows
-    realisation: NDArray[np.int64]
-    values: dict[str, Array]
-    estimates: dict[str, Estimate]
-    curves: dict[str, Curve]
 
 
 @dataclass(frozen=True)
@@ -116,6 +65,8 @@ class Aggregate:
         In the order of the cells.
     failures : tuple of (int, str)
         Row and error text of the first failed tasks.
+    companions : tuple of Companion
+        Other campaigns that the report sets beside this one.
     """
 
     path: Path
@@ -126,6 +77,7 @@ class Aggregate:
     jumps: JumpStatistics
     fields: FieldStatistics
     failures: tuple[tuple[int, str], ...]
+    companions: tuple[Companion, ...] = ()
 
     @property
     def done(self) -> int:
@@ -160,22 +112,17 @@ class Aggregate:
         return None
 
 
-def aggregate(path: Path | str) -> Aggregate:
-    """Average a results file over realisations.
+def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
+    """Average a results file over realisations; ``beside`` are files to set beside it.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is no results file, or holds no finished task.
+        If a file cannot be read, is no results file, or holds no finished task.
     """
     with Results(path) as results:
         status = results.status()
-        cells = _cells(results, status)
-        if not any(cell.done for cell in cells):
-            raise InputError(
-                f"{path} holds no finished task yet ({np.sum(status == FAILED)} failed, of "
-                f"{status.size}): there is nothing to report"
-            )
+        cells = read_cells(results, status)
         rows = [cell.rows for cell in cells]
         for name, scales in _curve_scales(results.campaign, cells).items():
             for branch in BRANCHES:
@@ -192,53 +139,8 @@ def aggregate(path: Path | str) -> Aggregate:
             jumps=aggregate_jumps(results, rows),
             fields=aggregate_fields(results, rows),
             failures=tuple(zip(failed.tolist(), results.errors(failed), strict=True)),
+            companions=tuple(read_companion(other, results.campaign) for other in beside),
         )
-
-
-def _cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
-    hurst, gamma = results.column("hurst"), results.column("work_of_adhesion")
-    realisation = results.column("realisation")
-    columns = {name: results.column(name) for name in _PER_TASK}
-    cells = []
-    for h, g in sorted(set(zip(hurst.tolist(), gamma.tolist(), strict=True))):
-        mine = np.flatnonzero((hurst == h) & (gamma == g))
-        rows = mine[status[mine] == DONE]
-        rows = rows[np.argsort(realisation[rows], kind="stable")]
-        values = {name: column[rows].astype(float) for name, column in columns.items()}
-        drops = values["loss_from_drops"]
-        values["small_scale_share"] = np.divide(
-            values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
-        )
-        failed = int(np.sum(status[mine] == FAILED))
-        cells.append(
-            Cell(
-                hurst=h,
-                work_of_adhesion=g,
-                done=rows.size,
-                failed=failed,
-                pending=mine.size - rows.size - failed,
-                rows=rows,
-                realisation=realisation[rows].astype(np.int64),
-                values=values,
-                estimates=_estimates(values),
-                curves={},
-            )
-        )
-    return cells
-
-
-def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
-    with_interval = np.array([values[name] for name in _WITH_INTERVAL])
-    found = dict(zip(_WITH_INTERVAL, estimates(with_interval), strict=True))
-    rest = [name for name in values if name not in found]
-    plain = estimates(np.array([values[name] for name in rest]), with_interval=False)
-    return found | dict(zip(rest, plain, strict=True))
-
-
-def stress_scale(campaign: Campaign, h_max: Array) -> Array:
-    """E* q0 h_max / 2 in Pa, for every h_max in m: σ~ is the mean stress over this."""
-    half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
-    return 0.5 * half_space.modulus * (2 * np.pi / campaign.profile.period) * h_max
 
 
 def _curve_scales(campaign: Campaign, cells: Sequence[Cell]) -> dict[str, dict[str, list[Array]]]:

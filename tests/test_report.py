@@ -19,8 +19,9 @@ from synthetic_results import campaign, rows, write
 
 from ensemble.aggregate import aggregate
 from ensemble.aggregate_jumps import BIN_EDGES, BINS_PER_DECADE
+from ensemble.campaign import parse_campaign
 from ensemble.command import main
-from ensemble.report import findings, paper, tables, write_report
+from ensemble.report import findings, paper, state_tables, tables, write_report
 from ensemble.report.figures import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES, loops, losses
 from ensemble.report.figures import fields as field_figures
 from ensemble.report.figures.style import save, spread_out, style
@@ -90,7 +91,7 @@ def test_tables_print_as_plain_lines_without_a_terminal(data):
 
 
 def test_jumps_by_kind_add_up_to_all_drops(data):
-    table = tables.jumps(data)
+    table = state_tables.jumps(data)
     shares = np.zeros(len(data.cells))
     for row in table.rows:
         shares[[(c.hurst, c.work_of_adhesion) for c in data.cells].index(row[:2])] += row[-1]
@@ -217,7 +218,7 @@ def test_spectra_carry_both_reference_slopes(data):
         assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(slope, abs=1e-5)
     x, y = np.log(drawn["0.90"]).T
     assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(-2.8, abs=1e-3)
-    rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in tables.slopes(data).rows}
+    rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in state_tables.slopes(data).rows}
     assert rows_of[0.7, 0.01, "unloading", 0.9] == pytest.approx(-2.7, abs=1e-3)
 
 
@@ -393,3 +394,67 @@ def test_contact_is_compared_at_equal_load():
 def test_values_are_spread_evenly():
     assert spread_out([1, 2, 3], 4) == [1, 2, 3]
     assert spread_out(list(range(10)), 4) == [0, 3, 6, 9]
+
+
+# ---------------------------------------------------------------------- beside other campaigns
+
+
+def companion(tmp_path, name: str, factor: float, **replaced: str) -> Path:
+    """The campaign of ``file`` with some lines replaced, its losses multiplied by a factor."""
+    text = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5).text
+    for old, new in replaced.values():
+        assert old in text
+        text = text.replace(old, new)
+    plan = parse_campaign(text)
+    values = rows(campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5))
+    values |= {n: values[n] * factor for n in ("loss", "loss_dimensionless")}
+    short = {n for n, v in values.items() if "loading_" in n or n.startswith(("psd", "gap_d"))}
+    return write(tmp_path / name, plan, {n: v for n, v in values.items() if n not in short})
+
+
+def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_path):
+    finer = companion(
+        tmp_path, "finer.h5", 1.02, a=("[output]", "[solver]\naccuracy = 1e-4\n[output]")
+    )
+    steps = companion(tmp_path, "steps.h5", 0.99, a=("load_steps = 20", "load_steps = 40"))
+    alone = {row[:2]: row for row in tables.losses(data).rows}
+    both = aggregate(file, [finer, steps])
+    assert [c.kind for c in both.companions] == ["resolution", "load steps"]
+    assert both.companions[1].differs == ("cycle.load_steps = 40",)
+    names = [column.name for column in tables.losses(both).columns]
+    by_steps = names.index("loss_dimensionless_error_load_steps")
+    by_grid = names.index("loss_dimensionless_error_resolution")
+    for row in tables.losses(both).rows:
+        cell = data.cell(*row[:2])
+        loss = cell.values["loss_dimensionless"]
+        assert row[by_grid] == pytest.approx(0.02 * loss.mean())
+        assert row[by_steps] == pytest.approx(0.01 * loss.mean())
+        assert alone[row[:2]][by_grid] is None
+        audit = np.abs(cell.values["loss"] - cell.values["loss_from_drops"]) / cell.values["loss"]
+        assert alone[row[:2]][by_steps] == pytest.approx(np.mean(audit * loss))
+
+
+def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, drawn):
+    lower = companion(
+        tmp_path, "lower.h5", 0.5, a=("max_penetration = 0.9", "max_penetration = 0.6")
+    )
+    data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
+    assert "loss_against_max_penetration" in drawn
+    with style():
+        axes = losses.loss_against_penetration(data).axes[0]
+    x, y = axes.containers[0].lines[0].get_data()
+    assert x.tolist() == [0.6, 0.9]
+    assert y[0] == pytest.approx(0.5 * y[1])
+    page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "cycle.max_penetration = 0.6" in page
+    assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
+
+
+def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
+    factor = 19 / aggregate(file).cell(0.8, 0.04).estimates["loss_dimensionless"].mean
+    wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 10", "ratio = 20"))
+    data = aggregate(file, [wider])
+    assert data.companions[0].kind == "spectrum"
+    (sentence,) = findings.readings(data)
+    assert sentence.startswith("Nearest to the known values of the paper's Table 1: wider.h5")
+    assert "wider.h5 1.9 %" in sentence

@@ -16,11 +16,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="directory for losses.csv, curves.nc, the figures and report.md",
     )
+    parser.add_argument(
+        "--beside",
+        metavar="OTHER.h5",
+        type=Path,
+        nargs="+",
+        default=[],
+        help="other campaigns to compare with, loop by loop: another resolution or method, other "
+        "load steps, another largest penetration, another spectrum",
+    )
 
 
 def execute(args: argparse.Namespace) -> int:
     """Write the report; returns 0."""
     from ensemble.report import write_report
 
-    write_report(args.file, args.to)
+    write_report(args.file, args.to, beside=args.beside)
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
@@ -11,7 +12,10 @@ from ensemble.errors import InputError
 
 
 def write_report(
-    path: Path | str, directory: Path | str, stream: IO[str] | None = None
+    path: Path | str,
+    directory: Path | str,
+    stream: IO[str] | None = None,
+    beside: Sequence[Path | str] = (),
 ) -> Aggregate:
     """Write ``losses.csv``, ``curves.nc``, the figures and ``report.md``; print the tables.
 
@@ -23,13 +27,15 @@ def write_report(
         Made if missing; files of the same names are replaced.
     stream : text stream, optional
         Where the tables go; standard output by default.
+    beside : sequence of path
+        Results files of other campaigns to compare with.
 
     Raises
     ------
     InputError
         If there is nothing to report, or the directory cannot be written.
     """
-    data = aggregate(path)
+    data = aggregate(path, beside)
     directory = Path(directory)
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -42,23 +48,34 @@ def write_report(
 
 def _write_files(data: Aggregate, directory: Path) -> None:
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
-    from ensemble.report import tables
+    from ensemble.report import state_tables, tables
     from ensemble.report.curves import write_curves
-    from ensemble.report.figures import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
+    from ensemble.report.figures import (
+        HEIGHTS,
+        LOOPS,
+        LOSSES,
+        MECHANISMS,
+        PENETRATIONS,
+        SHAPES,
+    )
+    from ensemble.report.figures.losses import of_penetration
     from ensemble.report.figures.style import save, style
     from ensemble.report.page import write_page
 
     tables.losses(data).write_csv(directory / "losses.csv")
     tables.paired(data).write_csv(directory / "growth.csv")
-    tables.jumps(data).write_csv(directory / "jumps.csv")
+    state_tables.jumps(data).write_csv(directory / "jumps.csv")
     write_curves(data, directory / "curves.nc")
-    tables.slopes(data).write_csv(directory / "slopes.csv")
+    if data.companions:
+        tables.companions(data).write_csv(directory / "beside.csv")
+    state_tables.slopes(data).write_csv(directory / "slopes.csv")
     with_shapes = (*SHAPES, *HEIGHTS) if data.fields.penetration.size else HEIGHTS
     sections = (
         ("loops", LOOPS),
         ("losses", LOSSES),
         ("mechanisms", MECHANISMS),
         ("fields", with_shapes),
+        ("companions", PENETRATIONS if of_penetration(data) else ()),
     )
     for _, illustrations in sections:
         for item in illustrations:
@@ -70,11 +87,11 @@ def _write_files(data: Aggregate, directory: Path) -> None:
 
 
 def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
-    from ensemble.report import findings, tables
+    from ensemble.report import findings, state_tables, tables
 
     tables.losses(data).print(stream)
     print(file=stream)
-    tables.mechanisms(data).print(stream)
+    state_tables.mechanisms(data).print(stream)
     for sentence in (*findings.missing(data), *findings.quality(data)):
         print(sentence, file=stream)
     print(f"report: {directory / 'report.md'}", file=stream)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ensemble.aggregate import Aggregate, Cell
+from ensemble.aggregate import Aggregate
+from ensemble.aggregate_cells import Cell
 from ensemble.aggregate_fields import fitted_slope
 from ensemble.report import paper
 
@@ -38,6 +39,30 @@ def agreement(data: Aggregate) -> list[str]:
         *_order_in_slope(data),
         *_unloading_exceeds_loading(data),
         *_spectrum(data),
+    ]
+
+
+def readings(data: Aggregate) -> list[str]:
+    """Which campaign comes nearest to the paper's table, of this one and those beside it."""
+    deviations = []
+    for name, cells in (
+        (data.path.name, data.cells),
+        *((companion.path.name, companion.cells) for companion in data.companions),
+    ):
+        found = [
+            cell.estimates["loss_dimensionless"].mean / value - 1
+            for cell in cells
+            if cell.done and (value := paper.table_1(cell.hurst, cell.work_of_adhesion)) is not None
+        ]
+        if found:
+            deviations.append((float(np.sqrt(np.mean(np.square(found)))), name))
+    if len(deviations) < 2:
+        return []
+    deviations.sort()
+    listing = "; ".join(f"{name} {100 * deviation:.1f} %" for deviation, name in deviations)
+    return [
+        f"Nearest to the known values of the paper's Table 1: {deviations[0][1]} (root mean square "
+        f"deviation: {listing})."
     ]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from ensemble import statistics
 from ensemble.aggregate import Aggregate
-from ensemble.report import findings, paper, tables
+from ensemble.report import findings, paper, state_tables, tables
 from ensemble.report.figures import Illustration
 
 Drawn = Mapping[str, str]
@@ -20,7 +20,8 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     ----------
     data : Aggregate
     sections : sequence of (heading, illustrations)
-        The figures that were drawn, under the headings "loops", "losses", "mechanisms", "fields".
+        The figures that were drawn, under the headings "loops", "losses", "mechanisms", "fields",
+        "companions".
     """
     figures = dict(sections)
     losses = tables.losses(data)
@@ -42,10 +43,18 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
             "The same profiles serve every γ, so the growth is known better than the losses.",
             growth.markdown(),
         ]
+    if data.companions:
+        out += [
+            "## Beside other campaigns",
+            "The same realisations of both campaigns, profile by profile.",
+            tables.companions(data).markdown(),
+            *_bullets(findings.readings(data)),
+            *_show(figures.get("companions", ())),
+        ]
     out += ["## Loops", *_show(figures.get("loops", ()))]
     if figures.get("fields"):
         out += ["## Shapes, spectra and distributions", *_show(figures["fields"])]
-        slopes = tables.slopes(data)
+        slopes = state_tables.slopes(data)
         if slopes.rows:
             out += [
                 "### Slope of the spectrum of the deformed surface",
@@ -59,10 +68,10 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         "A jump is *small scale* if edges only run inside existing patches (spreading, receding), "
         "and *large scale* if patches come or go (snap-in, merging, splitting, vanishing, "
         "pull-off).",
-        tables.mechanisms(data).markdown(),
+        state_tables.mechanisms(data).markdown(),
         *_show(figures.get("mechanisms", ())),
         "### Jumps by kind",
-        tables.jumps(data).markdown(),
+        state_tables.jumps(data).markdown(),
         "## Profiles",
         tables.profiles(data).markdown(),
         "## Accuracy and completeness",
@@ -93,8 +102,10 @@ def _footnote() -> str:
         "W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max) and Δ~ = Δ/h_max, each realisation with its own "
         "h_max; s.e.: standard error of the mean; 95 % interval of the mean by the BCa bootstrap "
         f"at the expanded level ({statistics.RESAMPLES} resamples, fixed seed), for fewer than "
-        f"{statistics.FEWEST_FOR_BOOTSTRAP} realisations by Student's t; audit: largest "
-        "|loop integral - sum of drops| / loss; paper: "
+        f"{statistics.FEWEST_FOR_BOOTSTRAP} realisations by Student's t; ± steps: mean "
+        "|loop integral - sum of drops|, or the difference from a campaign with other load steps "
+        "beside this one; ± grid: the difference from a campaign with another resolution or "
+        "method beside this one; audit: largest |loop integral - sum of drops| / loss; paper: "
         f"{paper.REFERENCE}, Table 1, – where its value is not known here."
     )
 

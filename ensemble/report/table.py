@@ -29,6 +29,11 @@ def fixed(digits: int) -> Format:
     return lambda value: f"{value:.{digits}f}"
 
 
+def percent(value: Any) -> str:
+    """Show a fraction in percent, with two significant digits."""
+    return f"{100 * value:.2g} %"
+
+
 @dataclass(frozen=True)
 class Column:
     """One column.
@@ -46,6 +51,10 @@ class Column:
     name: str
     heading: str = ""
     show: Format = plain
+
+
+# What a row is about.
+KEY = (Column("hurst", "H"), Column("work_of_adhesion [J/m^2]", "γ (J/m²)"))
 
 
 @dataclass(frozen=True)

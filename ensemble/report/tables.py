@@ -1,30 +1,21 @@
-"""The tables of the report, from an aggregate."""
+"""The tables of losses and profiles, from an aggregate."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ensemble.aggregate import Aggregate, Cell, stress_scale
-from ensemble.aggregate_curves import BRANCHES
-from ensemble.aggregate_fields import fitted_slope
+from ensemble.aggregate import Aggregate
+from ensemble.aggregate_cells import Cell, stress_scale
+from ensemble.beside import difference
 from ensemble.report import paper
-from ensemble.report.table import Column, Table, Value, fixed, make_table, number, plain
+from ensemble.report.table import KEY, Column, Table, Value, fixed, make_table, number, percent
 from ensemble.statistics import Estimate, interval_method
-
-_KEY = (
-    Column("hurst", "H"),
-    Column("work_of_adhesion [J/m^2]", "γ (J/m²)"),
-)
-
-
-def _percent(value: float) -> str:
-    return f"{100 * value:.2g} %"
 
 
 def losses(data: Aggregate) -> Table:
     """One row for each (H, γ), everything that ``losses.csv`` holds."""
     columns = (
-        *_KEY,
+        *KEY,
         Column("n", "n"),
         Column("failed", "failed"),
         Column("pending", "pending"),
@@ -33,6 +24,8 @@ def losses(data: Aggregate) -> Table:
         Column("loss_dimensionless_sem", "s.e.", number(2)),
         Column("loss_dimensionless_ci_low", "95 % from", number()),
         Column("loss_dimensionless_ci_high", "to", number()),
+        Column("loss_dimensionless_error_load_steps", "± steps", number(1)),
+        Column("loss_dimensionless_error_resolution", "± grid", number(1)),
         Column("loss_dimensionless_paper", "paper", fixed(2)),
         Column("loss_mean [J/m^2]", "loss (J/m²)", number()),
         Column("loss_std [J/m^2]"),
@@ -43,7 +36,7 @@ def losses(data: Aggregate) -> Table:
         Column("loss_from_drops_mean [J/m^2]"),
         Column("audit_residual_mean"),
         Column("audit_residual_rms"),
-        Column("audit_residual_largest", "audit", _percent),
+        Column("audit_residual_largest", "audit", percent),
         Column("loss_small_scale_mean [J/m^2]"),
         Column("loss_small_scale_sem [J/m^2]"),
         Column("loss_large_scale_mean [J/m^2]"),
@@ -83,6 +76,8 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         cell.failed,
         cell.pending,
         *_five(found["loss_dimensionless"]),
+        _error_of_load_steps(data, cell),
+        _error_of_resolution(data, cell),
         paper.table_1(cell.hurst, cell.work_of_adhesion),
         *_five(found["loss"]),
         interval_method(cell.done),
@@ -108,6 +103,36 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         paper.m2(cell.hurst),
         found["wall_time"].mean,
     ]
+
+
+def _error_of_load_steps(data: Aggregate, cell: Cell) -> float | None:
+    """From a campaign with other load steps if there is one, else from the energy audit.
+
+    The audit compares loop integral and sum of drops, of which the load steps are the only
+    difference.
+    """
+    found = _deviation(data, cell, "load steps")
+    if found is None and cell.done:
+        audit = cell.values["audit_residual"] * cell.values["loss_dimensionless"]
+        found = float(np.mean(np.abs(audit)))
+    return found
+
+
+def _error_of_resolution(data: Aggregate, cell: Cell) -> float | None:
+    """From a campaign that differs in its solver alone; None if there is none beside."""
+    return _deviation(data, cell, "resolution")
+
+
+def _deviation(data: Aggregate, cell: Cell, kind: str) -> float | None:
+    """Largest mean difference of the loss from a companion of that kind."""
+    found = [
+        abs(pair.difference.mean)
+        for companion in data.companions
+        if companion.kind == kind
+        and (other := companion.cell(cell.hurst, cell.work_of_adhesion)) is not None
+        and (pair := difference(cell, other)) is not None
+    ]
+    return max(found, default=None)
 
 
 def _five(estimate: Estimate) -> list[float]:
@@ -174,102 +199,39 @@ def profiles(data: Aggregate) -> Table:
     return make_table("Profiles", columns, rows)
 
 
-def jumps(data: Aggregate) -> Table:
-    """Jumps of one loop by kind: how many, and their share of all drops, over all γ of one H."""
-    found = data.jumps
+def companions(data: Aggregate) -> Table:
+    """Losses of the campaigns beside this one, over the realisations that both have."""
     columns = (
-        *_KEY,
-        Column("kind", "kind"),
-        Column("scale", "scale"),
-        Column("jumps_per_loop", "jumps a loop", number(3)),
-        Column("energy_per_loop [J/m^2]", "drops a loop (J/m²)", number(3)),
-        Column("share_of_drops", "share", _percent),
+        Column("file", "campaign"),
+        Column("differs", "where it differs"),
+        *KEY,
+        Column("pairs", "pairs"),
+        Column("loss_dimensionless_here", "W~ here", number()),
+        Column("loss_dimensionless_there", "there", number()),
+        Column("difference", "difference", number(3)),
+        Column("difference_sem", "s.e.", number(2)),
+        Column("difference_ci_low", "95 % from", number(3)),
+        Column("difference_ci_high", "to", number(3)),
+        Column("loss_dimensionless_paper", "paper", fixed(2)),
     )
     rows: list[list[Value]] = []
-    for k, cell in enumerate(data.cells):
-        total = float(found.energy[k].sum())
-        for j, kind in enumerate(found.kinds):
-            if not found.number[k, j]:
+    for companion in data.companions:
+        for cell in data.cells:
+            other = companion.cell(cell.hurst, cell.work_of_adhesion)
+            pair = difference(cell, other) if other is not None else None
+            if pair is None:
                 continue
             rows.append(
                 [
+                    companion.path.name,
+                    "; ".join(companion.differs) or "nothing",
                     cell.hurst,
                     cell.work_of_adhesion,
-                    kind,
-                    "small" if found.small_scale[j] else "large",
-                    float(found.number[k, j] / cell.done),
-                    float(found.energy[k, j] / cell.done),
-                    float(found.energy[k, j] / total) if total else None,
+                    pair.here.n,
+                    pair.here.mean,
+                    pair.there.mean,
+                    *_without_std(pair.difference),
+                    paper.table_1(cell.hurst, cell.work_of_adhesion),
                 ]
             )
-    return make_table("Jumps by kind", columns, rows)
-
-
-def mechanisms(data: Aggregate) -> Table:
-    """Loss by mechanism and pull-off, one row for each (H, γ)."""
-    columns = (
-        *_KEY,
-        Column("small_scale_share", "small-scale share", _percent),
-        Column("small_scale_share_ci_low", "95 % from", _percent),
-        Column("small_scale_share_ci_high", "to", _percent),
-        Column("jumps_per_loop", "jumps a loop", number(3)),
-        Column("pull_off_stress [Pa]", "pull-off (Pa)", number(3)),
-        Column("pull_off_stress_sem [Pa]", "s.e.", number(2)),
-        Column("pull_off_penetration", "at Δ/h_max", number(3)),
-        Column("wall_time [s]", "s a loop", plain),
-    )
-    rows: list[list[Value]] = []
-    for cell in data.cells:
-        share, pull_off = cell.estimates["small_scale_share"], cell.estimates["pull_off_stress"]
-        rows.append(
-            [
-                cell.hurst,
-                cell.work_of_adhesion,
-                share.mean,
-                share.low,
-                share.high,
-                cell.estimates["jump_count"].mean,
-                pull_off.mean,
-                pull_off.sem,
-                cell.estimates["pull_off_penetration"].mean,
-                float(f"{cell.estimates['wall_time'].mean:.3g}"),
-            ]
-        )
-    return make_table("Mechanisms and pull-off", columns, rows)
-
-
-def slopes(data: Aggregate) -> Table:
-    """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
-    columns = (
-        *_KEY,
-        Column("branch", "branch"),
-        Column("penetration", "Δ/h_max", fixed(2)),
-        Column("realisations", "n"),
-        Column("slope", "slope", fixed(2)),
-        Column("slope_sem", "s.e.", number(1)),
-        Column("slope_persson", "-(2+H)", fixed(2)),
-        Column("slope_profile", "-(2H+1)", fixed(2)),
-    )
-    fields = data.fields
-    rows: list[list[Value]] = []
-    for index, cell in enumerate(data.cells):
-        for b, branch in enumerate(BRANCHES):
-            for k, penetration in enumerate(fields.penetration.tolist()):
-                if not fields.in_contact[index, b, k]:
-                    continue
-                density = fields.psd_displacement[index, b, k]
-                slope, error = fitted_slope(data.campaign, fields.wave_number, density)
-                rows.append(
-                    [
-                        cell.hurst,
-                        cell.work_of_adhesion,
-                        branch,
-                        penetration,
-                        int(fields.in_contact[index, b, k]),
-                        slope,
-                        error,
-                        -(2 + cell.hurst),
-                        -(2 * cell.hurst + 1),
-                    ]
-                )
-    return make_table("Slope of the spectrum of the deformed surface", columns, rows)
+    return make_table("Beside other campaigns", columns, rows)

@@ -123,3 +123,12 @@ MECHANISMS = (
         losses.pull_off,
     ),
 )
+PENETRATIONS = (
+    Illustration(
+        "loss_against_max_penetration",
+        "Loss against the largest penetration",
+        "This campaign and those beside it that differ in max_penetration, means with 95 % "
+        "intervals, middle H.",
+        losses.loss_against_penetration,
+    ),
+)

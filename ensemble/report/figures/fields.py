@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ensemble.aggregate import Aggregate, Cell
+from ensemble.aggregate import Aggregate
+from ensemble.aggregate_cells import Cell
 from ensemble.aggregate_curves import BRANCHES
 from ensemble.aggregate_fields import FieldStatistics, Shape
 from ensemble.fields import field_plan

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ensemble.aggregate import Aggregate, Cell
+from ensemble.aggregate import Aggregate
+from ensemble.aggregate_cells import Cell
 from ensemble.aggregate_curves import BRANCHES
 from ensemble.report.figures.style import (
     LINE_OF_BRANCH,

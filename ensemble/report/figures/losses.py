@@ -9,8 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ensemble.aggregate import Aggregate, Cell, stress_scale
+from ensemble.aggregate import Aggregate
+from ensemble.aggregate_cells import Cell, stress_scale
 from ensemble.aggregate_jumps import BIN_EDGES, BINS_PER_DECADE
+from ensemble.beside import Companion
 from ensemble.report import paper
 from ensemble.report.figures.style import (
     LINES,
@@ -29,6 +31,7 @@ from ensemble.report.figures.style import (
     shown_gammas,
     spread_out,
 )
+from ensemble.report.findings import typical_cell
 from ensemble.statistics import Estimate
 
 
@@ -83,6 +86,41 @@ def loss_against_slope(data: Aggregate) -> Figure:
     axes.set_xlabel("mean square slope $m_2$")
     axes.set_ylabel(r"loss $\tilde W$")
     axes.set_ylim(bottom=0)
+    axes.legend(loc="best")
+    return figure
+
+
+def of_penetration(data: Aggregate) -> list[Companion]:
+    """Campaigns beside this one that differ in the largest penetration."""
+    return [companion for companion in data.companions if companion.kind == "penetration"]
+
+
+def loss_against_penetration(data: Aggregate) -> Figure:
+    """W~ against the largest penetration, one curve for each γ, with intervals."""
+    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    axes = figure.axes[0]
+    typical = typical_cell(data)
+    assert typical is not None  # an aggregate has finished tasks
+    for k, gamma in shown_gammas(data):
+        found = [(data.campaign.cycle.max_penetration, data.cell(typical.hurst, gamma))]
+        found += [
+            (companion.campaign.cycle.max_penetration, companion.cell(typical.hurst, gamma))
+            for companion in of_penetration(data)
+        ]
+        done = sorted(
+            (
+                (top, cell.estimates["loss_dimensionless"])
+                for top, cell in found
+                if cell and cell.done
+            ),
+            key=lambda pair: pair[0],
+        )
+        x = np.array([top for top, _ in done])
+        _errorbar(axes, x, [estimate for _, estimate in done], k, gamma_label(gamma))
+    axes.set_xlabel(r"largest penetration $\Delta_\mathrm{max}/h_\mathrm{max}$")
+    axes.set_ylabel(r"loss $\tilde W$")
+    axes.set_ylim(bottom=0)
+    label_panel(axes, f"H = {typical.hurst:g}")
     axes.legend(loc="best")
     return figure
 

@@ -1,0 +1,106 @@
+"""Campaigns set beside one another: the same loops with another resolution, path or spectrum.
+
+Two campaigns that share their seed have the same phases realisation by realisation, so the
+difference of their losses is taken profile by profile.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ensemble.aggregate_cells import Cell, read_cells
+from ensemble.campaign import Campaign
+from ensemble.rules import shown
+from ensemble.statistics import Estimate, estimates
+from ensemble.store import Results
+
+Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
+
+# What is computed, and what is kept of it, do not change a loop.
+_IGNORED = ("sweep.", "output.", "solver.time_limit")
+
+
+@dataclass(frozen=True, eq=False)
+class Companion:
+    """Another campaign.
+
+    Attributes
+    ----------
+    path : Path
+    campaign : Campaign
+    cells : tuple of Cell
+    differs : tuple of str
+        "key = value" of the keys that differ, with the values of this campaign.
+    kind : str
+        What the difference is about: "resolution" (the solver), "load steps", "penetration" (the
+        largest one, load steps may go with it), "spectrum" (the profile), "other".
+    """
+
+    path: Path
+    campaign: Campaign
+    cells: tuple[Cell, ...]
+    differs: tuple[str, ...]
+    kind: Kind
+
+    def cell(self, hurst: float, work_of_adhesion: float) -> Cell | None:
+        """Return the cell of (H, γ), None if this campaign lacks it."""
+        for cell in self.cells:
+            if (cell.hurst, cell.work_of_adhesion) == (hurst, work_of_adhesion):
+                return cell
+        return None
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Dimensionless loss of a companion less that of the campaign, over the pairs of one cell."""
+
+    here: Estimate
+    there: Estimate
+    difference: Estimate
+
+
+def read_companion(path: Path | str, campaign: Campaign) -> Companion:
+    """Read another results file and say how its campaign differs.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is no results file, or holds no finished task.
+    """
+    with Results(path) as results:
+        other, cells = results.campaign, read_cells(results, results.status())
+    here, there = campaign.values(), other.values()
+    keys = [key for key in here if here[key] != there[key] and not key.startswith(_IGNORED)]
+    return Companion(
+        path=Path(path),
+        campaign=other,
+        cells=tuple(cells),
+        differs=tuple(f"{key} = {shown(there[key])}" for key in keys),
+        kind=_kind(set(keys)),
+    )
+
+
+def _kind(keys: set[str]) -> Kind:
+    if keys and all(key.startswith("solver.") for key in keys):
+        return "resolution"
+    if keys == {"cycle.load_steps"}:
+        return "load steps"
+    if "cycle.max_penetration" in keys and all(key.startswith("cycle.") for key in keys):
+        return "penetration"
+    if keys and all(key.startswith("profile.") for key in keys):
+        return "spectrum"
+    return "other"
+
+
+def difference(here: Cell, there: Cell) -> Difference | None:
+    """Compare the losses of the realisations that both have finished; None without any."""
+    _, mine, theirs = np.intersect1d(here.seed, there.seed, assume_unique=True, return_indices=True)
+    if not mine.size:
+        return None
+    one = here.values["loss_dimensionless"][mine]
+    two = there.values["loss_dimensionless"][theirs]
+    return Difference(*estimates(np.array([one, two, two - one])))
