@@ -26,6 +26,8 @@ _GROWTH = 1.8
 # Lengths up to this many nodes are taken exactly, longer ones rounded in equal ratios.
 _EXACT_LENGTH = 24
 _RATIO = 1.08
+# Geometries remembered without rounding, to spare the rounding.
+_RECENT = 20_000
 
 
 @cache
@@ -84,7 +86,9 @@ class EdgeCompliance:
         # V over two blocks of nodes is then a combination of four values of F.
         slope = np.concatenate(([0.5 * kernel[0]], 0.5 * kernel[0] + np.cumsum(kernel[1:])))
         self._f = np.concatenate(([0.0], np.cumsum(slope)))
+        self._recent: dict[tuple[int, int, tuple[int, int, int] | None], float] = {}
         self._known: dict[tuple[int, ...], float] = {}
+        self._pairs: dict[tuple[int, ...], Array] = {}
 
     def isolated(self) -> float:
         """S at the edge of a single patch that covers half of the period, in m/Pa."""
@@ -110,6 +114,18 @@ class EdgeCompliance:
             They are the neighbours' nodes and, shared out between both sides, those of all other
             patches, taken as if they followed without gaps: far away only their number counts.
         """
+        geometry = (width, gap, neighbours)
+        known = self._recent.get(geometry)
+        if known is None:
+            if len(self._recent) >= _RECENT:
+                self._recent.clear()
+            known = self._recent[geometry] = self._rounded_value(width, gap, neighbours)
+        return known
+
+    def _rounded_value(
+        self, width: int, gap: int, neighbours: tuple[int, int, int] | None
+    ) -> float:
+        """S of the geometry with rounded lengths."""
         key: tuple[int, ...]
         if neighbours is None:
             # Either the patch or the gap is taken exactly: together they are the period.
@@ -123,17 +139,62 @@ class EdgeCompliance:
             known = self._known[key] = self._compute(key)
         return known
 
+    def across_patch(self, width: int, left: int, right: int, before: int, after: int) -> Array:
+        """S of the two free nodes beside a patch, shape (2, 2), in m/Pa.
+
+        Parameters
+        ----------
+        width : int
+            Nodes of the patch.
+        left, right : int
+            Free nodes on either side.
+        before, after : int
+            Contact nodes beyond them; 0 for none.
+        """
+        key: tuple[int, ...]
+        if before == 0 and after == 0:
+            # A single patch: either it or the only gap is taken exactly.
+            short = _rounded(min(width, self.n - width))
+            width = short if width <= self.n - width else self.n - short
+            key = (0, width, self.n - width, 0, 0, 0)
+        else:
+            key = (0, *(_rounded(k) for k in (width, left, right, before, after)))
+        known = self._pairs.get(key)
+        if known is None:
+            _, width, left, right, before, after = key
+            blocks = [(0, 1, _fine_both(width))]
+            free = self.n - width - left - right
+            after = min(after, free)
+            before = min(before, free - after)
+            if after > 0:
+                blocks.append((width + right, 1, _fine_near(after)))
+            if before > 0:
+                blocks.append((-left, -1, _fine_near(before)))
+            known = self._pairs[key] = self._schur(blocks, (-1, width))
+        return known
+
+    def across_gap(self, near: int, gap: int, far: int) -> Array:
+        """S of the first and last free node of a gap between patches, shape (2, 2), in m/Pa.
+
+        Parameters
+        ----------
+        near, gap, far : int
+            Nodes of the patch before the gap, of the gap, and of the patch after it.
+        """
+        key = (1, *(_rounded(k) for k in (near, gap, far)))
+        known = self._pairs.get(key)
+        if known is None:
+            _, near, gap, far = key
+            far = min(far, self.n - gap - near)
+            blocks = [(0, -1, _fine_both(near))]
+            if far > 0:
+                blocks.append((gap, 1, _fine_both(far)))
+            known = self._pairs[key] = self._schur(blocks, (0, gap - 1))
+        return known
+
     def _compute(self, key: tuple[int, ...]) -> float:
         """Schur complement of the node at 0; the patch lies at -1 and beyond."""
-        low: list[int] = []
-        high: list[int] = []
-
-        def add(start: int, sign: int, ends: tuple[int, ...]) -> None:
-            places = sorted(start + sign * offset for offset in ends)
-            low.extend(places[:-1])
-            high.extend(places[1:])
-
-        add(0, -1, _fine_both(key[0]))
+        blocks = [(0, -1, _fine_both(key[0]))]
         if len(key) > 1:
             width, gap, next_width, other_gap, other_width = key
             # Rounded lengths must not reach round the period.
@@ -141,16 +202,38 @@ class EdgeCompliance:
             next_width = min(next_width, free)
             other_width = min(other_width, free - next_width)
             if next_width > 0:
-                add(gap, 1, _fine_near(next_width))
+                blocks.append((gap, 1, _fine_near(next_width)))
             if other_width > 0:
-                add(-width - other_gap, -1, _fine_near(other_width))
+                blocks.append((-width - other_gap, -1, _fine_near(other_width)))
+        return float(self._schur(blocks, (0,))[0, 0])
+
+    def _schur(
+        self, patches: list[tuple[int, int, tuple[int, ...]]], nodes: tuple[int, ...]
+    ) -> Array:
+        """S of one or two free nodes beside patches (start, direction, block ends)."""
+        low: list[int] = []
+        high: list[int] = []
+        for start, sign, ends in patches:
+            places = sorted(start + sign * offset for offset in ends)
+            low += places[:-1]
+            high += places[1:]
+        j = np.array(nodes)
+        s = self._block(j[:, None], j[:, None] + 1, j[None, :], j[None, :] + 1)
         if not low:
-            return self._self
+            return s
         a = np.array(low)
         b = np.array(high)
         v = self._block(a[:, None], b[:, None], a[None, :], b[None, :])
-        to_node = self._block(a, b, np.array(0), np.array(1))
-        return self._self - float(inverse_form(v, to_node))
+        to = [self._block(a, b, np.array(k), np.array(k + 1)) for k in nodes]
+        for i, one in enumerate(to):
+            s[i, i] -= inverse_form(v.copy(), one)
+        if len(nodes) == 2:
+            # Polarisation: 2 aᵀV⁻¹b = (a+b)ᵀV⁻¹(a+b) - aᵀV⁻¹a - bᵀV⁻¹b.
+            both = inverse_form(v.copy(), to[0] + to[1])
+            apart = inverse_form(v.copy(), to[0] - to[1])
+            s[0, 1] -= 0.25 * (both - apart)
+            s[1, 0] = s[0, 1]
+        return s
 
     def _block(self, a: Array, b: Array, c: Array, d: Array) -> Array:
         """Sum of V over the nodes a … b-1 and c … d-1."""

@@ -22,6 +22,7 @@ from solver.elasticity import ElasticGrid
 from solver.grid_cg import Contact, ContactSolver
 from solver.grid_compliance import EdgeCompliance
 from solver.grid_edges import Edges, Indices, survey
+from solver.grid_pairs import pairs
 from solver.profile import Array
 
 # Moves whose energies differ by less than this share of the largest are equally urgent: mirror
@@ -110,6 +111,7 @@ class Relaxation:
         tolerance = self.loose
         tight_energy = np.inf
         moves: list[_Move] = []
+        paired = False
         current = contact.copy()
         for _ in range(_MAX_SWEEPS):
             edges = self._survey(current)
@@ -131,7 +133,9 @@ class Relaxation:
             if anchor is not None and moves and energy >= anchor_energy - self._least_release:
                 # The last sweep did not pay: take it back and try fewer edges, shorter steps.
                 self.rejected += 1
-                if len(moves) == 1 and moves[0].length == 1:
+                if paired:
+                    blocked.update(m.key for m in moves)
+                elif len(moves) == 1 and moves[0].length == 1:
                     blocked.add(moves[0].key)
                     caution = 1
                 else:
@@ -147,6 +151,10 @@ class Relaxation:
                 anchor = current.copy()
                 anchor_energy = energy
             moves = self._moves(edges, memory, blocked, caution)
+            paired = False
+            if not moves and current.residual <= self._tight_residual:
+                moves = self._pair_moves(current, edges, blocked)
+                paired = bool(moves)
             if not moves:
                 if current.residual > self._tight_residual:
                     self.solver.solve(current, self.tight)
@@ -239,6 +247,26 @@ class Relaxation:
         urgent = [m for m in moves if m.release >= least]
         # Even the tied ones together did not pay: one of them, the leftmost.
         return urgent[:1] if caution > 1 and len(moves) >> (caution - 2) <= 1 else urgent
+
+    def _pair_moves(
+        self, contact: Contact, edges: Edges, blocked: set[tuple[int, int, int]]
+    ) -> list[_Move]:
+        """Moves of the pair of edges that releases most, and of those that tie with it."""
+        elastic = self.elastic
+        margin = _MARGIN * elastic.dx * float(self.adhesion.min())
+        found = pairs(
+            contact, edges, self.solver.height, self.adhesion, elastic.dx, self.compliance
+        )
+        found = [p for p in found if p.release > margin and p.key(edges) not in blocked]
+        if not found:
+            return []
+        most = max(p.release for p in found)
+        return [
+            _Move(edge, p.direction, 1, p.release, p.key(edges))
+            for p in found
+            if p.release >= most * (1 - _TIE)
+            for edge in p.edges
+        ]
 
     def _apply(
         self, contact: Contact, edges: Edges, moves: list[_Move]

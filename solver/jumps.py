@@ -19,6 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+import numpy as np
+
 from solver.profile import Array
 
 JumpKind = Literal[
@@ -100,11 +102,11 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
 def _overlapping(patch: Array, others: Array, period: float) -> list[int]:
     """Indices of ``others`` that share a point with ``patch`` on the circle."""
     a, b = patch
-    return [
-        k
-        for k, (c, d) in enumerate(others)
-        if any(a < d + shift and c + shift < b for shift in (-period, 0.0, period))
-    ]
+    c, d = others[:, 0], others[:, 1]
+    hits = np.zeros(len(others), dtype=bool)
+    for shift in (-period, 0.0, period):
+        hits |= (a < d + shift) & (c + shift < b)
+    return [int(k) for k in np.flatnonzero(hits)]
 
 
 def _same(one: tuple[float, float], two: Array, period: float) -> bool:

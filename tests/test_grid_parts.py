@@ -12,6 +12,7 @@ from solver.grid_cg import Contact, ContactSolver
 from solver.grid_compliance import EdgeCompliance
 from solver.grid_edges import patch_ranges, survey
 from solver.grid_kernels import dot, inverse_form
+from solver.grid_pairs import pairs
 
 HALF_SPACE = HalfSpace(1e6, 0.5)
 PERIOD = 2e-3 * np.pi
@@ -188,6 +189,30 @@ def test_moving_an_edge_by_one_node_costs_what_the_survey_says():
             assert edges.recession[k] == pytest.approx(cost, abs=0.005 * (unit + abs(unit - cost)))
         else:
             assert contact.stress[edges.inner[k]] >= 0
+
+
+@pytest.mark.parametrize("level", [0.3e-6, 0.8e-6])
+def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level, monkeypatch):
+    monkeypatch.setattr("solver.grid_pairs._COUPLING", np.inf)  # price them all
+    method = rough()
+    contact = method.solver.empty(0.8 * level)
+    contact.mask = method.height > level
+    method.solver.solve(contact, 1e-6)
+    relaxation = method.relaxation
+    edges = relaxation._survey(contact)
+    dx = method.elastic.dx
+    found = pairs(contact, edges, method.height, relaxation.adhesion, dx, relaxation.compliance)
+    assert {p.direction for p in found} == {1, -1}
+    now = exact_energy(method, contact.mask, contact.separation)
+    unit = 2 * dx * method.problem.work_of_adhesion
+    for pair in found:
+        moved = contact.mask.copy()
+        for k in pair.edges:
+            moved[edges.outer[k] if pair.direction > 0 else edges.inner[k]] = pair.direction > 0
+        cost = exact_energy(method, moved, contact.separation) - now
+        # A hundredth of the elastic part, which S prices.
+        elastic = abs(cost + pair.direction * unit)
+        assert -pair.release == pytest.approx(cost, abs=0.01 * elastic)
 
 
 # ------------------------------------------------------------------ relaxation
