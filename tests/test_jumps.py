@@ -1,0 +1,65 @@
+"""The kinds of jumps, on the circle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver.jumps import JUMP_KINDS, SMALL_SCALE, Jump, classify
+
+NONE = np.empty((0, 2))
+
+
+def patches(*edges: tuple[float, float]) -> np.ndarray:
+    return np.array(edges, dtype=float).reshape(-1, 2)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind", "length"),
+    [
+        (NONE, patches((0.4, 0.5)), "snap-in", 0.1),
+        (patches((0.1, 0.2)), patches((0.1, 0.2), (0.5, 0.6)), "snap-in", 0.1),
+        (patches((0.1, 0.2), (0.3, 0.4)), patches((0.1, 0.4)), "merging", 0.3),
+        (patches((0.1, 0.4)), patches((0.1, 0.2), (0.3, 0.4)), "splitting", 0.3),
+        (patches((0.1, 0.2), (0.5, 0.7)), patches((0.1, 0.2)), "vanishing", 0.2),
+        (patches((0.1, 0.2), (0.5, 0.7)), NONE, "pull-off", 0.2),
+        (patches((0.1, 0.2), (0.5, 0.6)), patches((0.1, 0.2), (0.5, 0.7)), "spreading", 0.2),
+        (patches((0.1, 0.2), (0.5, 0.7)), patches((0.1, 0.2), (0.5, 0.6)), "receding", 0.2),
+        # The same patch, written from the other side of the period.
+        (patches((0.9, 1.1)), patches((0.9, 1.2)), "spreading", 0.3),
+        (patches((0.02, 0.1)), patches((0.98, 1.1)), "spreading", 0.12),
+        (patches((0.02, 0.1), (0.8, 0.9)), patches((0.8, 1.1)), "merging", 0.3),
+        # Several events: a new patch counts before a merger, a merger before a loss.
+        (
+            patches((0.1, 0.2), (0.3, 0.4), (0.6, 0.7)),
+            patches((0.1, 0.4)),
+            "merging",
+            0.3,
+        ),
+    ],
+)
+def test_kind_and_largest_changed_patch(before, after, kind, length):
+    found, largest = classify(before, after, 1.0)
+    assert found == kind
+    assert largest == pytest.approx(length)
+
+
+def test_kind_does_not_depend_on_the_origin():
+    before, after = patches((0.1, 0.2), (0.5, 0.7)), patches((0.1, 0.75))
+    for shift in np.linspace(0, 1, 21):
+
+        def moved(edges: np.ndarray, shift: float = shift) -> np.ndarray:
+            left = (edges[:, 0] + shift) % 1.0
+            new = np.column_stack((left, left + edges[:, 1] - edges[:, 0]))
+            return new[np.argsort(new[:, 0])]
+
+        assert classify(moved(before), moved(after), 1.0) == ("merging", pytest.approx(0.65))
+
+
+def test_only_running_edges_are_small_scale():
+    kinds = {
+        kind: Jump("loading", 0.0, 0.0, kind, 1, 1, 0.1, 0.2, 0.1).small_scale
+        for kind in JUMP_KINDS
+    }
+    assert {kind for kind, small in kinds.items() if small} == {"spreading", "receding"}
+    assert {"spreading", "receding"} == SMALL_SCALE
