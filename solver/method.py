@@ -55,6 +55,8 @@ class ContactState:
         ½∫σ(h - s)dx and -γ∫sqrt(1 + h'²)dx over the contact of one period, in J/m.
     contact_fraction : float
         A/A0.
+    stiffness : float
+        dp̄/ds along the branch in Pa/m where the method knows it, else NaN.
     internal : object
         What the method needs to go on from here; nobody else reads it.
     """
@@ -65,6 +67,7 @@ class ContactState:
     elastic_energy: float
     adhesion_energy: float
     contact_fraction: float
+    stiffness: float = float("nan")
     internal: Any = field(default=None, repr=False)
 
     @property

@@ -2,8 +2,9 @@
 
 The elastic field of given edges is that of :mod:`solver.sharp_gaps`; this module follows the edges
 along the loading path. Along a stable branch it steps in the separation with a tangent predictor
-and Newton's corrector; where the corrector finds no stable equilibrium within reach, the step
-is cut down to the wanted resolution of a jump, and the edges then descend in energy at fixed separation.
+and Newton's corrector; where the corrector finds no stable equilibrium within reach, the step is
+cut down to the wanted resolution of a jump, and the edges then descend in energy at fixed
+separation.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _DESCENT_LIMIT = 1_000_000
 _FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
 _RESOLUTION = 0.02  # resolution of a jump's separation, in units of accuracy·h_max
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
-_BEND = 1e-3  # largest relative error of the trapezoidal rule over one step
+_BEND = 3e-4  # largest relative error of the trapezoidal rule over one step
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten that rule
 
 
@@ -71,7 +72,8 @@ class SharpMethod(Method):
         self.nucleation = Nucleation(problem, self.edges)
         self.h_max = profile.h_max * self.q0
         self.resolution = _RESOLUTION * accuracy * self.h_max
-        self._bend = min(_BEND, 0.3 * np.sqrt(accuracy))
+        self._bend = _BEND * np.sqrt(min(1.0, accuracy / 1e-3))
+        self._loaded: list[ContactState] = []  # without adhesion: the way back
         m = np.arange(profile.coefficients.size)
         h = np.abs(profile.coefficients * self.q0) ** 2
         self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
@@ -95,18 +97,44 @@ class SharpMethod(Method):
     def follow(self, state: ContactState, separation: float) -> Path:
         """Follow the quasi-static path; see the contract."""
         branch: Branch = "loading" if separation <= state.separation else "unloading"
+        if self.problem.work_of_adhesion == 0:
+            return self._follow_reversibly(state, separation)
         events = list(self._events(state, separation, branch))
         return Path(
             tuple(e for e in events if isinstance(e, ContactState)),
             tuple(e for e in events if isinstance(e, Jump)),
         )
 
+    def _follow_reversibly(self, state: ContactState, separation: float) -> Path:
+        """Without adhesion the state at a separation is unique, and nothing jumps.
+
+        On loading patches appear, grow and merge smoothly. Unloading goes back through the states
+        of loading; a state that is missing is loaded to from a lighter one.
+        """
+        if separation <= state.separation:
+            events = list(self._events(state, separation, "loading"))
+            states = [e for e in events if isinstance(e, ContactState)]
+            self._loaded += states
+            return Path(tuple(states), ())
+        lighter = [s for s in self._loaded if s.separation >= separation]
+        back = [s for s in self._loaded if state.separation < s.separation < separation]
+        first = self.detached(max(separation, self.problem.profile.h_max))
+        start = min(lighter, key=lambda s: s.separation, default=first)
+        if start.separation > separation:
+            found = self._events(start, separation, "loading")
+            start = [e for e in found if isinstance(e, ContactState)][-1]
+        return Path((*sorted(back[::-1], key=lambda s: s.separation), start), ())
+
     # ------------------------------------------------------------------ states
 
     def _state(
-        self, field: GapField | None, at: float, separation: float | None = None
+        self,
+        field: GapField | None,
+        at: float,
+        slope: float = float("nan"),
+        separation: float | None = None,
     ) -> ContactState:
-        """Contact state of a field (None: no contact) at q0 s = ``at``."""
+        """Contact state of a field (None: no contact) at q0 s = ``at``, dp/d(q0 s) = ``slope``."""
         separation = at / self.q0 if separation is None else separation
         if field is None:
             return self.detached(separation)
@@ -126,6 +154,7 @@ class SharpMethod(Method):
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
             contact_fraction=float((right - left).sum() / (2 * np.pi)),
+            stiffness=slope * half * self.q0,
             internal=gaps,
         )
 
@@ -155,10 +184,14 @@ class SharpMethod(Method):
             at = first
             yield self.detached(at / self.q0)
             gaps = yield from self._jump(gaps, at, branch, touches=highest)
-        while len(gaps) and at != target:
+        settled = False
+        while len(gaps) and (at != target or not settled):
             point = self._equilibrium(gaps, at)
+            settled = True
             if point is None:
                 gaps = yield from self._jump(gaps, at, branch)
+            elif at == target:
+                yield self._state(point.field, at, self._slope(point), separation)
             else:
                 at, gaps = yield from self._branch(point, target, separation, branch)
         if not len(gaps) and at != target:
@@ -182,12 +215,12 @@ class SharpMethod(Method):
                 if abs(step) > self.resolution:
                     wanted = max(0.25 * abs(step), 0.999 * self.resolution)
                     continue
-                yield self._state(point.field, point.at)
+                yield self._state(point.field, point.at, slope)
                 at = target if step == target - point.at else point.at + step
                 gaps = yield from self._jump(point.field.gaps, at, branch)
                 return at, gaps
-            slope = self._slope(reached)
-            error = self._trapezoid_error(shown, reached, slope)
+            next_slope = self._slope(reached)
+            error = self._trapezoid_error(shown, reached, next_slope)
             if error > 4 and abs(step) > self.resolution:
                 wanted = 0.5 * abs(step)
                 continue
@@ -197,7 +230,7 @@ class SharpMethod(Method):
                     touched, clearance = self._touched(trail)
                     if touched is not None:
                         point, touches = touched
-                        yield self._state(point.field, point.at)
+                        yield self._state(point.field, point.at, self._slope(point))
                         gaps = yield from self._jump(
                             point.field.gaps, point.at, branch, touches=touches
                         )
@@ -205,14 +238,14 @@ class SharpMethod(Method):
                     look, trail = reached.at - clearance / _FASTEST_CLOSING, [reached]
             small = self._without_small(reached.field.gaps)
             if small is not None:
-                yield self._state(reached.field, reached.at)
+                yield self._state(reached.field, reached.at, next_slope)
                 gaps = yield from self._jump(reached.field.gaps, reached.at, branch, start=small)
                 return reached.at, gaps
-            point, wanted = reached, 2 * abs(step)
+            point, slope, wanted = reached, next_slope, 2 * abs(step)
             if point.at == target:
-                yield self._state(point.field, target, separation)
+                yield self._state(point.field, target, slope, separation)
             elif error > 1:
-                yield self._state(point.field, point.at)
+                yield self._state(point.field, point.at, slope)
                 shown = (point.at, slope)
         return target, point.field.gaps
 
@@ -263,7 +296,9 @@ class SharpMethod(Method):
             if grown is None or self._same(grown.field.gaps, point.field.gaps):
                 break
             point = grown
-        after = self._state(None if point is None else point.field, at)
+        after = self.detached(at / self.q0)
+        if point is not None:
+            after = self._state(point.field, at, self._slope(point))
         period = self.problem.profile.period
         drop = (before.energy - after.energy) / period
         kind, length = classify(before.edges, after.edges, period)

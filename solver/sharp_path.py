@@ -37,14 +37,13 @@ class Counters:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
-    """Eigenvalues and eigenvectors of the symmetric tangent with its scale factors."""
+class Held:
+    """Symmetric tangent with its scale factors, held over running steps."""
 
     d: Array
-    values: Array
-    vectors: Array
+    matrix: Array
     uses: int
-    last: Array | None  # the step taken with it
+    last: Array  # the step taken with it
 
 
 class EdgeMechanics:
@@ -64,7 +63,12 @@ class EdgeMechanics:
         self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
         self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
         self.longest_step = 0.1 * self.wave  # longer steps leap over pinned minima
-        self.smallest = 0.005 * self.wave  # narrower patches and gaps are gone
+        # Narrower patches and gaps are gone: far below the width at which a patch on the sharpest
+        # crest first comes to rest, (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8.
+        seed = (2 * critical**2 / source.sharpest**2) ** (1 / 3)
+        self.smallest = 0.005 * self.wave
+        if critical > 0:
+            self.smallest = min(self.smallest, 0.05 * seed)
         # an opening this far below zero is an overlap that descent cannot weigh
         rough = np.sqrt(source.m2 * self.wave)
         self.overlapping = 0.1 * max(critical, float(rough))
@@ -155,39 +159,33 @@ class EdgeMechanics:
         _, matrix = self.symmetric(field, tangent)
         return float(eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0])
 
-    def descend(self, gaps: Array, separation: float, held: Modes | None) -> tuple[Array, Modes]:
+    def descend(self, gaps: Array, separation: float, held: Held | None) -> tuple[Array, Held]:
         """Take one step of energy descent at fixed separation, no edge further than 0.1 λ_min.
 
-        A step solves (tangent + μ) n = C_c - C in the symmetric scaling with the least μ ≥ 0 that
-        makes the matrix positive definite and keeps the step within its limits: Newton's step
-        near a minimum, the gradient's direction far from one. A patch or gap loses at most half of
-        its length. While edges run at their limits μ dominates and the tangent of a few steps
-        before (``held``) does as well, unless an edge turns; the openings are always fresh.
+        Edges out of equilibrium run in the direction in which the energy falls, all at the same
+        speed (their limit); edges near equilibrium follow them by Newton's step. A patch or gap
+        loses at most a quarter of its length to each edge. While edges run, the tangent of a few
+        steps before (``held``) does as well, unless an edge turns; the openings are always fresh.
         """
         self.count.descent_steps += 1
         field = self.field(gaps, separation)
-        residual = self.residual(field)
+        pull = -self.residual(field)
         limit = self._limits(gaps)
         step = None
-        if held is not None and held.uses < _REUSES and len(held.values) == residual.size:
-            step = self._trust(held, residual, limit)
+        if held is not None and held.uses < _REUSES and len(held.d) == pull.size:
+            step = running_step(held.matrix, held.d, pull, limit)
             fast = np.abs(step) > 0.2 * self.longest_step
-            if held.last is not None and np.any(fast & (step * held.last <= 0)):
+            if np.any(fast & (step * held.last <= 0)):
                 step = None  # an edge turns: the held tangent is too old
         if held is None or step is None:
             d, matrix = self.symmetric(field, self.tangent(field))
-            held = Modes(d, *np.linalg.eigh(matrix), uses=0, last=None)
-            step = self._trust(held, residual, limit)
+            step = running_step(matrix, d, pull, limit)
+            held = Held(d, matrix, uses=0, last=step)
         # Where surfaces would overlap beside an edge there is nothing to weigh: contact advances.
         step = np.where(field.opening.ravel() < -self.overlapping, limit, step)
         running = bool(np.any(np.abs(step) > 0.9 * self.longest_step))
         held = replace(held, last=step, uses=held.uses + 1 if running else _REUSES)
         return np.asarray((gaps.ravel() + outward(gaps) * step).reshape(-1, 2)), held
-
-    @staticmethod
-    def _trust(modes: Modes, residual: Array, limit: Array) -> Array:
-        pull = modes.vectors.T @ (-residual * modes.d)
-        return np.asarray(_trust_step(modes.values, modes.vectors, pull, modes.d, limit))
 
     def _limits(self, gaps: Array) -> Array:
         """Longest step of each edge: 0.1 λ_min, and a quarter of the gap or patch it may close."""
@@ -198,34 +196,58 @@ class EdgeMechanics:
 
 
 @njit(cache=True)
-def _trust_step(values, vectors, pull, d, limit):  # type: ignore[no-untyped-def]  # compiled
-    """(matrix + μ)^-1 pull in the symmetric scaling, with the least μ ≥ 0 that fits the limits."""
-    n = values.shape[0]
-    span = values[n - 1] - values[0] + max(abs(values[0]), abs(values[n - 1])) + 1e-300
-    base = 0.0 if values[0] > 1e-9 * span else -values[0] + 1e-9 * span
-    step = vectors @ (pull / (values + base)) / d
-    if _fits(step, limit):
-        return step
-    high = 1e-3 * span
-    step = vectors @ (pull / (values + base + high)) / d
-    while not _fits(step, limit):
-        high *= 8.0
-        step = vectors @ (pull / (values + base + high)) / d
-    low = high / 8.0
-    for _ in range(5):
-        middle = np.sqrt(low * high)
-        trial = vectors @ (pull / (values + base + middle)) / d
-        if _fits(trial, limit):
-            high = middle
-            step = trial
-        else:
-            low = middle
+def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # compiled
+    """Step of every edge: runners at their limit, the others by Newton's step around them.
+
+    ``matrix`` is the symmetric tangent, ``d`` its scale factors, ``pull`` C_c - C. Edges become
+    runners one after the other: those that Newton's step would move beyond their limit, and, while
+    the matrix of the others is not positive definite, the one that its softest mode moves most.
+    """
+    n = pull.shape[0]
+    step = np.zeros(n)
+    runs = np.zeros(n, dtype=np.bool_)
+    scaled = pull * d
+    for _ in range(n + 1):
+        free = np.flatnonzero(~runs)
+        if free.shape[0] == 0:
+            break
+        block = np.empty((free.shape[0], free.shape[0]))
+        right = np.empty(free.shape[0])
+        for i in range(free.shape[0]):
+            right[i] = scaled[free[i]]
+            for j in range(n):
+                if runs[j]:
+                    right[i] -= matrix[free[i], j] * step[j] * d[j]
+            for j in range(free.shape[0]):
+                block[i, j] = matrix[free[i], free[j]]
+        values, vectors = np.linalg.eigh(block)
+        if values[0] <= 1e-9 * np.abs(values).max():
+            # The softest mode runs downhill; its largest edge leads.
+            mode = vectors[:, 0] / d[free]
+            lead = np.argmax(np.abs(mode))
+            edge = free[lead]
+            downhill = vectors[:, 0] @ right
+            sign = np.sign(mode[lead]) * (1.0 if downhill >= 0 else -1.0)
+            if abs(pull[edge]) * d[edge] > 0.5 * np.abs(right).max():
+                sign = np.sign(pull[edge])
+            runs[edge] = True
+            step[edge] = sign * limit[edge]
+            continue
+        newton = (vectors @ ((vectors.T @ right) / values)) / d[free]
+        done = True
+        for i in range(free.shape[0]):
+            edge = free[i]
+            step[edge] = newton[i]
+            if not abs(newton[i]) <= limit[edge]:
+                runs[edge] = True
+                step[edge] = np.sign(newton[i]) * limit[edge]
+                done = False
+        if done:
+            break
+        for i in range(free.shape[0]):
+            if not runs[free[i]]:
+                step[free[i]] = 0.0
     return step
-
-
-@njit(cache=True)
-def _fits(step, limit):  # type: ignore[no-untyped-def]  # compiled
-    return np.all(np.abs(step) <= limit)
 
 
 def outward(gaps: Array) -> Array:

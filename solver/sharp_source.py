@@ -65,6 +65,7 @@ class StressSource:
         m = np.arange(profile.coefficients.size)
         h = profile.coefficients * profile.q0
         self.m2 = profile.m2
+        self.sharpest = float(np.abs(profile.curvatures(8 * top)).max()) / profile.q0
         stress = self._on_panels(m * h)  # symbol |q| of the half-space
         slope = self._on_panels(1j * m * m * h)
         measure = np.sqrt(1 + self._on_panels(1j * m * h) ** 2)
