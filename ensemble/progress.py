@@ -11,6 +11,7 @@ from typing import Any, TextIO
 _LIVE_INTERVAL = 0.5  # s
 _LINE_INTERVALS = (5.0, 60.0)  # s: at first, and grown to
 _MOST_FAILURES_SHOWN = 5
+_BAR_WIDTH = 16  # with the text, most lines fit into 80 columns
 
 
 def duration(seconds: float) -> str:
@@ -113,8 +114,10 @@ class Progress:
 
         c = self._counts
         grid = Table.grid(padding=(0, 1))
+        grid.add_column()
+        grid.add_column(no_wrap=True, overflow="ellipsis")
         bar = ProgressBar(
-            total=max(1, c.total), completed=c.done_before + c.done + c.failed, width=30
+            total=max(1, c.total), completed=c.done_before + c.done + c.failed, width=_BAR_WIDTH
         )
         grid.add_row(bar, text)
         self._live.update(grid, refresh=True)
