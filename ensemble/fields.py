@@ -32,7 +32,6 @@ BRANCHES: tuple[Branch, ...] = ("loading", "unloading")
 # Nodes per shortest wave: spectra then reach four times the highest wave number of the profile.
 NODES_PER_WAVE = 8
 _BINS_PER_DECADE = 12
-_PLACES_PER_NODE = 8
 
 # Gap in units of h_max: from far below the roughness to far above any gap before detachment.
 GAP_EDGES: Array = np.logspace(-4, 2, 6 * 16 + 1)
@@ -203,10 +202,8 @@ class FieldRecorder:
     def _record(self, place: tuple[int, int], fields: Fields) -> None:
         plan, h_max = self._plan, self._method.problem.profile.h_max
         self._row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
-        gap, parts = between_nodes(fields.gap / h_max)
-        # Clipped, so that no gap is lost: the edges lie far outside what occurs.
-        gap = np.clip(gap, GAP_EDGES[0], GAP_EDGES[-1] * (1 - 1e-12))
-        self._row["gap_density"][place] = _density(gap, GAP_EDGES, total=parts)
+        shares = gap_shares(fields.gap / h_max, GAP_EDGES)
+        self._row["gap_density"][place] = shares / np.diff(GAP_EDGES)
         if self._keep:
             pick = slice(None, None, plan.stride)
             self._kept["field_displacement"][place] = fields.displacement[pick]
@@ -218,37 +215,37 @@ class FieldRecorder:
         return self._row | self._kept if self._keep else self._row
 
 
-def between_nodes(gap: Array) -> tuple[Array, int]:
-    """Gaps at equally spaced places between the nodes of a periodic grid.
+def gap_shares(gap: Array, edges: Array) -> Array:
+    """Share of the period in which the gap lies in each bin.
 
     Beside an edge of contact the gap rises like the square root of the distance, so steeply that
-    values at nodes alone would leave gaps in its distribution: there it is interpolated so,
-    elsewhere linearly.
+    values at nodes alone would give a row of spikes: between nodes it is interpolated so there,
+    linearly elsewhere, and the shares are those of the interpolation, exactly.
 
     Parameters
     ----------
     gap : array, shape (n,)
-        Zero in contact.
+        At equally spaced nodes of the period; zero in contact.
+    edges : array, shape (bins + 1,)
+        Ascending, positive. What lies outside counts in the outermost bins.
 
     Returns
     -------
-    values : array
-        Gaps at the places out of contact.
-    places : int
-        Number of all places, in contact or not.
+    array, shape (bins,)
+        They add up to the share of the period that is out of contact.
     """
-    u = (np.arange(_PLACES_PER_NODE) + 0.5) / _PLACES_PER_NODE
-    left = gap[:, None]
-    right = np.roll(gap, -1)[:, None]
-    values = np.where(
-        left == 0,
-        right * np.sqrt(u),
-        np.where(right == 0, left * np.sqrt(1 - u), left + (right - left) * u),
-    )
-    return values[values > 0], values.size
+    pair = np.sort(np.stack([gap, np.roll(gap, -1)]), axis=0)
+    low, high = pair[:, pair[1] > 0]
+    below = np.zeros(edges.size)  # share with a gap below each edge
+    for k, edge in enumerate(edges[1:-1], start=1):
+        linear = np.clip((edge - low) / np.maximum(high - low, 1e-300), 0, 1)
+        root = np.minimum(edge / high, 1) ** 2
+        below[k] = np.where(low == 0, root, linear).sum()
+    below[-1] = low.size
+    return np.asarray(np.diff(below) / gap.size)
 
 
-def _density(values: Array, edges: Array, total: int | None = None) -> Array:
-    """Histogram over bins, divided by the number of nodes and by the width of the bin."""
+def _density(values: Array, edges: Array) -> Array:
+    """Histogram over bins, divided by the number of values and by the width of the bin."""
     count, _ = np.histogram(values, edges)
-    return np.asarray(count / (np.diff(edges) * (values.size if total is None else total)))
+    return np.asarray(count / (np.diff(edges) * values.size))

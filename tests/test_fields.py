@@ -9,7 +9,7 @@ from fake_run import fake_result
 
 from ensemble.campaign import parse_campaign
 from ensemble.errors import InputError
-from ensemble.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, between_nodes, field_plan
+from ensemble.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan, gap_shares
 from ensemble.schema import COLUMNS, KEPT
 from ensemble.store import Results, Writer, create
 from ensemble.task import make_problem, run_task
@@ -96,17 +96,25 @@ def test_reductions_agree_with_the_states_of_the_loop():
         np.testing.assert_array_equal(kept, fields.gap[:: plan.stride].astype(np.float32))
 
 
-def test_gaps_between_nodes_rise_like_a_square_root_beside_contact():
-    """For t = c sqrt(r) the density is 2t/c²; from the nodes alone it would be a row of spikes."""
+def test_gaps_beside_contact_are_counted_as_a_square_root():
+    """For t = c sqrt(r) the share below t grows as t²; from the nodes alone it would be a stair."""
     r = np.maximum(np.arange(4096) - 2048.0, 0)
     r[0] = r[-1]  # no second edge
-    values, places = between_nodes(np.sqrt(r))
-    assert values.size / places == pytest.approx(0.5, abs=1e-3)
-    edges = np.linspace(0, np.sqrt(2047), 46)
-    count = np.histogram(values, edges)[0]
-    expected = (edges[1:] ** 2 - edges[:-1] ** 2) * places / 4096
-    np.testing.assert_allclose(count[1:-1], expected[1:-1], rtol=0.15)
-    np.testing.assert_allclose(count[0], expected[0], rtol=0.3)
+    edges = np.concatenate([[1e-9], np.linspace(0.05, 45.2, 60), [100]])
+    shares = gap_shares(np.sqrt(r), edges)
+    assert shares.sum() == pytest.approx(0.5, abs=1e-3)
+    expected = np.diff(edges[:-1] ** 2) / 4096
+    # Beyond the first node the interpolation is linear: 2 % off in its first interval.
+    np.testing.assert_allclose(np.cumsum(shares)[:-1], np.cumsum(expected), rtol=0.03)
+    np.testing.assert_allclose(shares[0], expected[0], rtol=1e-3)
+
+
+def test_shares_of_a_linear_gap_are_those_of_its_slope():
+    gap = 1 + np.abs(np.arange(64) - 32) / 32  # a triangle from 1 to 2, no contact
+    edges = np.array([0.1, 1.0, 1.25, 1.5, 2.0, 3.0])
+    np.testing.assert_allclose(gap_shares(gap, edges), [0, 0.25, 0.25, 0.5, 0], atol=1e-12)
+    flat = gap_shares(np.full(8, 0.5), np.array([0.1, 0.4, 0.6, 1.0]))
+    np.testing.assert_allclose(flat, [0, 1, 0])
 
 
 def test_states_without_contact_are_not_a_number():

@@ -96,6 +96,12 @@ def test_jumps_by_kind_add_up_to_all_drops(data):
     for row in table.rows:
         shares[[(c.hurst, c.work_of_adhesion) for c in data.cells].index(row[:2])] += row[-1]
     np.testing.assert_allclose(shares, 1)
+    glance = state_tables.shares_by_kind(data)
+    place = {(row[0], row[1], row[2]): row[-1] for row in table.rows}
+    for row in glance.rows:
+        assert sum(row[2:]) == pytest.approx(1)
+        for column, share in zip(glance.columns[2:], row[2:], strict=True):
+            assert share == pytest.approx(place.get((*row[:2], column.name), 0))
 
 
 def test_curves_open_in_xarray_with_units(report, data):

@@ -54,13 +54,13 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     out += ["## Loops", *_show(figures.get("loops", ()))]
     if figures.get("fields"):
         out += ["## Shapes, spectra and distributions", *_show(figures["fields"])]
-        slopes = state_tables.slopes(data)
+        slopes = state_tables.slopes(data, ("loading",))
         if slopes.rows:
             out += [
-                "### Slope of the spectrum of the deformed surface",
+                "### Slope of the spectrum of the deformed surface on loading",
                 "Power law fitted at small wave numbers: over the lowest decade of the profile's "
                 "spectrum, or its lower half if it is shorter than two decades; standard error "
-                "of the fit.",
+                "of the fit. Unloading: `slopes.csv`.",
                 slopes.markdown(),
             ]
     out += [
@@ -70,8 +70,9 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         "pull-off).",
         state_tables.mechanisms(data).markdown(),
         *_show(figures.get("mechanisms", ())),
-        "### Jumps by kind",
-        state_tables.jumps(data).markdown(),
+        "### Share of the drops by kind of the jump",
+        state_tables.shares_by_kind(data).markdown(),
+        "Numbers of jumps: `jumps.csv`.",
         "## Profiles",
         tables.profiles(data).markdown(),
         "## Accuracy and completeness",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ensemble.aggregate import Aggregate
 from ensemble.aggregate_curves import BRANCHES
 from ensemble.aggregate_fields import fitted_slope
@@ -19,7 +21,7 @@ from ensemble.report.table import (
 
 
 def jumps(data: Aggregate) -> Table:
-    """Jumps of one loop by kind: how many, and their share of all drops, over all γ of one H."""
+    """One row for each (H, γ) and kind: how many jumps, and their share of all drops."""
     found = data.jumps
     columns = (
         *KEY,
@@ -47,6 +49,19 @@ def jumps(data: Aggregate) -> Table:
                 ]
             )
     return make_table("Jumps by kind", columns, rows)
+
+
+def shares_by_kind(data: Aggregate) -> Table:
+    """Share of each kind in the drops, one row for each (H, γ): :func:`jumps` at a glance."""
+    found = data.jumps
+    used = [j for j in range(len(found.kinds)) if found.number[:, j].any()]
+    columns = (*KEY, *(Column(found.kinds[j], found.kinds[j], percent) for j in used))
+    rows: list[list[Value]] = []
+    for k, cell in enumerate(data.cells):
+        total = float(found.energy[k].sum())
+        shares = [float(found.energy[k, j]) / total if total else None for j in used]
+        rows.append([cell.hurst, cell.work_of_adhesion, *shares])
+    return make_table("Share of the drops by kind of the jump", columns, rows)
 
 
 def mechanisms(data: Aggregate) -> Table:
@@ -82,7 +97,7 @@ def mechanisms(data: Aggregate) -> Table:
     return make_table("Mechanisms and pull-off", columns, rows)
 
 
-def slopes(data: Aggregate) -> Table:
+def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
     columns = (
         *KEY,
@@ -97,7 +112,8 @@ def slopes(data: Aggregate) -> Table:
     fields = data.fields
     rows: list[list[Value]] = []
     for index, cell in enumerate(data.cells):
-        for b, branch in enumerate(BRANCHES):
+        for branch in branches:
+            b = BRANCHES.index(branch)
             for k, penetration in enumerate(fields.penetration.tolist()):
                 if not fields.in_contact[index, b, k]:
                     continue
