@@ -6,7 +6,8 @@
 # Results: out/NAME.h5, tables and figures: out/NAME/ (NAME from CAMPAIGN.toml), both below the
 # working directory; OUT=DIR puts them elsewhere. A results file of an earlier run is resumed.
 # RANKS: one more than the cores that this process may use, since the rank that hands out only
-# waits. MPIRUN=PATH chooses the launcher. Exit code 75: stopped early, run it again to resume.
+# waits. MPIRUN=PATH chooses the launcher. Exit codes are those of hysteron run; 75: stopped early,
+# run it again to resume.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -43,5 +44,7 @@ ${launch[@]+"${launch[@]}"} "$hysteron" run "$campaign" --out "$out/$name.h5" </
 if [ "$code" = 75 ]; then
     echo "jobs/local.sh: stopped early; the same command resumes it ($out/$name.h5)" >&2
 fi
-if [ "$code" != 0 ]; then exit "$code"; fi
+# 1: some tasks failed, which the report says too.
+if [ "$code" -gt 1 ] || [ ! -e "$out/$name.h5" ]; then exit "$code"; fi
 "$hysteron" report "$out/$name.h5" --to "$out/$name"
+exit "$code"

@@ -90,7 +90,7 @@ if [ "$code" = 75 ] && [ -z "$cancelled" ]; then
         qsub ${options[@]+"${options[@]}"} -v "$variables" "${SCRIPT:-jobs/pbs.sh}" ||
             echo "could not be submitted; qsub it again to resume"
     fi
-elif [ "$code" = 0 ]; then
+elif [ "$code" -le 1 ] && [ -e "$file" ]; then # 1: some tasks failed, which the report says too
     "$HYSTERON" report "$file" --to "$name" || code=$?
 fi
 exit "$code"

@@ -82,7 +82,7 @@ if [ "$code" = 75 ] && [ -z "$cancelled" ]; then
     else
         scontrol requeue "$SLURM_JOB_ID" || echo "could not be requeued; sbatch it again to resume"
     fi
-elif [ "$code" = 0 ]; then
+elif [ "$code" -le 1 ] && [ -e "$file" ]; then # 1: some tasks failed, which the report says too
     "$HYSTERON" report "$file" --to "$name" || code=$?
 fi
 exit "$code"

@@ -115,7 +115,7 @@ def pbs(tmp_path: Path, code: int, **env: str) -> tuple[str, str]:
     tools.mkdir()
     calls = tmp_path / "calls"
     for name, text in {
-        "hysteron": f'echo "hysteron $*" >>{calls}; [ "$1" = report ] || exit {code}',
+        "hysteron": f'echo "hysteron $*" >>{calls}; >study.h5; [ "$1" = report ] || exit {code}',
         "qsub": f'echo "qsub $*" >>{calls}',
         "mpirun": f'echo "mpirun $1 $2" >>{calls}; shift 4; exec "$@"',
         "qstat": "printf '    Resource_List.select = 2:ncpus=2:mpiprocs=2\\n"
