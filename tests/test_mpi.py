@@ -183,6 +183,9 @@ def test_bad_input_is_told_once_and_every_rank_ends(tmp_path):
     assert len(ours) == 1
     assert "hurst is [1.5]: it must be a list of different values" in ours[0]
     assert [p.name for p in tmp_path.iterdir()] == ["c.toml"]
+    process = hysteron("run", path, "--speed", "3", ranks=3)
+    assert process.returncode == 2
+    assert process.stderr.count("unrecognized arguments: --speed") == 1
 
 
 def test_the_status_during_a_run_under_mpirun(tmp_path):

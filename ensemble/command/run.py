@@ -24,6 +24,10 @@ OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFA
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    from ensemble.ranks import launched
+
+    if launched()[1] > 0:  # rank 0 complains for all
+        parser.error = lambda message: sys.exit(BAD_INPUT)  # type: ignore[method-assign]
     parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
     parser.add_argument(
         "--out", metavar="FILE.h5", help="results file (default: the campaign's name, here)"
