@@ -6,6 +6,7 @@ difference of their losses is taken profile by profile.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -73,21 +74,27 @@ def read_companion(path: Path | str, campaign: Campaign) -> Companion:
     """
     with Results(path) as results:
         other, cells = results.campaign, read_cells(results, results.status())
-    here, there = campaign.values(), other.values()
-    keys = [key for key in here if here[key] != there[key] and not key.startswith(_IGNORED)]
+    values, keys = other.values(), differing_keys(campaign, other)
     return Companion(
         path=Path(path),
         campaign=other,
         cells=tuple(cells),
-        differs=tuple(f"{key} = {shown(there[key])}" for key in keys),
-        kind=_kind(set(keys)),
+        differs=tuple(f"{key} = {shown(values[key])}" for key in keys),
+        kind=kind_of(keys),
     )
 
 
-def _kind(keys: set[str]) -> Kind:
+def differing_keys(here: Campaign, there: Campaign) -> list[str]:
+    """Keys ("cycle.load_steps") in which the loops of two campaigns differ."""
+    one, two = here.values(), there.values()
+    return [key for key in one if one[key] != two[key] and not key.startswith(_IGNORED)]
+
+
+def kind_of(keys: Sequence[str]) -> Kind:
+    """Say what a difference in these keys is about; see :class:`Companion`."""
     if keys and all(key.startswith("solver.") for key in keys):
         return "resolution"
-    if keys == {"cycle.load_steps"}:
+    if list(keys) == ["cycle.load_steps"]:
         return "load steps"
     if "cycle.max_penetration" in keys and all(key.startswith("cycle.") for key in keys):
         return "penetration"

@@ -19,12 +19,14 @@ from synthetic_results import campaign, rows, write
 
 from ensemble.aggregate import aggregate
 from ensemble.aggregate_jumps import BIN_EDGES, BINS_PER_DECADE
-from ensemble.campaign import parse_campaign
+from ensemble.beside import differing_keys, kind_of
+from ensemble.campaign import load_campaign, parse_campaign
 from ensemble.command import main
 from ensemble.report import findings, paper, state_tables, tables, write_report
 from ensemble.report.figures import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES, loops, losses
 from ensemble.report.figures import fields as field_figures
 from ensemble.report.figures.style import save, spread_out, style
+from ensemble.task import make_problem
 
 ROOT = Path(__file__).parent.parent
 GAMMAS = (0.01, 0.04, 0.07)
@@ -464,3 +466,26 @@ def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
     (sentence,) = findings.readings(data)
     assert sentence.startswith("Nearest to the known values of the paper's Table 1: wider.h5")
     assert "wider.h5 1.9 %" in sentence
+
+
+def test_campaigns_that_come_along_are_comparable_with_the_paper_campaign():
+    base = load_campaign(ROOT / "jobs" / "paper.toml")
+    kinds = {
+        "ratio-200": "spectrum",
+        "equal-c0": "spectrum",
+        "penetration-0.6": "penetration",
+        "penetration-0.93": "penetration",
+        "steps-80": "load steps",
+        "accuracy-1e-4": "resolution",
+    }
+    files = {path.stem: path for path in (ROOT / "jobs" / "beside").glob("*.toml")}
+    assert set(files) == set(kinds)
+    for name, path in files.items():
+        other = load_campaign(path)
+        assert kind_of(differing_keys(base, other)) == kinds[name]
+        assert other.sweep.seed == base.sweep.seed
+        assert set(other.sweep.work_of_adhesion) <= set(base.sweep.work_of_adhesion)
+        if kinds[name] == "spectrum":
+            for task in other.tasks()[:: other.sweep.realisations]:
+                quoted = paper.m2(task.hurst)
+                assert make_problem(other, task).profile.m2 == pytest.approx(quoted, rel=0.05)
