@@ -123,7 +123,8 @@ class SharpMethod(Method):
         if start.separation > separation:
             found = self._events(start, separation, "loading")
             start = [e for e in found if isinstance(e, ContactState)][-1]
-        return Path((*sorted(back[::-1], key=lambda s: s.separation), start), ())
+        back.reverse()  # states at one separation come in the order opposite to loading
+        return Path((*sorted(back, key=lambda s: s.separation), start), ())
 
     # ------------------------------------------------------------------ states
 

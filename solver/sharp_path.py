@@ -62,7 +62,9 @@ class EdgeMechanics:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
         self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
-        self.longest_step = 0.1 * self.wave  # longer steps leap over pinned minima
+        # Steps above 0.1 λ_min leap over pinned minima. Where two edges race, which minimum is
+        # reached can depend on the step down to 0.05 λ_min, below which no loop was seen to change.
+        self.longest_step = 0.05 * self.wave
         # Narrower patches and gaps are gone: far below the width at which a patch on the sharpest
         # crest first comes to rest, (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8.
         seed = (2 * critical**2 / source.sharpest**2) ** (1 / 3)
@@ -160,7 +162,7 @@ class EdgeMechanics:
         return float(eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0])
 
     def descend(self, gaps: Array, separation: float, held: Held | None) -> tuple[Array, Held]:
-        """Take one step of energy descent at fixed separation, no edge further than 0.1 λ_min.
+        """Take one step of energy descent at fixed separation.
 
         Edges out of equilibrium run in the direction in which the energy falls, all at the same
         speed (their limit); edges near equilibrium follow them by Newton's step. A patch or gap
@@ -183,12 +185,15 @@ class EdgeMechanics:
             held = Held(d, matrix, uses=0, last=step)
         # Where surfaces would overlap beside an edge there is nothing to weigh: contact advances.
         step = np.where(field.opening.ravel() < -self.overlapping, limit, step)
+        if np.abs(step).max() <= self.settled and not self.stable(field, self.tangent(field)):
+            d, matrix = self.symmetric(field, self.tangent(field))
+            step = off_saddle(matrix, d, limit)
         running = bool(np.any(np.abs(step) > 0.9 * self.longest_step))
         held = replace(held, last=step, uses=held.uses + 1 if running else _REUSES)
         return np.asarray((gaps.ravel() + outward(gaps) * step).reshape(-1, 2)), held
 
     def _limits(self, gaps: Array) -> Array:
-        """Longest step of each edge: 0.1 λ_min, and a quarter of the gap or patch it may close."""
+        """Longest step of each edge: 0.05 λ_min, and a quarter of the gap or patch it may close."""
         length, patch = self.widths(gaps)
         left = np.minimum(length, np.roll(patch, 1))
         right = np.minimum(length, patch)
@@ -221,18 +226,22 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
             for j in range(free.shape[0]):
                 block[i, j] = matrix[free[i], free[j]]
         values, vectors = np.linalg.eigh(block)
-        if values[0] <= 1e-9 * np.abs(values).max():
-            # The softest mode runs downhill; its largest edge leads.
-            mode = vectors[:, 0] / d[free]
-            lead = np.argmax(np.abs(mode))
-            edge = free[lead]
+        floor = 1e-9 * np.abs(values).max()
+        if values[0] <= floor:
+            # The softest mode runs downhill; its largest edge leads. A pull without any share in
+            # that mode is a symmetric one: it keeps its symmetry.
             downhill = vectors[:, 0] @ right
-            sign = np.sign(mode[lead]) * (1.0 if downhill >= 0 else -1.0)
-            if abs(pull[edge]) * d[edge] > 0.5 * np.abs(right).max():
-                sign = np.sign(pull[edge])
-            runs[edge] = True
-            step[edge] = sign * limit[edge]
-            continue
+            if abs(downhill) > 1e-6 * np.sqrt(right @ right):
+                mode = vectors[:, 0] / d[free]
+                lead = np.argmax(np.abs(mode))
+                edge = free[lead]
+                sign = np.sign(mode[lead]) * np.sign(downhill)
+                if abs(pull[edge]) * d[edge] > 0.5 * np.abs(right).max():
+                    sign = np.sign(pull[edge])
+                runs[edge] = True
+                step[edge] = sign * limit[edge]
+                continue
+            values = np.maximum(np.abs(values), floor)
         newton = (vectors @ ((vectors.T @ right) / values)) / d[free]
         done = True
         for i in range(free.shape[0]):
@@ -248,6 +257,14 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
             if not runs[free[i]]:
                 step[free[i]] = 0.0
     return step
+
+
+def off_saddle(matrix: Array, d: Array, limit: Array) -> Array:
+    """Step along the softest mode, its first large edge outwards: the way off a saddle."""
+    mode = np.linalg.eigh(matrix)[1][:, 0] / d
+    lead = int(np.flatnonzero(np.abs(mode) > 0.99 * np.abs(mode).max())[0])
+    scaled = mode / mode[lead]
+    return np.asarray(np.clip(scaled * limit.min(), -limit, limit))
 
 
 def outward(gaps: Array) -> Array:

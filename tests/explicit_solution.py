@@ -1,0 +1,82 @@
+"""The mixed problem of given edges by its Riemann-Hilbert solution: an oracle for tests.
+
+F = σ + iH[σ] is the boundary value of a function analytic in the unit disc. With T(θ) the product of
+sin((θ-a)/2) sin((θ-b)/2) over all patches, the part beyond full contact is (u + τ)/sqrt(T), u a
+principal value integral of sqrt(T) σ_full over the gaps and τ a trigonometric polynomial fixed by
+the closure of every gap and by the mean gap. Gauss-Chebyshev nodes in each gap; cost N². Stresses in
+units of E*/2, lengths of 1/q0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def explicit_solution(stress, gaps, separation, nodes):
+    """Return p = 2p̄/E* and the opening C at every gap end, shape (L, 2), for L gaps.
+
+    ``stress`` is a function θ → 2σ_full/E*, ``gaps`` has shape (L, 2).
+    """
+    count = len(gaps)
+    centre, half = gaps.mean(axis=1), np.diff(gaps, axis=1)[:, 0] / 2
+    edges = gaps.ravel()
+
+    def product(theta):
+        """T up to sign, scaled by 2 per factor; positive in the gaps."""
+        return np.abs(np.prod(2 * np.sin((theta[:, None] - edges) / 2), axis=1))
+
+    def kernel(x):
+        return 1 / np.tan(x / 2) if count % 2 == 0 else 1 / np.sin(x / 2)
+
+    j = np.arange(nodes)
+    source_x = np.cos((j + 0.5) * np.pi / nodes)
+    target_x = np.cos(np.arange(nodes + 1) * np.pi / nodes)  # Lobatto: ends included
+    sign = (-1.0) ** np.arange(count)
+    phi = centre[:, None] + half[:, None] * source_x
+    root = np.sqrt(product(phi.ravel()).reshape(phi.shape))
+    # ∫ D κ dφ with D ∝ sqrt(1-x²): first-kind rule, weight π/N · sqrt(1-x²)
+    weight = half[:, None] * np.sqrt(1 - source_x**2) * np.pi / nodes
+    strength = sign[:, None] * root * stress(phi.ravel()).reshape(phi.shape) * weight
+
+    theta = centre[:, None] + half[:, None] * target_x
+    u = -(kernel(theta.ravel()[:, None] - phi.ravel()) @ strength.ravel()) / (2 * np.pi)
+    u = u.reshape(theta.shape)
+    basis = [np.prod(np.sin((theta[..., None] - centre) / 2), axis=-1)]
+    for k in range(count):
+        others = np.delete(centre, k)
+        rest = np.prod(np.sin((theta[..., None] - others) / 2), axis=-1)
+        basis.append(np.cos((theta - centre[k]) / 2) * rest)
+    basis = np.stack(basis)
+
+    # T = (own ends) · (rest): own ends give 1/sqrt(1-x²), the rest is smooth in the gap.
+    smooth = np.empty_like(theta)
+    for k in range(count):
+        others = np.delete(edges, [2 * k, 2 * k + 1])
+        rest = np.abs(np.prod(2 * np.sin((theta[k][:, None] - others) / 2), axis=1))
+        x = half[k] * (1 - target_x) / 2
+        y = half[k] * (1 + target_x) / 2
+        own = 4 * np.sinc(x / np.pi) * np.sinc(y / np.pi) * half[k] ** 2 / 4
+        smooth[k] = np.sqrt(rest * own)
+    ends = np.ones(nodes + 1)
+    ends[[0, -1]] = 0.5
+    rule = np.pi / nodes * ends  # Lobatto-Chebyshev for ∫ g/sqrt(1-x²) dx
+
+    def closure(w):
+        """∫_gap t' of each gap, and the sum of ∫ t, for t' = -sign·w/sqrt(T)."""
+        slope = -sign[:, None] * w / smooth * half[:, None]
+        closed = slope @ rule
+        mean = -np.sum((slope * half[:, None] * target_x) @ rule)
+        return np.append(closed, mean)
+
+    matrix = np.stack([closure(b) for b in basis], axis=1)
+    right = -closure(u)
+    right[-1] += 2 * np.pi * separation
+    c = np.linalg.solve(matrix, right)
+    w = u + np.tensordot(c, basis, axes=1)
+    # near an end t' = -sign·w/(smooth·sqrt(1-x²)), t = C sqrt(r): |t'| = C/(2 sqrt(r))
+    opening = np.empty((count, 2))
+    for k in range(count):
+        factor = 2 * np.sqrt(half[k] / 2) / smooth[k]
+        opening[k, 0] = (-sign[k] * w[k, -1]) * factor[-1]
+        opening[k, 1] = (sign[k] * w[k, 0]) * factor[0]
+    return c, opening
