@@ -112,6 +112,5 @@ def _overlapping(patch: Array, others: Array, period: float) -> list[int]:
 def _same(one: tuple[float, float], two: Array, period: float) -> bool:
     """Whether two patches have the same edges on the circle."""
     offset = (one[0] - two[0] + period / 2) % period - period / 2
-    return abs(offset) < 1e-12 * period and abs((one[1] - one[0]) - (two[1] - two[0])) < (
-        1e-12 * period
-    )
+    change = (one[1] - one[0]) - (two[1] - two[0])
+    return bool(max(abs(offset), abs(change)) < 1e-12 * period)

@@ -125,7 +125,7 @@ class Profile:
         spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
         stop = self.highest_harmonic + 1
         spectrum[:stop] = a[:stop]
-        return np.fft.irfft(spectrum, n) * n
+        return np.asarray(np.fft.irfft(spectrum, n) * n)
 
     # ------------------------------------------------------------------ statistics
 
@@ -168,7 +168,8 @@ class Profile:
         crest = (h >= np.roll(h, 1)) & (h >= np.roll(h, -1))
         # A crest between nodes rises at most about dx² |h''|/8 above its highest node.
         spread = (self.period / n) ** 2 * float(np.max(np.abs(self.curvatures(n))))
-        x = np.flatnonzero(crest & (h >= h.max() - spread)) * (self.period / n)
+        near = np.flatnonzero(crest & (h >= h.max() - spread))
+        x: Array = np.asarray(near * (self.period / n), dtype=np.float64)
         for _ in range(8):
             second = self.at(x, 2)
             step = np.where(second < 0, self.at(x, 1) / np.where(second < 0, second, -1.0), 0.0)
@@ -265,12 +266,9 @@ def self_affine_profile(
     a = np.zeros(top + 1, dtype=np.complex128)
     a[n0:] = size * np.exp(1j * phase[n0 - 1 :])
     unit = Profile(period, a)
-    scale = {
-        "h_rms": lambda: target / unit.h_rms,
-        "m2": lambda: np.sqrt(target / unit.m2),
-        "c0": lambda: np.sqrt(target),
-    }[norm]()
-    return unit.scaled(float(scale))
+    present = {"h_rms": unit.m0, "m2": unit.m2, "c0": 1.0}[norm]
+    wanted = target**2 if norm == "h_rms" else target
+    return unit.scaled(float(np.sqrt(wanted / present)))
 
 
 def profile_from_heights(heights: Array, period: float) -> Profile:

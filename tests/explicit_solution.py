@@ -1,10 +1,10 @@
 """The mixed problem of given edges by its Riemann-Hilbert solution: an oracle for tests.
 
-F = σ + iH[σ] is the boundary value of a function analytic in the unit disc. With T(θ) the product of
-sin((θ-a)/2) sin((θ-b)/2) over all patches, the part beyond full contact is (u + τ)/sqrt(T), u a
+F = σ + iH[σ] is the boundary value of a function analytic in the unit disc. With T(θ) the product
+of sin((θ-a)/2) sin((θ-b)/2) over all patches, the part beyond full contact is (u + τ)/sqrt(T), u a
 principal value integral of sqrt(T) σ_full over the gaps and τ a trigonometric polynomial fixed by
-the closure of every gap and by the mean gap. Gauss-Chebyshev nodes in each gap; cost N². Stresses in
-units of E*/2, lengths of 1/q0.
+the closure of every gap and by the mean gap. Gauss-Chebyshev nodes in each gap; cost N². Stresses
+in units of E*/2, lengths of 1/q0.
 """
 
 from __future__ import annotations
