@@ -114,7 +114,10 @@ class Profile:
         return np.asarray(np.cos(phase) @ a.real - np.sin(phase) @ a.imag)
 
     def _iq(self, power: int) -> NDArray[np.complex128]:
-        return (1j * self.q0 * np.arange(self.coefficients.size)) ** power
+        powers: NDArray[np.complex128] = np.power(
+            1j * self.q0 * np.arange(self.coefficients.size), power
+        )
+        return powers
 
     def _sample(self, a: NDArray[np.complex128], n: int) -> Array:
         if n <= 2 * self.highest_harmonic:

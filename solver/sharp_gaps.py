@@ -108,6 +108,8 @@ class GapField:
         q0 s.
     tolerance : float
         Wanted relative accuracy of the interaction between gaps.
+    differentiable : bool
+        Whether :attr:`derivatives` will be asked for; without them a field costs a third less.
 
     Attributes
     ----------
@@ -118,7 +120,12 @@ class GapField:
     """
 
     def __init__(
-        self, source: StressSource, gaps: Array, separation: float, tolerance: float
+        self,
+        source: StressSource,
+        gaps: Array,
+        separation: float,
+        tolerance: float,
+        differentiable: bool = True,
     ) -> None:
         self.source, self.gaps, self.separation = source, gaps, separation
         self.table = map_gaps(gaps)
@@ -131,6 +138,7 @@ class GapField:
                 TABLES.start, TABLES.square, TABLES.eta, TABLES.w, TABLES.b, TABLES.modes,
                 source.width, source.panels, source.x, source.w, source.coefficients,
                 source.weights, source.level_start, source.end_x, source.end_w,
+                2 if differentiable else 1,
             )
         )  # fmt: skip
         # The matrix is symmetric, so its transpose is Fortran order without a copy.
@@ -138,7 +146,7 @@ class GapField:
         if info:
             raise FloatingPointError("the matrix of the gaps is not positive definite")
         self._solved, _ = dpotrs(self._factor, self.rhs, lower=1)
-        unit = self._solved[:, 2]
+        unit = self._solved[:, 1]
         self._unit_mean = float(self.weight @ unit)
         self.pressure = (
             -(2 * np.pi * separation + float(self.weight @ self._solved[:, 0])) / self._unit_mean
@@ -162,7 +170,7 @@ class GapField:
     @cached_property
     def opening_by_separation(self) -> Array:
         """∂C/∂(q0 s) at fixed edges, shape (L, 2)."""
-        return self._at_ends(-self.pressure_by_separation * self._solved[:, 2], None)
+        return self._at_ends(-self.pressure_by_separation * self._solved[:, 1], None)
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array]:
@@ -178,15 +186,15 @@ class GapField:
         slope = self._slope.ravel()
         side = np.tile([-1.0, 1.0], len(self.gaps))
         p = (area + self.weight @ y) / self._unit_mean
-        y -= np.outer(self._solved[:, 2], p)
+        y -= np.outer(self._solved[:, 1], p)
         by_edge: Array = _ends(y, self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends)
         k = np.arange(len(slope))
         by_edge[k ^ 1, k] += 0.5 * np.sqrt(2 * slope[k ^ 1])  # the singular opening's far end
         strength = side * self.opening.ravel() * np.sqrt(slope / 8)
         by_edge *= strength
         # Translation: all edges together against the profile.
-        drift = -float(self.weight @ self._solved[:, 1]) / self._unit_mean
-        moved = self._at_ends(-self._solved[:, 1] - drift * self._solved[:, 2], 1).ravel()
+        drift = -float(self.weight @ self._solved[:, 2]) / self._unit_mean
+        moved = self._at_ends(-self._solved[:, 2] - drift * self._solved[:, 1], 1).ravel()
         by_edge[k, k] = 0.0
         by_edge[k, k] = moved - by_edge.sum(axis=1)
         return by_edge, p * strength
@@ -216,16 +224,16 @@ def _mapped(alpha, x):  # type: ignore[no-untyped-def]  # compiled
 @njit(cache=True)
 def _assemble(  # type: ignore[no-untyped-def]  # compiled
     table, kinds, offset, counts, start, square, eta, w, b, modes,
-    width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w,
+    width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w, fields,
 ):  # fmt: skip
     gaps_n = table.shape[0]
     n = offset[gaps_n]
     theta = np.empty(n)
     weight = np.empty(n)  # dθ/dη times the weight of the rule
     slope = np.empty((gaps_n, 2))  # dη/dθ at the ends
-    rhs = np.empty((3, n))
-    beyond = np.empty((gaps_n, 2, 2))
-    all_s = np.zeros((n, 2))
+    rhs = np.empty((fields + 1, n))  # S~, the unit pressure and, last, S~'
+    beyond = np.empty((gaps_n, 2, fields))
+    all_s = np.zeros((n, fields))
     matrix = np.empty((n, n))
     for k in range(gaps_n):
         m = counts[kinds[k]]
@@ -233,12 +241,12 @@ def _assemble(  # type: ignore[no-untyped-def]  # compiled
         slope[k, 0] = 1 / theta_at(gap, -1.0)[1]
         slope[k, 1] = 1 / theta_at(gap, 1.0)[1]
         s = all_s[offset[k] : offset[k] + m]
-        ends = np.zeros((2, 2))
+        ends = np.zeros((2, fields))
         gap_moments(
             gap, width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w,
             s, ends,
         )  # fmt: skip
-        for field in range(2):
+        for field in range(fields):
             low = 0.0
             high = 0.0
             sign = 1.0
@@ -253,15 +261,12 @@ def _assemble(  # type: ignore[no-untyped-def]  # compiled
             place = start[kinds[k]] + i
             theta[row], stretch = theta_at(gap, eta[place])
             weight[row] = w[place] * stretch
-            total0 = 0.0
-            total1 = 0.0
-            for j in range(m):
-                u = modes[square[kinds[k]] + i * m + j]
-                total0 += u * s[j, 0]
-                total1 += u * s[j, 1]
-            rhs[0, row] = w[place] * total0
-            rhs[1, row] = w[place] * total1
-            rhs[2, row] = weight[row]
+            rhs[1, row] = weight[row]
+            for field in range(fields):
+                total = 0.0
+                for j in range(m):
+                    total += modes[square[kinds[k]] + i * m + j] * s[j, field]
+                rhs[2 * field, row] = w[place] * total
             for j in range(i + 1):
                 other = start[kinds[k]] + j
                 value = b[square[kinds[k]] + i * m + j]

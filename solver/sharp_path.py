@@ -44,6 +44,7 @@ class Held:
     matrix: Array
     uses: int
     last: Array  # the step taken with it
+    runners: int  # edges that ran in that step
 
 
 class EdgeMechanics:
@@ -63,7 +64,8 @@ class EdgeMechanics:
         self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
         self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
         # Steps above 0.1 λ_min leap over pinned minima. Where two edges race, which minimum is
-        # reached can depend on the step down to 0.05 λ_min, below which no loop was seen to change.
+        # reached can depend on the step down to 0.05 λ_min, below which no loop was seen to change;
+        # an edge that runs alone takes twice that.
         self.longest_step = 0.05 * self.wave
         # Narrower patches and gaps are gone: far below the width at which a patch on the sharpest
         # crest first comes to rest, (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8.
@@ -76,10 +78,10 @@ class EdgeMechanics:
         self.overlapping = 0.1 * max(critical, float(rough))
         self.count = Counters()
 
-    def field(self, gaps: Array, separation: float) -> GapField:
+    def field(self, gaps: Array, separation: float, differentiable: bool = True) -> GapField:
         """Solve the field of these gaps."""
         self.count.fields += 1
-        return GapField(self.source, gaps, separation, self.tolerance)
+        return GapField(self.source, gaps, separation, self.tolerance, differentiable)
 
     def residual(self, field: GapField) -> Array:
         """C_e - C_c at every edge, shape (2L,); positive where contact recedes."""
@@ -104,7 +106,10 @@ class EdgeMechanics:
 
     def widths(self, gaps: Array) -> tuple[Array, Array]:
         """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
-        return gaps[:, 1] - gaps[:, 0], np.append(gaps[1:, 0], gaps[0, 0] + 2 * np.pi) - gaps[:, 1]
+        patch = np.empty(len(gaps))
+        patch[:-1] = gaps[1:, 0]
+        patch[-1] = gaps[0, 0] + 2 * np.pi
+        return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
 
     def valid(self, gaps: Array) -> bool:
         """Whether every gap and patch has a positive length."""
@@ -165,39 +170,47 @@ class EdgeMechanics:
         """Take one step of energy descent at fixed separation.
 
         Edges out of equilibrium run in the direction in which the energy falls, all at the same
-        speed (their limit); edges near equilibrium follow them by Newton's step. A patch or gap
-        loses at most a quarter of its length to each edge. While edges run, the tangent of a few
-        steps before (``held``) does as well, unless an edge turns; the openings are always fresh.
+        speed (their limit, twice as long for one that runs alone); edges near equilibrium follow
+        them by Newton's step. A patch or gap loses at most a quarter of its length to each edge.
+        While edges run, the tangent of a few steps before (``held``) does as well, unless an edge
+        turns; the openings are always fresh.
         """
         self.count.descent_steps += 1
-        field = self.field(gaps, separation)
+        reuse = held is not None and held.uses < _REUSES and len(held.d) == gaps.size
+        field = self.field(gaps, separation, differentiable=not reuse)
         pull = -self.residual(field)
-        limit = self._limits(gaps)
+        alone = held is not None and held.runners == 1
+        limit = self._limits(gaps, (2 if alone else 1) * self.longest_step)
         step = None
-        if held is not None and held.uses < _REUSES and len(held.d) == pull.size:
+        if held is not None and reuse:
             step = running_step(held.matrix, held.d, pull, limit)
             fast = np.abs(step) > 0.2 * self.longest_step
             if np.any(fast & (step * held.last <= 0)):
                 step = None  # an edge turns: the held tangent is too old
         if held is None or step is None:
+            if reuse:
+                field = self.field(gaps, separation)
             d, matrix = self.symmetric(field, self.tangent(field))
             step = running_step(matrix, d, pull, limit)
-            held = Held(d, matrix, uses=0, last=step)
+            held = Held(d, matrix, uses=0, last=step, runners=0)
         # Where surfaces would overlap beside an edge there is nothing to weigh: contact advances.
         step = np.where(field.opening.ravel() < -self.overlapping, limit, step)
         if np.abs(step).max() <= self.settled and not self.stable(field, self.tangent(field)):
             d, matrix = self.symmetric(field, self.tangent(field))
             step = off_saddle(matrix, d, limit)
-        running = bool(np.any(np.abs(step) > 0.9 * self.longest_step))
-        held = replace(held, last=step, uses=held.uses + 1 if running else _REUSES)
+        runners = int(np.count_nonzero(np.abs(step) > 0.5 * self.longest_step))
+        held = replace(held, last=step, uses=held.uses + 1 if runners else _REUSES, runners=runners)
         return np.asarray((gaps.ravel() + outward(gaps) * step).reshape(-1, 2)), held
 
-    def _limits(self, gaps: Array) -> Array:
-        """Longest step of each edge: 0.05 λ_min, and a quarter of the gap or patch it may close."""
+    def _limits(self, gaps: Array, longest: float) -> Array:
+        """Longest step of each edge: ``longest``, or a quarter of the gap or patch it may close."""
         length, patch = self.widths(gaps)
-        left = np.minimum(length, np.roll(patch, 1))
-        right = np.minimum(length, patch)
-        return np.minimum(self.longest_step, 0.25 * np.stack([left, right], axis=1).ravel())
+        limit = np.empty_like(gaps)
+        limit[0, 0] = patch[-1]
+        limit[1:, 0] = patch[:-1]
+        limit[:, 1] = patch
+        np.minimum(limit, length[:, None], out=limit)
+        return np.asarray(np.minimum(longest, 0.25 * limit).ravel())
 
 
 @njit(cache=True)
@@ -269,7 +282,9 @@ def off_saddle(matrix: Array, d: Array, limit: Array) -> Array:
 
 def outward(gaps: Array) -> Array:
     """+1 at left gap ends, where contact grows to the right, -1 at right ones, shape (2L,)."""
-    return np.tile([1.0, -1.0], len(gaps))
+    sign = np.ones(2 * len(gaps))
+    sign[1::2] = -1.0
+    return sign
 
 
 def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:

@@ -190,27 +190,34 @@ def _add(one_minus, one_plus, weight0, weight1, s, ends):  # type: ignore[no-unt
     twice = 2 * (one_plus - 1 if one_plus < one_minus else 1 - one_minus)
     # sin((n+1)t) with cos t = η: U_n sqrt(1-η²), by recurrence.
     a0 = weight0 * 2 / np.pi
-    a1 = weight1 * 2 / np.pi
     previous = 0.0
     current = root
+    low = one_minus / (root * np.pi)
+    high = one_plus / (root * np.pi)
+    ends[0, 0] += weight0 * low
+    ends[1, 0] += weight0 * high
+    if s.shape[1] == 1:
+        for n in range(s.shape[0]):
+            s[n, 0] += a0 * current
+            current, previous = twice * current - previous, current
+        return
+    a1 = weight1 * 2 / np.pi
     for n in range(s.shape[0]):
         s[n, 0] += a0 * current
         s[n, 1] += a1 * current
         current, previous = twice * current - previous, current
-    low = one_minus / (root * np.pi)
-    high = one_plus / (root * np.pi)
-    ends[0, 0] += weight0 * low
     ends[0, 1] += weight1 * low
-    ends[1, 0] += weight0 * high
     ends[1, 1] += weight1 * high
 
 
 @njit(cache=True)
-def _value(coefficients, place, panels):  # type: ignore[no-untyped-def]  # compiled
+def _value(coefficients, place, panels, both):  # type: ignore[no-untyped-def]  # compiled
+    """S and, if wanted, S' (else 0) at θ = place · panel width."""
     k = int(np.floor(place))
     x = 2 * (place - k) - 1
     k %= panels
-    return _clenshaw(coefficients[k, :, 0], x), _clenshaw(coefficients[k, :, 1], x)
+    second = _clenshaw(coefficients[k, :, 1], x) if both else 0.0
+    return _clenshaw(coefficients[k, :, 0], x), second
 
 
 @njit(cache=True)
@@ -224,7 +231,7 @@ def _end_piece(  # type: ignore[no-untyped-def]  # compiled
         y = end_x[i]
         r = y * y * cell  # distance from the end; the square root becomes smooth in y
         theta = gap[LEFT] + r if side == 0 else gap[RIGHT] - r
-        v0, v1 = _value(coefficients, theta / width, panels)
+        v0, v1 = _value(coefficients, theta / width, panels, s.shape[1] > 1)
         weight = 2 * y * end_w[i] * cell
         minus, plus = one_minus_plus(gap, r, side)
         _add(minus, plus, weight * v0, weight * v1, s, ends)
@@ -236,7 +243,7 @@ def _end_piece(  # type: ignore[no-untyped-def]  # compiled
         for i in range(node_x.shape[0]):
             r = at + (stop - at) * (node_x[i] + 1) / 2
             theta = gap[LEFT] + r if side == 0 else gap[RIGHT] - r
-            v0, v1 = _value(coefficients, theta / width, panels)
+            v0, v1 = _value(coefficients, theta / width, panels, s.shape[1] > 1)
             weight = node_w[i] * (stop - at) / 2
             minus, plus = one_minus_plus(gap, r, side)
             _add(minus, plus, weight * v0, weight * v1, s, ends)
@@ -249,6 +256,8 @@ def gap_moments(  # type: ignore[no-untyped-def]  # compiled
 ):
     """Moments of (S, S') over a gap, added to ``s``, shape (modes, 2), and ``ends``, (2, 2).
 
+    With ``s`` of shape (modes, 1) those of S alone.
+
     ``gap`` is a row of :func:`solver.sharp_map.map_gaps`.
     """
     left = gap[LEFT]
@@ -260,7 +269,7 @@ def gap_moments(  # type: ignore[no-untyped-def]  # compiled
         for i in range(count):
             t = (i + 0.5) * np.pi / count
             theta, stretch = theta_at(gap, np.cos(t))
-            v0, v1 = _value(coefficients, theta / width, panels)
+            v0, v1 = _value(coefficients, theta / width, panels, s.shape[1] > 1)
             weight = np.pi / count * np.sin(t) * stretch
             _add(
                 2 * np.sin(t / 2) ** 2,
