@@ -225,5 +225,5 @@ def run_loop(
         loss_dimensionless=loss / problem.loss_scale,
         loss_from_drops=float(sum(j.energy_drop for j in jumps)),
         seconds=process_time() - started,
-        method={"name": method.name, **method.describe()},
+        method={"name": method.name, "chosen": method.chosen, **method.describe()},
     )

@@ -118,6 +118,8 @@ class Method(ABC):
     """Finds and follows contact states of one problem; see the module's numbered contract."""
 
     name: ClassVar[str]
+    chosen: str | None = None
+    """Why this method was chosen, where the user left the choice open."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from solver.method import Method
 from solver.problem import Problem
@@ -38,15 +38,35 @@ def make_method(
         raise ValueError(f"method is {name!r}: it must be one of {', '.join(METHOD_NAMES)}")
     if not 0 < accuracy < 1:
         raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1, both excluded")
-    options: dict[str, Any] = {"accuracy": accuracy}
+    chosen = None
+    if name == "auto":
+        name, chosen = choose(problem)
+        if name == "grid" and nodes_per_wave is None:
+            chosen += f"; grid of its default resolution for the accuracy {accuracy:g}"
+    method: Method
     if name == "grid":
         from solver.grid import GridMethod
 
-        return GridMethod(problem, nodes_per_wave=nodes_per_wave, **options)
-    from solver.sharp import SharpMethod
+        method = GridMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy)
+    else:
+        from solver.sharp import SharpMethod
 
-    if nodes_per_wave is not None:
-        raise ValueError(
-            f"nodes_per_wave is {nodes_per_wave!r}: it belongs to the method 'grid' alone"
-        )
-    return SharpMethod(problem, **options)
+        if nodes_per_wave is not None:
+            raise ValueError(
+                f"nodes_per_wave is {nodes_per_wave!r}: it belongs to the method 'grid' alone"
+            )
+        method = SharpMethod(problem, accuracy=accuracy)
+    method.chosen = chosen
+    return method
+
+
+def choose(problem: Problem) -> tuple[Literal["grid", "sharp"], str]:
+    """Pick the method for a problem, and say why in one sentence.
+
+    ``sharp`` is faster than ``grid`` at equal error wherever adhesion keeps the patches few
+    (docs/benchmark.md). Without adhesion there are hundreds of patches, the loss is zero whatever
+    the resolution, and the work of ``sharp`` grows with the cube of their number.
+    """
+    if problem.work_of_adhesion == 0:
+        return "grid", "auto: grid, as there is no adhesion and so no loss to resolve"
+    return "sharp", "auto: sharp, the fastest at any error of the loss where there is adhesion"
