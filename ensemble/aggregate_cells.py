@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +119,9 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
 def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
     with_interval = np.array([values[name] for name in _WITH_INTERVAL])
     found = dict(zip(_WITH_INTERVAL, estimates(with_interval), strict=True))
+    share = found["small_scale_share"]
+    low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval knows no bounds
+    found["small_scale_share"] = replace(share, low=float(low), high=float(high))
     rest = [name for name in values if name not in found]
     plain = estimates(np.array([values[name] for name in rest]), with_interval=False)
     return found | dict(zip(rest, plain, strict=True))

@@ -170,14 +170,17 @@ def _unloading_exceeds_loading(data: Aggregate) -> list[str]:
     ratios = [(cell, ratio) for cell in data.cells if (ratio := area_ratio(cell)) is not None]
     if not ratios:
         return []
+    where = "At equal load, on unloading up to the largest tension, the contact is"
     below = [cell for cell, ratio in ratios if ratio < 1]
     if below:
         names = "; ".join(_name(cell) for cell in below)
-        return [f"At equal load the contact is not everywhere larger on unloading: {names}."]
+        return [f"{where} not everywhere larger than on loading: {names}."]
     least = min(ratio for _, ratio in ratios)
+    apart = [_name(cell) for cell in data.cells if cell.done and area_ratio(cell) is None]
+    rest = f" (no load in common away from the turning point: {'; '.join(apart)})" if apart else ""
     return [
-        "At equal load the contact is larger on unloading than on loading everywhere, by a factor "
-        f"of at least {least:.2f}; the paper says the same."
+        f"{where} larger than on loading everywhere, by a factor of at least {least:.2f}{rest}; "
+        "the paper says the same."
     ]
 
 
@@ -221,25 +224,23 @@ def _from_middle(values: tuple[float, ...]) -> list[float]:
 def area_ratio(cell: Cell) -> float | None:
     """Least ratio of A/A0 on unloading to loading at equal mean stress, on the mean curves.
 
-    Only where loading carries more than a tenth of its final contact, and below 0.98 of the final
-    stress: at the turning point both branches meet. None without such states.
+    Unloading up to its largest tension only: afterwards patches are lost while the tension falls.
+    Loading between a tenth and 95 % of its final contact: at the turning point both branches meet.
+    None without common stresses.
     """
     if not cell.done:
         return None
     stress_up = cell.curves["loading_stress"].mean
     area_up = cell.curves["loading_contact_fraction"].mean
-    stress_down = cell.curves["unloading_stress"].mean
-    area_down = cell.curves["unloading_contact_fraction"].mean
-    # Unloading is monotone in stress until the largest tension.
-    stop = int(np.argmin(stress_down)) + 1
-    if stop < 2:
-        return None
-    order = np.argsort(stress_down[:stop])
-    span = stress_down[0] - stress_down[stop - 1]
-    wanted = (area_up > 0.1 * area_up[-1]) & (stress_up < stress_down[0] - 0.02 * span)
+    stop = int(np.argmin(cell.curves["unloading_stress"].mean)) + 1
+    stress_down = cell.curves["unloading_stress"].mean[:stop]
+    area_down = cell.curves["unloading_contact_fraction"].mean[:stop]
+    wanted = (area_up > 0.1 * area_up[-1]) & (area_up < 0.95 * area_up[-1])
+    wanted &= (stress_up >= stress_down.min()) & (stress_up <= stress_down.max())
     if not np.any(wanted):
         return None
-    unloading = np.interp(stress_up[wanted], stress_down[:stop][order], area_down[:stop][order])
+    order = np.argsort(stress_down)
+    unloading = np.interp(stress_up[wanted], stress_down[order], area_down[order])
     return float(np.min(unloading / area_up[wanted]))
 
 

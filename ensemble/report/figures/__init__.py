@@ -113,7 +113,8 @@ MECHANISMS = (
     Illustration(
         "jump_energies",
         "Distribution of the energy drops",
-        "Jumps of one loop per decade of energy drop, mean over realisations.",
+        "Jumps of one loop per decade of energy drop, mean over realisations. Drops more than "
+        "eight decades below the largest are not shown.",
         losses.jump_energies,
     ),
     Illustration(

@@ -32,6 +32,8 @@ from ensemble.report.figures.style import (
 )
 from ensemble.report.findings import typical_cell
 
+# Gap/h_max below which the density is that of the interpolation beside edges alone.
+_LEAST_GAP = 1e-3
 # Colour of a branch where both are drawn over the rigid profile.
 _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 
@@ -116,6 +118,7 @@ def gap_density(data: Aggregate) -> Figure:
                     )
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.set_xlim(left=_LEAST_GAP)
         axes.set_ylabel(r"density of $t/h_\mathrm{max}$")
         label_panel(axes, _cell_label(cell))
     figure.axes[len(hursts) - 1].set_xlabel(r"gap $t/h_\mathrm{max}$")

@@ -59,6 +59,7 @@ def loss_against_adhesion(data: Aggregate) -> Figure:
                 marker="*",
                 markersize=8,
                 markerfacecolor="white",
+                zorder=5,
                 markeredgecolor=look(k).colour,
                 label=f"H = {hurst:g}, paper",
             )
@@ -247,9 +248,12 @@ def _cells(data: Aggregate) -> list[Cell]:
 
 
 def _occupied(histogram: np.ndarray) -> slice:
-    """The bins from the first to the last that holds a jump of any cell."""
+    """The bins from the first to the last that holds a jump of any cell; at most eight decades."""
     filled = np.flatnonzero(histogram.sum(axis=(0, 1)))
-    return slice(int(filled[0]), int(filled[-1]) + 1) if filled.size else slice(0, 1)
+    if not filled.size:
+        return slice(0, 1)
+    stop = int(filled[-1]) + 1
+    return slice(max(int(filled[0]), stop - 8 * BINS_PER_DECADE), stop)
 
 
 def _errorbar(
