@@ -8,8 +8,8 @@ nodes, whose spacing at an end of the gap is far below that of any output grid.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from solver.compiled import compiled
 from solver.method import Fields
 from solver.problem import Problem
 from solver.sharp_gaps import GapField
@@ -58,7 +58,7 @@ def fields_of(problem: Problem, field: GapField | None, separation: float, n: in
     )
 
 
-@njit(cache=True)
+@compiled
 def _sum_modes(gap, theta, modes):  # type: ignore[no-untyped-def]  # compiled
     """Σ_n b_n sin((n+1)t), cos t = η(θ), by Clenshaw's recurrence."""
     out = np.empty(theta.shape[0])
@@ -77,7 +77,7 @@ def _sum_modes(gap, theta, modes):  # type: ignore[no-untyped-def]  # compiled
     return out
 
 
-@njit(cache=True)
+@compiled
 def _pull(theta, phi, strength):  # type: ignore[no-untyped-def]  # compiled
     """Σ_j strength_j / sin²((θ-φ_j)/2)."""
     out = np.zeros(theta.shape[0])

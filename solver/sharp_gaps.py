@@ -36,10 +36,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotrs
 
+from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp_map import ALPHA, LEFT, RIGHT, convergence, map_gaps, theta_at
 from solver.sharp_source import StressSource, gap_moments
@@ -200,7 +200,7 @@ class GapField:
         return by_edge, p * strength
 
 
-@njit(cache=True)
+@compiled
 def _periodic(x):  # type: ignore[no-untyped-def]  # compiled
     """1/sin²(x/2) - 4/x², x = Δθ: what the own gap feels of its periodic images."""
     if abs(x) < 0.2:
@@ -210,7 +210,7 @@ def _periodic(x):  # type: ignore[no-untyped-def]  # compiled
     return 1 / (half * half) - 4 / (x * x)
 
 
-@njit(cache=True)
+@compiled
 def _mapped(alpha, x):  # type: ignore[no-untyped-def]  # compiled
     """4 [α²/sinh²(αx) - 1/x²], x = Δη: the own gap's kernel beyond a straight crack in η."""
     y = alpha * x
@@ -221,7 +221,7 @@ def _mapped(alpha, x):  # type: ignore[no-untyped-def]  # compiled
     return 4 * ((alpha / np.sinh(y)) ** 2 - 1 / (x * x))
 
 
-@njit(cache=True)
+@compiled
 def _assemble(  # type: ignore[no-untyped-def]  # compiled
     table, kinds, offset, counts, start, square, eta, w, b, modes,
     width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w, fields,
@@ -291,7 +291,7 @@ def _assemble(  # type: ignore[no-untyped-def]  # compiled
     return theta, weight, slope, matrix, rhs.T, beyond, all_s
 
 
-@njit(cache=True)
+@compiled
 def _ends(f, slope, kinds, offset, start, ends):  # type: ignore[no-untyped-def]  # compiled
     """sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
     out = np.zeros((2 * slope.shape[0], f.shape[1]))
@@ -305,7 +305,7 @@ def _ends(f, slope, kinds, offset, start, ends):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True)
+@compiled
 def _singular_loads(  # type: ignore[no-untyped-def]  # compiled
     table, slope, kinds, offset, counts, start, square, eta, b, theta, weight, matrix, w
 ):  # fmt: skip

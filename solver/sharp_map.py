@@ -13,8 +13,8 @@ over patch, and Chebyshev series in η converge as ρ^-M with ρ = τ + sqrt(1 +
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from solver.compiled import compiled
 from solver.profile import Array
 
 # Columns of the table of gaps.
@@ -22,7 +22,7 @@ LEFT, RIGHT, LEFT_PATCH, RIGHT_PATCH, ALPHA = 0, 1, 2, 3, 4
 _COLUMNS = 5
 
 
-@njit(cache=True)
+@compiled
 def map_gaps(gaps):  # type: ignore[no-untyped-def]  # compiled
     """Table of gaps, shape (L, 5): both ends, widths of the patches beside them, α.
 
@@ -44,7 +44,7 @@ def map_gaps(gaps):  # type: ignore[no-untyped-def]  # compiled
     return table
 
 
-@njit(cache=True)
+@compiled
 def one_minus_plus(gap, r, side):  # type: ignore[no-untyped-def]  # compiled
     """(1 - η, 1 + η) at the distance r from the left (side 0) or right end, relatively exact."""
     own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
@@ -56,7 +56,7 @@ def one_minus_plus(gap, r, side):  # type: ignore[no-untyped-def]  # compiled
     return near, 2 - near
 
 
-@njit(cache=True)
+@compiled
 def theta_at(gap, eta):  # type: ignore[no-untyped-def]  # compiled
     """θ and dθ/dη at η."""
     from_left = eta < 0

@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.fft import dst
 
+from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp_gaps import MODE_COUNTS, TABLES, GapField
 from solver.sharp_map import theta_at
@@ -40,7 +40,7 @@ class Opening:
     modes: Array
 
 
-@njit(cache=True)
+@compiled
 def _fine_nodes(gap, top, per_wave):  # type: ignore[no-untyped-def]  # compiled
     """Sine nodes so close that the shortest wave holds ``per_wave`` of them: θ, dθ/dη, sin t."""
     widest = 0.0

@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp_gaps import GapField
 from solver.sharp_source import StressSource
@@ -213,7 +213,7 @@ class EdgeMechanics:
         return np.asarray(np.minimum(longest, 0.25 * limit).ravel())
 
 
-@njit(cache=True)
+@compiled
 def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # compiled
     """Step of every edge: runners at their limit, the others by Newton's step around them.
 

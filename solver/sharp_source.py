@@ -16,10 +16,10 @@ end pieces, with their square-root weight, are integrated with S interpolated on
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
+from solver.compiled import compiled
 from solver.profile import Array, Profile
 from solver.sharp_map import LEFT, LEFT_PATCH, RIGHT, RIGHT_PATCH, one_minus_plus, theta_at
 
@@ -139,7 +139,7 @@ def _lagrange(nodes: Array, x: Array) -> Array:
     )
 
 
-@njit(cache=True)
+@compiled
 def _clenshaw(coefficients, x):  # type: ignore[no-untyped-def]  # compiled
     b1 = 0.0
     b2 = 0.0
@@ -148,7 +148,7 @@ def _clenshaw(coefficients, x):  # type: ignore[no-untyped-def]  # compiled
     return x * b1 - b2 + coefficients[0]
 
 
-@njit(cache=True)
+@compiled
 def interpolate(theta, width, panels, coefficients):  # type: ignore[no-untyped-def]  # compiled
     """(S, S') at each angle, shape (len(theta), 2)."""
     out = np.empty((theta.shape[0], 2))
@@ -162,7 +162,7 @@ def interpolate(theta, width, panels, coefficients):  # type: ignore[no-untyped-
     return out
 
 
-@njit(cache=True)
+@compiled
 def _measure_at(theta, width, panels, measure):  # type: ignore[no-untyped-def]  # compiled
     value = np.empty(theta.shape[0])
     slope = np.empty(theta.shape[0])
@@ -183,7 +183,7 @@ def _measure_at(theta, width, panels, measure):  # type: ignore[no-untyped-def] 
     return value, slope
 
 
-@njit(cache=True)
+@compiled
 def _add(one_minus, one_plus, weight0, weight1, s, ends):  # type: ignore[no-untyped-def]
     """Add one source of strength ∫S dθ at η, given by 1 - η and 1 + η, to the moments."""
     root = np.sqrt(one_minus * one_plus)
@@ -210,7 +210,7 @@ def _add(one_minus, one_plus, weight0, weight1, s, ends):  # type: ignore[no-unt
     ends[1, 1] += weight1 * high
 
 
-@njit(cache=True)
+@compiled
 def _value(coefficients, place, panels, both):  # type: ignore[no-untyped-def]  # compiled
     """S and, if wanted, S' (else 0) at θ = place · panel width."""
     k = int(np.floor(place))
@@ -220,7 +220,7 @@ def _value(coefficients, place, panels, both):  # type: ignore[no-untyped-def]  
     return _clenshaw(coefficients[k, :, 0], x), second
 
 
-@njit(cache=True)
+@compiled
 def _end_piece(  # type: ignore[no-untyped-def]  # compiled
     gap, side, length, width, panels, node_x, node_w, coefficients, end_x, end_w, s, ends
 ):
@@ -250,7 +250,7 @@ def _end_piece(  # type: ignore[no-untyped-def]  # compiled
         at = stop
 
 
-@njit(cache=True)
+@compiled
 def gap_moments(  # type: ignore[no-untyped-def]  # compiled
     gap, width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w, s, ends
 ):

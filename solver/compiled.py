@@ -1,0 +1,51 @@
+"""Compiled functions, cached between processes by the sources they were compiled from.
+
+numba's own cache knows only the file of a function, not the files of the functions that it calls:
+after a change in one module, callers in another would silently keep the old code. So the cache
+lies in a folder named after the content of all modules of this package. Where no folder can be
+written the functions are compiled anew in each process.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit
+
+
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile ``function`` at its first call (numba, nopython), keeping the result on disk."""
+    folder = _cache_folder()
+    dispatcher: Callable[..., Any]
+    if folder is None:
+        dispatcher = njit(function)
+        return dispatcher
+    settings: Any = config  # its attributes are made at run time
+    before = settings.CACHE_DIR
+    try:
+        settings.CACHE_DIR = str(folder)  # read when the function is decorated
+        dispatcher = njit(cache=True)(function)
+    finally:
+        settings.CACHE_DIR = before
+    return dispatcher
+
+
+@cache
+def _cache_folder() -> Path | None:
+    """Folder for the present sources, created; None if there is no place to write."""
+    digest = hashlib.sha256()
+    for module in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(module.read_bytes())
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    try:
+        root = Path(base) if base else Path.home() / ".cache"
+        folder = root / "hysteron" / digest.hexdigest()[:16]
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):
+        return None
+    return folder if os.access(folder, os.W_OK) else None
