@@ -39,8 +39,26 @@ else
     echo "jobs/local.sh: one process (no mpirun was found, or one rank was asked for)"
 fi
 
-code=0
-${launch[@]+"${launch[@]}"} "$hysteron" run "$campaign" --out "$out/$name.h5" </dev/null || code=$?
+# A shell that waits for a command in the foreground keeps signals to itself until that has ended;
+# so the run goes to the background. Told to terminate, it is stopped in order (SIGUSR1), which
+# mpirun passes on to the ranks: at SIGTERM it would kill them.
+signalled='' run=''
+# shellcheck disable=SC2317
+stop() {
+    signalled=yes
+    if [ -n "$run" ]; then kill -s USR1 "$run" 2>/dev/null || true; fi
+}
+trap stop USR1 TERM
+trap 'signalled=yes' INT # Ctrl-C reaches mpirun by itself
+${launch[@]+"${launch[@]}"} "$hysteron" run "$campaign" --out "$out/$name.h5" </dev/null &
+run=$!
+while :; do
+    signalled='' code=0
+    wait "$run" || code=$?
+    # A signal ends the wait, but not the run.
+    if [ -z "$signalled" ]; then break; fi
+done
+trap - USR1 TERM INT
 if [ "$code" = 75 ]; then
     echo "jobs/local.sh: stopped early; the same command resumes it ($out/$name.h5)" >&2
 fi

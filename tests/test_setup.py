@@ -6,8 +6,10 @@ import ast
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 import tomllib
 from pathlib import Path
 
@@ -104,6 +106,35 @@ def test_local_script_asks_for_a_campaign() -> None:
     done = subprocess.run([ROOT / "jobs" / "local.sh"], capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "usage: jobs/local.sh CAMPAIGN.toml" in done.stderr
+
+
+def test_local_script_stops_its_run_in_order(tmp_path: Path) -> None:
+    # A checkout in which hysteron is a stand-in that notes how it is stopped.
+    for folder in ("jobs", "tools"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    hysteron = tmp_path / ".venv" / "bin" / "hysteron"
+    hysteron.parent.mkdir(parents=True)
+    hysteron.write_text("#!/bin/bash\ntrap 'exit 75' USR1\ntouch begun\nsleep 60 & wait\n")
+    hysteron.chmod(0o755)
+    script = subprocess.Popen(
+        [tmp_path / "jobs" / "local.sh", "study.toml", "1"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        end = time.monotonic() + 20
+        while not (tmp_path / "begun").exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        script.terminate()
+        assert script.wait(20) == 75
+        assert script.stderr is not None
+        assert "the same command resumes it (out/study.h5)" in script.stderr.readline()
+    finally:
+        os.killpg(script.pid, signal.SIGKILL)  # the stand-in's sleep
 
 
 # ------------------------------------------------------------------ the PBS script, with a stand-in
