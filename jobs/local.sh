@@ -42,14 +42,14 @@ fi
 # A shell that waits for a command in the foreground keeps signals to itself until that has ended;
 # so the run goes to the background. Told to terminate, it is stopped in order (SIGUSR1), which
 # mpirun passes on to the ranks: at SIGTERM it would kill them.
-signalled='' run=''
+signalled='' interrupted='' run=''
 # shellcheck disable=SC2317
 stop() {
     signalled=yes
     if [ -n "$run" ]; then kill -s USR1 "$run" 2>/dev/null || true; fi
 }
 trap stop USR1 TERM
-trap 'signalled=yes' INT # Ctrl-C reaches mpirun by itself
+trap 'signalled=yes interrupted=yes' INT # Ctrl-C reaches mpirun by itself
 ${launch[@]+"${launch[@]}"} "$hysteron" run "$campaign" --out "$out/$name.h5" </dev/null &
 run=$!
 while :; do
@@ -59,6 +59,8 @@ while :; do
     if [ -z "$signalled" ]; then break; fi
 done
 trap - USR1 TERM INT
+# mpirun makes a code of its own of Ctrl-C.
+if [ -n "$interrupted" ] && [ "$code" != 0 ]; then code=75; fi
 if [ "$code" = 75 ]; then
     echo "jobs/local.sh: stopped early; the same command resumes it ($out/$name.h5)" >&2
 fi
