@@ -133,7 +133,7 @@ class GapField:
         self.kinds = np.minimum(np.searchsorted(MODE_COUNTS, wanted), len(MODE_COUNTS) - 1)
         self.offset = np.concatenate([[0], np.cumsum(MODE_COUNTS[self.kinds])])
         self.theta, self.weight, self._slope, self._matrix, self.rhs, self._beyond, self.s = (
-            _assemble(
+            assemble(
                 self.table, self.kinds, self.offset, MODE_COUNTS,
                 TABLES.start, TABLES.square, TABLES.eta, TABLES.w, TABLES.b, TABLES.modes,
                 source.width, source.panels, source.x, source.w, source.coefficients,
@@ -156,11 +156,20 @@ class GapField:
 
     def _at_ends(self, f: Array, field: int | None) -> Array:
         """C at each gap end of the density f, with the high modes of S (0), S' (1) or none."""
-        out = _ends(f[:, None], self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends)
+        out = edge_openings(
+            f[:, None], self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends
+        )
         result: Array = out[:, 0].reshape(-1, 2)
         if field is not None:
             result = result - np.sqrt(2 * self._slope) * self._beyond[:, :, field]
         return result
+
+    def _regular(self, f: Array) -> Array:
+        """C of regular densities, shape (2L, columns), from their columns of nodal values."""
+        out: Array = edge_openings(
+            f, self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends
+        )
+        return out
 
     @cached_property
     def pressure_by_separation(self) -> float:
@@ -187,7 +196,9 @@ class GapField:
         side = np.tile([-1.0, 1.0], len(self.gaps))
         p = (area + self.weight @ y) / self._unit_mean
         y -= np.outer(self._solved[:, 1], p)
-        by_edge: Array = _ends(y, self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends)
+        by_edge: Array = edge_openings(
+            y, self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends
+        )
         k = np.arange(len(slope))
         by_edge[k ^ 1, k] += 0.5 * np.sqrt(2 * slope[k ^ 1])  # the singular opening's far end
         strength = side * self.opening.ravel() * np.sqrt(slope / 8)
@@ -222,10 +233,15 @@ def _mapped(alpha, x):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _assemble(  # type: ignore[no-untyped-def]  # compiled
+def assemble(  # type: ignore[no-untyped-def]  # compiled
     table, kinds, offset, counts, start, square, eta, w, b, modes,
     width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w, fields,
 ):  # fmt: skip
+    """Matrix and right-hand sides of (1), with S alone (fields = 1) or S and S' (2).
+
+    Returns θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~'), what the
+    higher modes add at the ends, and the moments.
+    """
     gaps_n = table.shape[0]
     n = offset[gaps_n]
     theta = np.empty(n)
@@ -292,7 +308,7 @@ def _assemble(  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _ends(f, slope, kinds, offset, start, ends):  # type: ignore[no-untyped-def]  # compiled
+def edge_openings(f, slope, kinds, offset, start, ends):  # type: ignore[no-untyped-def]  # compiled
     """sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
     out = np.zeros((2 * slope.shape[0], f.shape[1]))
     for k in range(slope.shape[0]):

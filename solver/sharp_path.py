@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
-from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp_gaps import GapField
+from solver.sharp_run import run_held
 from solver.sharp_source import StressSource
+from solver.sharp_step import off_saddle, running_step
 
 _REUSES = 8  # running steps that share one tangent
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
@@ -38,13 +38,12 @@ class Counters:
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Symmetric tangent with its scale factors, held over running steps."""
+    """Symmetric tangent with its scale factors, for the next running steps."""
 
     d: Array
     matrix: Array
-    uses: int
     last: Array  # the step taken with it
-    runners: int  # edges that ran in that step
+    runners: int  # edges that ran in that step; 0: the tangent is used up
 
 
 class EdgeMechanics:
@@ -161,11 +160,6 @@ class EdgeMechanics:
             return False
         return True
 
-    def softness(self, field: GapField, tangent: Array) -> float:
-        """Smallest eigenvalue of the symmetric tangent; its square is linear in s near a fold."""
-        _, matrix = self.symmetric(field, tangent)
-        return float(eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0])
-
     def descend(self, gaps: Array, separation: float, held: Held | None) -> tuple[Array, Held]:
         """Take one step of energy descent at fixed separation.
 
@@ -176,31 +170,27 @@ class EdgeMechanics:
         turns; the openings are always fresh.
         """
         self.count.descent_steps += 1
-        reuse = held is not None and held.uses < _REUSES and len(held.d) == gaps.size
-        field = self.field(gaps, separation, differentiable=not reuse)
-        pull = -self.residual(field)
-        alone = held is not None and held.runners == 1
-        limit = self._limits(gaps, (2 if alone else 1) * self.longest_step)
-        step = None
-        if held is not None and reuse:
-            step = running_step(held.matrix, held.d, pull, limit)
-            fast = np.abs(step) > 0.2 * self.longest_step
-            if np.any(fast & (step * held.last <= 0)):
-                step = None  # an edge turns: the held tangent is too old
-        if held is None or step is None:
-            if reuse:
-                field = self.field(gaps, separation)
-            d, matrix = self.symmetric(field, self.tangent(field))
-            step = running_step(matrix, d, pull, limit)
-            held = Held(d, matrix, uses=0, last=step, runners=0)
+        if held is not None and held.runners and len(held.d) == gaps.size:
+            moved, _, _, fields, turns = run_held(
+                self.source, gaps, separation, self.tolerance, (held.matrix, held.d), held.last,
+                held.runners, _REUSES,
+                (self.longest_step, self.smallest, self.overlapping), self.critical,
+            )  # fmt: skip
+            self.count.fields += fields
+            self.count.descent_steps += fields - 1
+            if fields > 1 or not turns:
+                return moved, replace(held, runners=0)
+        field = self.field(gaps, separation)
+        limit = self._limits(gaps, self.longest_step)
+        d, matrix = self.symmetric(field, self.tangent(field))
+        step = running_step(matrix, d, -self.residual(field), limit)
         # Where surfaces would overlap beside an edge there is nothing to weigh: contact advances.
         step = np.where(field.opening.ravel() < -self.overlapping, limit, step)
         if np.abs(step).max() <= self.settled and not self.stable(field, self.tangent(field)):
-            d, matrix = self.symmetric(field, self.tangent(field))
             step = off_saddle(matrix, d, limit)
         runners = int(np.count_nonzero(np.abs(step) > 0.5 * self.longest_step))
-        held = replace(held, last=step, uses=held.uses + 1 if runners else _REUSES, runners=runners)
-        return np.asarray((gaps.ravel() + outward(gaps) * step).reshape(-1, 2)), held
+        moved = (gaps.ravel() + outward(gaps) * step).reshape(-1, 2)
+        return moved, Held(d, matrix, step, runners)
 
     def _limits(self, gaps: Array, longest: float) -> Array:
         """Longest step of each edge: ``longest``, or a quarter of the gap or patch it may close."""
@@ -211,73 +201,6 @@ class EdgeMechanics:
         limit[:, 1] = patch
         np.minimum(limit, length[:, None], out=limit)
         return np.asarray(np.minimum(longest, 0.25 * limit).ravel())
-
-
-@compiled
-def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # compiled
-    """Step of every edge: runners at their limit, the others by Newton's step around them.
-
-    ``matrix`` is the symmetric tangent, ``d`` its scale factors, ``pull`` C_c - C. Edges become
-    runners one after the other: those that Newton's step would move beyond their limit, and, while
-    the matrix of the others is not positive definite, the one that its softest mode moves most.
-    """
-    n = pull.shape[0]
-    step = np.zeros(n)
-    runs = np.zeros(n, dtype=np.bool_)
-    scaled = pull * d
-    for _ in range(n + 1):
-        free = np.flatnonzero(~runs)
-        if free.shape[0] == 0:
-            break
-        block = np.empty((free.shape[0], free.shape[0]))
-        right = np.empty(free.shape[0])
-        for i in range(free.shape[0]):
-            right[i] = scaled[free[i]]
-            for j in range(n):
-                if runs[j]:
-                    right[i] -= matrix[free[i], j] * step[j] * d[j]
-            for j in range(free.shape[0]):
-                block[i, j] = matrix[free[i], free[j]]
-        values, vectors = np.linalg.eigh(block)
-        floor = 1e-9 * np.abs(values).max()
-        if values[0] <= floor:
-            # The softest mode runs downhill; its largest edge leads. A pull without any share in
-            # that mode is a symmetric one: it keeps its symmetry.
-            downhill = vectors[:, 0] @ right
-            if abs(downhill) > 1e-6 * np.sqrt(right @ right):
-                mode = vectors[:, 0] / d[free]
-                lead = np.argmax(np.abs(mode))
-                edge = free[lead]
-                sign = np.sign(mode[lead]) * np.sign(downhill)
-                if abs(pull[edge]) * d[edge] > 0.5 * np.abs(right).max():
-                    sign = np.sign(pull[edge])
-                runs[edge] = True
-                step[edge] = sign * limit[edge]
-                continue
-            values = np.maximum(np.abs(values), floor)
-        newton = (vectors @ ((vectors.T @ right) / values)) / d[free]
-        done = True
-        for i in range(free.shape[0]):
-            edge = free[i]
-            step[edge] = newton[i]
-            if not abs(newton[i]) <= limit[edge]:
-                runs[edge] = True
-                step[edge] = np.sign(newton[i]) * limit[edge]
-                done = False
-        if done:
-            break
-        for i in range(free.shape[0]):
-            if not runs[free[i]]:
-                step[free[i]] = 0.0
-    return step
-
-
-def off_saddle(matrix: Array, d: Array, limit: Array) -> Array:
-    """Step along the softest mode, its first large edge outwards: the way off a saddle."""
-    mode = np.linalg.eigh(matrix)[1][:, 0] / d
-    lead = int(np.flatnonzero(np.abs(mode) > 0.99 * np.abs(mode).max())[0])
-    scaled = mode / mode[lead]
-    return np.asarray(np.clip(scaled * limit.min(), -limit, limit))
 
 
 def outward(gaps: Array) -> Array:

@@ -113,7 +113,7 @@ class StressSource:
 
     def measure_at(self, theta: Array) -> tuple[Array, Array]:
         """sqrt(1 + h'²) and its derivative in θ at any angles."""
-        value, slope = _measure_at(
+        value, slope = measure_at(
             np.ascontiguousarray(theta), self.width, self.panels, self.measure
         )
         return value, slope
@@ -163,7 +163,8 @@ def interpolate(theta, width, panels, coefficients):  # type: ignore[no-untyped-
 
 
 @compiled
-def _measure_at(theta, width, panels, measure):  # type: ignore[no-untyped-def]  # compiled
+def measure_at(theta, width, panels, measure):  # type: ignore[no-untyped-def]  # compiled
+    """Value and θ-derivative of sqrt(1 + h'²) at each angle."""
     value = np.empty(theta.shape[0])
     slope = np.empty(theta.shape[0])
     for i in range(theta.shape[0]):
