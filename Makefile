@@ -25,7 +25,7 @@ lint: setup  ## ruff and mypy
 
 test: setup-test  ## the whole test suite, MPI and (where it can be installed) Slurm included
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
-	    export MPIRUN && exec $(bin)/python -m pytest $(ARGS)
+	    export MPIRUN && exec $(bin)/python -m pytest -rs $(ARGS)
 
 bench: setup  ## speed against error of each method
 	$(bin)/hysteron bench
