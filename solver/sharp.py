@@ -29,7 +29,7 @@ from solver.sharp_touch import Nucleation, Touch
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
 _CORRECTED = 0.05  # longest correction of a prediction, in λ_min
 _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
-_DESCENT_LIMIT = 1_000_000
+_DESCENT_LIMIT = 50_000
 _FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
 _RESOLUTION = 0.02  # resolution of a jump's separation, in units of accuracy·h_max
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss

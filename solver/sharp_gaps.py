@@ -108,8 +108,10 @@ class GapField:
         q0 s.
     tolerance : float
         Wanted relative accuracy of the interaction between gaps.
-    differentiable : bool
-        Whether :attr:`derivatives` will be asked for; without them a field costs a third less.
+
+    kinds : int array, shape (L,), optional
+        Places in MODE_COUNTS, instead of those that the tolerance asks for. An iteration must keep
+        them: where they change, the field jumps by its error.
 
     Attributes
     ----------
@@ -125,12 +127,14 @@ class GapField:
         gaps: Array,
         separation: float,
         tolerance: float,
-        differentiable: bool = True,
+        kinds: NDArray[np.intp] | None = None,
     ) -> None:
         self.source, self.gaps, self.separation = source, gaps, separation
         self.table = map_gaps(gaps)
-        wanted = -np.log(tolerance) / convergence(self.table)
-        self.kinds = np.minimum(np.searchsorted(MODE_COUNTS, wanted), len(MODE_COUNTS) - 1)
+        if kinds is None:
+            wanted = -np.log(tolerance) / convergence(self.table)
+            kinds = np.minimum(np.searchsorted(MODE_COUNTS, wanted), len(MODE_COUNTS) - 1)
+        self.kinds = kinds
         self.offset = np.concatenate([[0], np.cumsum(MODE_COUNTS[self.kinds])])
         self.theta, self.weight, self._slope, self._matrix, self.rhs, self._beyond, self.s = (
             assemble(
@@ -138,7 +142,7 @@ class GapField:
                 TABLES.start, TABLES.square, TABLES.eta, TABLES.w, TABLES.b, TABLES.modes,
                 source.width, source.panels, source.x, source.w, source.coefficients,
                 source.weights, source.level_start, source.end_x, source.end_w,
-                2 if differentiable else 1,
+                2,
             )
         )  # fmt: skip
         # The matrix is symmetric, so its transpose is Fortran order without a copy.

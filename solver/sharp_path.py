@@ -77,10 +77,12 @@ class EdgeMechanics:
         self.overlapping = 0.1 * max(critical, float(rough))
         self.count = Counters()
 
-    def field(self, gaps: Array, separation: float, differentiable: bool = True) -> GapField:
+    def field(
+        self, gaps: Array, separation: float, kinds: NDArray[np.intp] | None = None
+    ) -> GapField:
         """Solve the field of these gaps."""
         self.count.fields += 1
-        return GapField(self.source, gaps, separation, self.tolerance, differentiable)
+        return GapField(self.source, gaps, separation, self.tolerance, kinds)
 
     def residual(self, field: GapField) -> Array:
         """C_e - C_c at every edge, shape (2L,); positive where contact recedes."""
@@ -127,14 +129,14 @@ class EdgeMechanics:
         at = start.copy()
         last = np.inf
         sign = outward(gaps)
-        tangent = None
+        kinds = None
         for _ in range(_NEWTON_LIMIT):
             self.count.newton_steps += 1
             trial = at.reshape(-1, 2)
             if not self.valid(trial):
                 return None
-            field = self.field(trial, separation)
-            # A converged Newton iteration may reuse its tangent; the last one is always fresh.
+            field = self.field(trial, separation, kinds)
+            kinds = field.kinds
             tangent = self.tangent(field)
             try:
                 step = -sign * np.linalg.solve(tangent, self.residual(field))
