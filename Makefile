@@ -1,6 +1,6 @@
 # make help lists what there is. tools/setup.sh does nothing when nothing has changed.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test run test lint bench clean lock
+.PHONY: help setup setup-test run test test-kills lint bench clean lock
 SHELL := /bin/bash
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
@@ -8,7 +8,7 @@ ARGS :=
 CAMPAIGN := jobs/example.toml
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
 
 setup:  ## everything that hysteron needs, into .venv (HYSTERON_APT=no: no system packages)
 	@tools/setup.sh
@@ -26,6 +26,10 @@ lint: setup  ## ruff and mypy
 test: setup-test  ## the whole test suite, MPI and (where it can be installed) Slurm included
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
 	    export MPIRUN && exec $(bin)/python -m pytest -rs $(ARGS)
+
+test-kills: setup  ## 20 kills each of a worker, of rank 0 and of the whole job (about 4 minutes)
+	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
+	    export MPIRUN HYSTERON_KILLS=20 && exec $(bin)/python -m pytest tests/test_mpi.py -k random_moments
 
 bench: setup  ## speed against error of each method
 	$(bin)/hysteron bench
