@@ -148,3 +148,8 @@ def test_coefficients_must_describe_a_profile():
             Profile(1e-3, np.array(bad, dtype=complex))
     with pytest.raises(ValueError, match="flat"):
         Problem(Profile(1e-3, np.zeros(3, dtype=complex)), HalfSpace(1e6, 0.5), 0.01)
+
+
+def test_an_absurd_spectrum_is_refused_before_it_fills_the_memory():
+    with pytest.raises(ValueError, match="at most 100000 waves"):
+        self_affine_profile(0.8, period=1.0, n0=10, ratio=1_000_000, seed=1, h_rms=1e-6)
