@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import sys
 
 from ensemble.errors import InputError
@@ -24,6 +25,10 @@ COMMANDS: dict[str, str] = {
 }
 BAD_INPUT = 2
 
+# Small matrices gain nothing from threads, ranks already share the cores, and sums split over a
+# number of threads would tie the last bits to it. Set before numpy is loaded.
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; returns its exit code (2 for bad input, with one sentence on stderr)."""
@@ -32,6 +37,8 @@ def main(argv: list[str] | None = None) -> int:
     if name not in COMMANDS:
         _overview().parse_args(words or ["--help"])
         return BAD_INPUT
+    for variable in _ONE_THREAD:
+        os.environ.setdefault(variable, "1")
     module = importlib.import_module(f"ensemble.command.{name}")
     parser = argparse.ArgumentParser(prog=f"hysteron {name}", description=module.__doc__)
     module.add_arguments(parser)
