@@ -1,0 +1,115 @@
+"""Speed of each method against its error in the loss: CPU time, memory, table and figure.
+
+Every run has a process of its own with one thread; time is CPU time, so other work on the machine
+does not count. The full benchmark takes about half an hour, --quick less than a minute.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import platform
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ensemble.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page, record
+from ensemble.errors import InputError
+from solver.benchmark import FULL, QUICK, Line, benchmark, growth, ratios
+
+_DEFAULT = Path("out/benchmark")
+_WIDTH = 120
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``hysteron bench``."""
+    parser.add_argument(
+        "--to",
+        type=Path,
+        default=_DEFAULT,
+        metavar="DIR",
+        help=f"directory for benchmark.csv, benchmark.md and the figure (default {_DEFAULT})",
+    )
+    parser.add_argument("--quick", action="store_true", help="small scenes only, under a minute")
+    parser.add_argument(
+        "--budget",
+        type=float,
+        default=360.0,
+        metavar="SECONDS",
+        help="CPU time after which a run is given up (default 360)",
+    )
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Measure, print and write what came out."""
+    if not (math.isfinite(args.budget) and args.budget > 0):
+        raise InputError(f"--budget is {args.budget!r}: it must be positive, in seconds")
+    try:
+        args.to.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--to is {str(args.to)!r}: {error.strerror}") from error
+    # A file or a pipe has no width of its own; the tables need this one.
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True
+    ) as progress:
+        task = progress.add_task("measuring")
+
+        def show(line: Line) -> None:
+            run = line.run
+            progress.update(task, description=f"{run.scene.title}: {run.method}, {run.described}")
+
+        lines = benchmark(QUICK if args.quick else FULL, seconds=args.budget, on_line=show)
+        grown = [] if args.quick else growth(seconds=args.budget, on_line=show)
+    for scene in dict.fromkeys(line.run.scene for line in lines):
+        chosen = [line for line in lines if line.run.scene is scene]
+        title = f"{scene.title}; reference: {chosen[0].reference.text}"
+        console.print(_table(title, LINE_COLUMNS, [line_cells(line) for line in chosen]))
+    if grown:
+        rows = [growth_cells(line) for line in grown]
+        console.print(_table("How the cost of sharp grows", GROWTH_COLUMNS, rows))
+    compared = ratios(lines)
+    _write_csv(args.to / "benchmark.csv", [*lines, *grown])
+    command = "hysteron bench --quick" if args.quick else "hysteron bench"
+    text = page(lines, grown, compared, f"`{command}` on {_machine()}")
+    (args.to / "benchmark.md").write_text(text, encoding="utf-8")
+    _draw(lines, args.to / "benchmark")
+    console.print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
+    return 0
+
+
+def _table(title: str, columns: tuple[str, ...], rows: list[list[str]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for k, heading in enumerate(columns):
+        table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _write_csv(path: Path, lines: list[Line]) -> None:
+    records = [record(line) for line in lines]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(records[0]))
+        writer.writeheader()
+        writer.writerows(records)
+
+
+def _draw(lines: list[Line], stem: Path) -> None:
+    from ensemble.bench_figure import draw  # matplotlib only when everything is measured
+    from ensemble.report.figures.style import save
+
+    save(draw(lines), stem)
+
+
+def _machine() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            name = next(line.split(":")[1].strip() for line in file if "model name" in line)
+    except (OSError, StopIteration):
+        name = platform.processor() or platform.machine()
+    return f"one core of {name}, Python {platform.python_version()}"

@@ -1,0 +1,179 @@
+"""The scenes of the benchmark: from one wave with an exact loss to the scale of the paper.
+
+All have the paper's period 2π mm and material (E = 1 MPa, ν = 0.5, arXiv 1511.08891), in SI units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from solver.material import HalfSpace
+from solver.problem import Problem
+from solver.profile import Profile, self_affine_profile, single_wave
+from solver.references.single_wave import SingleWave
+
+Shape = Literal["one wave", "two waves", "rough"]
+
+HALF_SPACE = HalfSpace(1e6, 0.5)
+_PERIOD = 2e-3 * np.pi
+# So shallow that the area measured along the profile (the solver's) and the flat one (the closed
+# form's) give the same loss to 1e-8.
+_SHALLOW = 1e-4 * _PERIOD / (2 * np.pi)
+_ALPHA = 0.2
+_AMPLITUDE = 1e-6
+# A ripple on a crest, strong enough to pin the edges some ten times on their way out and back.
+_RIPPLE_HARMONIC, _RIPPLE = 12, 0.06
+_HURST, _H_RMS, _SEED = 0.8, 1e-6, 1
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One problem, its cycle, and the resolutions at which the methods are measured.
+
+    Attributes
+    ----------
+    name, title : str
+    shape : {"one wave", "two waves", "rough"}
+        A cos(q0 x); A cos(q0 x) with a ripple in phase; self-affine, H = 0.8, h_rms = 1 µm, seed 1.
+    work_of_adhesion : float
+        γ in J/m²; of one wave it follows from α = 0.2 and is not read.
+    load_steps : int
+        Steps from first touch to ``max_penetration`` (Δ~max).
+    n0, ratio : int
+        Lowest harmonic, and highest over lowest, of the rough shape.
+    grids : tuple of int
+        Least numbers of nodes per shortest wave, coarse to fine.
+    accuracies : tuple of float
+        Wanted accuracies of the loss, low to high.
+    ranges : tuple of float
+        Ranges of adhesion for tamaas in units of h_max, as small as is feasible.
+    tightest : tuple of float
+        Accuracies of the reference run of ``sharp``, the best first; the first that succeeds is
+        taken. Empty where the loss is known exactly.
+    reference_load_steps : int
+        Load steps of the reference run.
+    """
+
+    name: str
+    title: str
+    shape: Shape
+    work_of_adhesion: float = 0.0
+    max_penetration: float = 0.9
+    load_steps: int = 40
+    n0: int = 1
+    ratio: int = 1
+    grids: tuple[int, ...] = (8, 16, 32, 64)
+    accuracies: tuple[float, ...] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+    ranges: tuple[float, ...] = ()
+    tightest: tuple[float, ...] = ()
+    reference_load_steps: int = 80
+
+    def problem(self) -> Problem:
+        """Return the problem of this scene."""
+        if self.shape == "one wave":
+            gamma = _single_wave().work_of_adhesion
+            return Problem(single_wave(_SHALLOW, _PERIOD), HALF_SPACE, gamma)
+        if self.shape == "two waves":
+            waves = np.zeros(_RIPPLE_HARMONIC + 1, dtype=np.complex128)
+            waves[1], waves[-1] = 0.5, 0.5 * _RIPPLE
+            profile = Profile(_PERIOD, waves).scaled(_AMPLITUDE)
+        else:
+            profile = self_affine_profile(
+                _HURST, period=_PERIOD, n0=self.n0, ratio=self.ratio, seed=_SEED, h_rms=_H_RMS
+            )
+        return Problem(profile, HALF_SPACE, self.work_of_adhesion)
+
+    @property
+    def exact_loss(self) -> float | None:
+        """Loss in J/m² of nominal area where it is known in closed form."""
+        return _single_wave().loop.loss if self.shape == "one wave" else None
+
+
+def _single_wave() -> SingleWave:
+    return SingleWave.with_alpha(_ALPHA, _SHALLOW, _PERIOD, HALF_SPACE.modulus)
+
+
+ONE_WAVE = Scene(
+    name="one-wave",
+    title="one wave, α = 0.2",
+    shape="one wave",
+    max_penetration=0.5,
+    load_steps=10,
+    # One wave is the whole profile: its contact of 0.18 λ needs the nodes.
+    grids=(64, 256, 1024, 4096),
+    ranges=(0.05, 0.03),
+)
+TWO_WAVES = Scene(
+    name="two-waves",
+    title="two waves, m = 1 and 12, γ = 0.01",
+    shape="two waves",
+    work_of_adhesion=0.01,
+    load_steps=20,
+    ranges=(0.5,),
+    tightest=(1e-8, 1e-7, 1e-6),
+    reference_load_steps=20,
+)
+SMALL_ROUGH = Scene(
+    name="rough-32",
+    title="rough, m = 2 … 32, γ = 0.01",
+    shape="rough",
+    work_of_adhesion=0.01,
+    load_steps=20,
+    n0=2,
+    ratio=16,
+    ranges=(0.5, 0.3),
+    tightest=(1e-8, 1e-7, 1e-6, 1e-5),
+    reference_load_steps=40,
+)
+ROUGH = Scene(
+    name="rough-250",
+    title="rough, m = 10 … 250, γ = 0.01",
+    shape="rough",
+    work_of_adhesion=0.01,
+    n0=10,
+    ratio=25,
+    ranges=(0.3, 0.2),
+    tightest=(1e-7, 1e-6, 1e-5, 1e-4),
+)
+PAPER = Scene(
+    name="paper",
+    title="the paper's scale, m = 10 … 1000, γ = 0.04",
+    shape="rough",
+    work_of_adhesion=0.04,
+    n0=10,
+    ratio=100,
+    ranges=(0.2, 0.1),
+    tightest=(1e-7, 1e-6, 1e-5, 1e-4),
+)
+
+QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
+FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)
+
+GROWTH = tuple(
+    Scene(
+        name=f"growth-{10 * ratio}-{gamma:g}",
+        title=f"rough, m = 10 … {10 * ratio}, γ = {gamma:g}",
+        shape="rough",
+        work_of_adhesion=gamma,
+        n0=10,
+        ratio=ratio,
+        accuracies=(1e-3,),
+    )
+    for ratio in (25, 100, 1000)
+    for gamma in (0.04, 0.01, 0.0025)
+)
+"""How the cost of ``sharp`` grows with the number of patches (small γ) and of wave numbers."""
+
+# Meets touch, jumps, merging and vanishing in well below a second: compiles what a method compiles.
+WARM_UP = Scene(
+    name="warm-up",
+    title="warm-up",
+    shape="rough",
+    work_of_adhesion=0.02,
+    load_steps=4,
+    n0=2,
+    ratio=4,
+)
