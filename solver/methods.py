@@ -63,10 +63,11 @@ def make_method(
 def choose(problem: Problem) -> tuple[Literal["grid", "sharp"], str]:
     """Pick the method for a problem, and say why in one sentence.
 
-    ``sharp`` is faster than ``grid`` at equal error wherever adhesion keeps the patches few
-    (docs/benchmark.md). Without adhesion there are hundreds of patches, the loss is zero whatever
-    the resolution, and the work of ``sharp`` grows with the cube of their number.
+    The error of ``sharp`` is that of its tolerances, on any spectrum, and with the few patches that
+    adhesion leaves it is much the faster one (docs/methods.md). Without adhesion there are hundreds
+    of patches, the loss is zero whatever the resolution, and the work of ``sharp`` grows with the
+    cube of their number.
     """
     if problem.work_of_adhesion == 0:
         return "grid", "auto: grid, as there is no adhesion and so no loss to resolve"
-    return "sharp", "auto: sharp, the fastest at any error of the loss where there is adhesion"
+    return "sharp", "auto: sharp, whose error of the loss is that of its tolerances, not of a grid"

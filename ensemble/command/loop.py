@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
     method = parser.add_argument_group("method")
     method.add_argument(
-        "--method", default="grid", metavar="NAME", help=f"{', '.join(METHOD_NAMES)} (default grid)"
+        "--method", default="auto", metavar="NAME", help=f"{', '.join(METHOD_NAMES)} (default auto)"
     )
     method.add_argument(
         "--accuracy", type=float, default=1e-3, help="relative error of the loss (default 1e-3)"
