@@ -40,9 +40,7 @@ def make_method(
         raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1, both excluded")
     chosen = None
     if name == "auto":
-        name, chosen = choose(problem)
-        if name == "grid" and nodes_per_wave is None:
-            chosen += f"; grid of its default resolution for the accuracy {accuracy:g}"
+        name, chosen = choose(problem, nodes_per_wave)
     method: Method
     if name == "grid":
         from solver.grid import GridMethod
@@ -60,7 +58,9 @@ def make_method(
     return method
 
 
-def choose(problem: Problem) -> tuple[Literal["grid", "sharp"], str]:
+def choose(
+    problem: Problem, nodes_per_wave: int | None = None
+) -> tuple[Literal["grid", "sharp"], str]:
     """Pick the method for a problem, and say why in one sentence.
 
     The error of ``sharp`` is that of its tolerances, on any spectrum, and with the few patches that
@@ -68,6 +68,8 @@ def choose(problem: Problem) -> tuple[Literal["grid", "sharp"], str]:
     of patches, the loss is zero whatever the resolution, and the work of ``sharp`` grows with the
     cube of their number.
     """
+    if nodes_per_wave is not None:
+        return "grid", "auto: grid, as a number of nodes per wave is given"
     if problem.work_of_adhesion == 0:
         return "grid", "auto: grid, as there is no adhesion and so no loss to resolve"
     return "sharp", "auto: sharp, whose error of the loss is that of its tolerances, not of a grid"

@@ -61,6 +61,8 @@ def execute(args: argparse.Namespace) -> int:
 
         def show(line: Line) -> None:
             run = line.run
+            if not sys.stderr.isatty():  # no spinner there; half an hour of silence is too long
+                print(run.scene.name, *line_cells(line), sep="  ", file=sys.stderr, flush=True)
             progress.update(task, description=f"{run.scene.title}: {run.method}, {run.described}")
 
         lines = benchmark(QUICK if args.quick else FULL, seconds=args.budget, on_line=show)
