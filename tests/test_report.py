@@ -452,12 +452,29 @@ def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, drawn
     assert "loss_against_max_penetration" in drawn
     with style():
         axes = losses.loss_against_penetration(data).axes[0]
-    x, y = axes.containers[0].lines[0].get_data()
-    assert x.tolist() == [0.6, 0.9]
-    assert y[0] == pytest.approx(0.5 * y[1])
+    assert len(axes.containers) == len(GAMMAS)
+    for curve in axes.containers:
+        x, y = curve.lines[0].get_data()
+        assert x.tolist() == pytest.approx([0.6, 0.9], abs=0.005)  # moved apart a little
+        assert y[0] == pytest.approx(0.5 * y[1])
     page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "](loss_against_max_penetration.png)" in page
     assert "cycle.max_penetration = 0.6" in page
     assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
+
+
+def test_campaigns_with_one_gamma_in_common_are_drawn_for_each_hurst(file, tmp_path):
+    plan = campaign(hurst=(0.7, 0.8), gamma=(0.04,), realisations=3)
+    lower = parse_campaign(plan.text.replace("max_penetration = 0.9", "max_penetration = 0.6"))
+    values = {name: row for name, row in rows(plan).items() if row.ndim == 1}
+    data = aggregate(file, [write(tmp_path / "lower.h5", lower, values)])
+    with style():
+        axes = losses.loss_against_penetration(data).axes[0]
+    assert axes.get_title(loc="left") == r"$\gamma$ = 0.04 J/m²"
+    assert [curve.get_label() for curve in axes.containers] == ["H = 0.7", "H = 0.8"]
+    # Only the realisations that both have.
+    expected = data.cell(0.8, 0.04).values["loss_dimensionless"][:3].mean()
+    assert axes.containers[1].lines[0].get_ydata()[1] == pytest.approx(expected)
 
 
 def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):

@@ -58,7 +58,7 @@ LOSSES = (
     Illustration(
         "loss_against_m2",
         "Loss against mean square slope",
-        "Means with 95 % intervals.",
+        "Means with 95 % intervals. The curves are moved apart a little.",
         losses.loss_against_slope,
     ),
 )
@@ -82,14 +82,14 @@ SHAPES = (
     Illustration(
         "fig5_spectra_unloading",
         "Spectral density on unloading (paper's Fig. 5)",
-        "As before.",
+        "As on loading. At the largest penetration both branches are one state.",
         fields.spectra_on_unloading,
     ),
     Illustration(
         "fig8_gap_density",
         "Probability density of the separation (paper's Fig. 8)",
         "Gap outside contact, in units of each realisation's h_max; the integral is the fraction "
-        "out of contact. Middle γ.",
+        "out of contact. Middle γ. At the largest penetration both branches are one state.",
         fields.gap_density,
     ),
 )
@@ -120,7 +120,8 @@ MECHANISMS = (
     Illustration(
         "pull_off_stress",
         "Pull-off stress",
-        "Largest mean tension on unloading, means with 95 % intervals.",
+        "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
+        "a little.",
         losses.pull_off,
     ),
 )
@@ -128,8 +129,9 @@ PENETRATIONS = (
     Illustration(
         "loss_against_max_penetration",
         "Loss against the largest penetration",
-        "This campaign and those beside it that differ in max_penetration, means with 95 % "
-        "intervals, middle H.",
+        "This campaign and those beside it that differ in max_penetration: means with 95 % "
+        "intervals over the realisations that all of them have finished. The curves are moved "
+        "apart a little.",
         losses.loss_against_penetration,
     ),
 )

@@ -32,7 +32,7 @@ from ensemble.report.figures.style import (
     spread_out,
 )
 from ensemble.report.findings import typical_cell
-from ensemble.statistics import Estimate
+from ensemble.statistics import Estimate, estimates
 
 
 def loss_against_adhesion(data: Aggregate) -> Figure:
@@ -48,7 +48,7 @@ def loss_against_adhesion(data: Aggregate) -> Figure:
             [cell.estimates["loss_dimensionless"] for cell in cells],
             k,
             f"H = {hurst:g}",
-            offset=(k - (len(hursts) - 1) / 2) * 0.01 * max(data.works_of_adhesion),
+            offset=_apart(data, k, len(hursts)),
         )
         known = [(g, paper.table_1(hurst, g)) for g in data.works_of_adhesion]
         quoted = [(g, value) for g, value in known if value is not None]
@@ -74,7 +74,10 @@ def loss_against_slope(data: Aggregate) -> Figure:
     """W~ against the mean square slope m2, one curve for each γ, with intervals."""
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
     axes = figure.axes[0]
-    for k, gamma in shown_gammas(data):
+    shown = shown_gammas(data)
+    slopes = [cell.estimates["m2"].mean for cell in data.cells if cell.done]
+    apart = 0.012 * (max(slopes) - min(slopes))
+    for place, (k, gamma) in enumerate(shown):
         cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
         cells.sort(key=lambda cell: cell.estimates["m2"].mean)
         _errorbar(
@@ -83,11 +86,12 @@ def loss_against_slope(data: Aggregate) -> Figure:
             [cell.estimates["loss_dimensionless"] for cell in cells],
             k,
             gamma_label(gamma),
+            offset=(place - (len(shown) - 1) / 2) * apart,
         )
     axes.set_xlabel("mean square slope $m_2$")
     axes.set_ylabel(r"loss $\tilde W$")
     axes.set_ylim(bottom=0)
-    axes.legend(loc="best")
+    legend_above(figure, axes.get_legend_handles_labels()[0], MOST_CURVES)
     return figure
 
 
@@ -97,33 +101,68 @@ def of_penetration(data: Aggregate) -> list[Companion]:
 
 
 def loss_against_penetration(data: Aggregate) -> Figure:
-    """W~ against the largest penetration, one curve for each γ, with intervals."""
-    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
+    """W~ against the largest penetration with intervals, from the realisations that all share.
+
+    One curve for each γ at the middle H; or for each H, if the campaigns have one γ in common.
+    """
+    figure = new_figure(1, 1, ONE_COLUMN, 65 * MM)
     axes = figure.axes[0]
     typical = typical_cell(data)
     assert typical is not None  # an aggregate has finished tasks
-    for k, gamma in shown_gammas(data):
-        found = [(data.campaign.cycle.max_penetration, data.cell(typical.hurst, gamma))]
-        found += [
-            (companion.campaign.cycle.max_penetration, companion.cell(typical.hurst, gamma))
-            for companion in of_penetration(data)
+    curves = [
+        (k, gamma_label(gamma), found)
+        for k, gamma in shown_gammas(data)
+        if len(found := _by_penetration(data, typical.hurst, gamma)) > 1
+    ]
+    title = f"H = {typical.hurst:g}"
+    if len(curves) < 2:
+        common = [
+            gamma
+            for gamma in data.works_of_adhesion
+            if any(len(_by_penetration(data, hurst, gamma)) > 1 for hurst in data.hursts)
         ]
-        done = sorted(
-            (
-                (top, cell.estimates["loss_dimensionless"])
-                for top, cell in found
-                if cell and cell.done
-            ),
-            key=lambda pair: pair[0],
+        gamma = common[len(common) // 2] if common else typical.work_of_adhesion
+        title = gamma_label(gamma)
+        curves = [
+            (k, f"H = {hurst:g}", _by_penetration(data, hurst, gamma))
+            for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES))
+        ]
+        curves = [curve for curve in curves if curve[2]]
+    tops = [top for _, _, found in curves for top in found]
+    apart = 0.012 * (max(tops, default=1.0) - min(tops, default=0.0))
+    for place, (k, label, found) in enumerate(curves):
+        _errorbar(
+            axes,
+            np.array(list(found)),
+            list(found.values()),
+            k,
+            label,
+            offset=(place - (len(curves) - 1) / 2) * apart,
         )
-        x = np.array([top for top, _ in done])
-        _errorbar(axes, x, [estimate for _, estimate in done], k, gamma_label(gamma))
     axes.set_xlabel(r"largest penetration $\Delta_\mathrm{max}/h_\mathrm{max}$")
     axes.set_ylabel(r"loss $\tilde W$")
     axes.set_ylim(bottom=0)
-    label_panel(axes, f"H = {typical.hurst:g}")
-    axes.legend(loc="best")
+    label_panel(axes, title)
+    legend_above(figure, axes.get_legend_handles_labels()[0], len(curves) or 1)
     return figure
+
+
+def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, Estimate]:
+    """W~ of a cell by largest penetration, ascending, over the realisations of all campaigns."""
+    cells = {data.campaign.cycle.max_penetration: data.cell(hurst, gamma)}
+    for companion in of_penetration(data):
+        cells[companion.campaign.cycle.max_penetration] = companion.cell(hurst, gamma)
+    there = {top: cell for top, cell in sorted(cells.items()) if cell is not None and cell.done}
+    if not there:
+        return {}
+    shared = set.intersection(*(set(cell.seed.tolist()) for cell in there.values()))
+    if not shared:
+        return {}
+    losses = [
+        cell.values["loss_dimensionless"][np.isin(cell.seed, list(shared))]
+        for cell in there.values()
+    ]
+    return dict(zip(there, estimates(np.array(losses)), strict=True))
 
 
 def loss_by_mechanism(data: Aggregate) -> Figure:
@@ -207,7 +246,8 @@ def pull_off(data: Aggregate) -> Figure:
     """Largest mean tension on unloading against γ, for each H, with intervals."""
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
     axes = figure.axes[0]
-    for k, hurst in enumerate(spread_out(data.hursts, MOST_CURVES)):
+    hursts = spread_out(data.hursts, MOST_CURVES)
+    for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
         _errorbar(
             axes,
@@ -215,6 +255,7 @@ def pull_off(data: Aggregate) -> Figure:
             [cell.estimates["pull_off_stress"] for cell in cells],
             k,
             f"H = {hurst:g}",
+            offset=_apart(data, k, len(hursts)),
             unit=1e3,
         )
     axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
@@ -239,6 +280,11 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
     axes.tick_params(right=False)
     right = axes.secondary_yaxis("right", functions=(dimensionless, in_kilopascal))
     right.set_ylabel(r"$\tilde\sigma$ at the mean $h_\mathrm{max}$")
+
+
+def _apart(data: Aggregate, k: int, count: int) -> float:
+    """How far the k-th curve over γ is moved aside, so that intervals can be told apart."""
+    return (k - (count - 1) / 2) * 0.01 * max(data.works_of_adhesion)
 
 
 def _cells(data: Aggregate) -> list[Cell]:
