@@ -1,36 +1,52 @@
-"""What computed a results file: versions for its root attributes."""
+"""What is installed, and what computed a results file: versions as texts."""
 
 from __future__ import annotations
 
+import platform
 import sys
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
 from ensemble.ranks import library_version
 
+_PACKAGES = ("hysteron", "numpy", "scipy", "numba", "pyfftw", "h5py", "mpi4py")
+
 
 def versions() -> dict[str, str]:
-    """Return the versions of hysteron, its commit, Python, numpy, MPI, HDF5 and FFTW."""
-    import h5py
-    import numpy as np
-
+    """Return the root attributes of a results file: versions, commit, and the MPI in use."""
     return {
-        "hysteron_version": hysteron_version(),
+        "hysteron_version": _package("hysteron", missing="unknown"),
         "commit": commit(),
-        "python": sys.version.split()[0],
-        "numpy": np.__version__,
-        "mpi": library_version(),
-        "hdf5": h5py.version.hdf5_version + (" parallel" if h5py.get_config().mpi else " serial"),
-        "fftw": _fftw_version(),
+        "python": platform.python_version(),
+        "numpy": _package("numpy"),
+        "mpi": _short(library_version()),
+        "hdf5": _hdf5(),
+        "fftw": _fftw(),
     }
 
 
-def hysteron_version() -> str:
-    """Return the version of the installed distribution."""
-    try:
-        return metadata.version("hysteron")
-    except metadata.PackageNotFoundError:
-        return "unknown"
+def installed() -> dict[str, str]:
+    """Version texts by name: the packages, python, mpi, hdf5 and fftw; or why one does not load.
+
+    Does not initialise MPI: where this process has not loaded it, ``mpi`` says so.
+    """
+    mpi = sys.modules.get("mpi4py.MPI")
+    return {
+        "python": platform.python_version(),
+        **{name: _package(name) for name in _PACKAGES},
+        "hdf5": _or_reason(_hdf5),
+        "fftw": _or_reason(_fftw),
+        "mpi": _short(mpi.Get_library_version()) if mpi else "not loaded",
+    }
+
+
+def last_lines(text: str, count: int = 2) -> str:
+    """Return the last lines of a message that say something, as one line."""
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    # Rulers and empty lines of a launcher's message say nothing.
+    telling = [line for line in lines if any(c.isalnum() for c in line)]
+    return " / ".join(telling[-count:])[:300] or "no message"
 
 
 def commit() -> str:
@@ -56,8 +72,35 @@ def commit() -> str:
     return "unknown"
 
 
-def _fftw_version() -> str:
+def _package(name: str, missing: str = "not installed") -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return missing
+
+
+def _hdf5() -> str:
+    import h5py
+
+    return f"{h5py.version.hdf5_version} {'parallel' if h5py.get_config().mpi else 'serial'}"
+
+
+def _fftw() -> str:
     import pyfftw
 
-    version = pyfftw.fftw_version
-    return version.decode() if isinstance(version, bytes) else str(version)
+    version = pyfftw.fftw_version  # such as "fftw-3.3.10-sse2-avx"; bytes in some builds
+    text = version.decode() if isinstance(version, bytes) else str(version)
+    return text.removeprefix("fftw-")
+
+
+def _or_reason(text: Callable[[], str]) -> str:
+    try:
+        return text()
+    except (ImportError, RuntimeError, OSError, AttributeError) as error:
+        return f"does not load: {last_lines(str(error))}"
+
+
+def _short(library: str) -> str:
+    """Cut an MPI's description of itself, which can be a page of build options, to its name."""
+    lines = library.strip("\0 \n").splitlines() or ["unknown"]
+    return " ".join(lines[0].split(", ident")[0].split())

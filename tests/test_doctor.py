@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
-from ensemble import doctor
+from ensemble import doctor, launch, versions
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
     code = "import sys; from ensemble.command import main; sys.exit(main())"
     return subprocess.run(
         [sys.executable, "-c", code, "doctor", *options],
-        env=doctor.launch_environment() | env,
+        env=launch.launch_environment(2) | env,
         cwd=Path(__file__).parent.parent,
         capture_output=True,
         text=True,
@@ -56,7 +56,7 @@ def test_text_names_the_writer_and_every_library() -> None:
 
 
 def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path: Path) -> None:
-    if doctor.launcher() is None:
+    if launch.launcher() is None:
         pytest.skip("no mpirun here")
     # As the other MPI's mpirun does to these ranks: two processes, each alone in its world.
     wrong = tmp_path / "mpirun"
@@ -98,7 +98,7 @@ def test_unwritable_folder_is_one_sentence() -> None:
 
 def test_versions_are_texts_and_do_not_start_mpi() -> None:
     code = (
-        "import json, sys; from ensemble.doctor import versions; v = versions(); "
+        "import json, sys; from ensemble.versions import installed; v = installed(); "
         "print(json.dumps([v, 'mpi4py.MPI' in sys.modules]))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -107,3 +107,10 @@ def test_versions_are_texts_and_do_not_start_mpi() -> None:
     assert all(isinstance(text, str) and text for text in texts.values())
     if not loaded:
         assert texts["mpi"] == "not loaded"
+
+
+def test_a_results_file_tells_the_versions_that_doctor_tells(findings: dict[str, Any]) -> None:
+    written, told = versions.versions(), findings["versions"]
+    assert written["hysteron_version"] == told["hysteron"]
+    for name in ("python", "numpy", "hdf5", "fftw"):
+        assert written[name] == told[name]

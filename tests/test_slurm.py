@@ -22,7 +22,7 @@ from pathlib import Path
 import pytest
 from campaign_support import CAMPAIGN
 
-from ensemble import doctor
+from ensemble import launch
 from ensemble.schema import DONE
 from ensemble.store import Results
 
@@ -141,7 +141,7 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
     plugin = "disabled" if recent else "cgroup/v1"
     (folder / "cgroup.conf").write_text(f"CgroupPlugin={plugin}\n")
     # As a user's shell: nothing of pytest's own batch job, if there is one.
-    env = {k: v for k, v in doctor.launch_environment(3).items() if not k.startswith("SLURM")}
+    env = {k: v for k, v in launch.launch_environment(3).items() if not k.startswith("SLURM")}
     env |= {"PATH": PATH, "SLURM_CONF": str(folder / "slurm.conf")}
     cluster = Cluster(folder, env)
     daemons: list[subprocess.Popen[bytes]] = []
@@ -208,7 +208,7 @@ exec {sys.executable} {ROOT}/tests/fake_run.py "step=$step log={tmp_path}/begun"
 """
     )
     hysteron.chmod(0o755)
-    launcher = doctor.launcher()
+    launcher = launch.launcher()
     if launcher is None:
         pytest.skip("no mpirun here")
     cluster.env |= {"HYSTERON": str(hysteron), "LAUNCHER": f"{launcher} -n 2"}
