@@ -16,6 +16,7 @@ at any time what is in flight, and a stop is over when everything is answered.
 
 from __future__ import annotations
 
+import heapq
 import math
 import signal
 import threading
@@ -35,8 +36,9 @@ Collect = Callable[["Outcome"], None]
 MASTER = 0
 # Sleep between two looks for a message, growing from the first to the second value, in s.
 SHORTEST_PAUSE, LONGEST_PAUSE = 1e-3, 5e-3
-# Tasks shorter than this are queued one ahead on each worker, so that it never waits, in s.
-QUEUE_AHEAD_BELOW = 0.05
+# A worker holds so much work ahead, by measured times in s, but at most so many tasks: it need not
+# wait for the next short one while the master sleeps.
+AHEAD, MOST_AHEAD = 0.05, 32
 # How often a task in progress looks whether it is to stop, in s.
 WATCH_INTERVAL = 0.5
 
@@ -232,15 +234,18 @@ class Master:
         self._tick = tick
         self._clock = clock
         self._sleep = sleep
-        self._load = dict.fromkeys(range(1, channel.size), 0)
-        self._idle = set(self._load)
+        # Of each worker, the tasks that it was sent and has not answered, with the mean times of
+        # their groups: nothing is queued behind a task of a group that was not measured.
+        self._sent: dict[int, dict[int, float]] = {r: {} for r in range(1, channel.size)}
+        # Workers that may have room, the emptiest first (entries go stale).
+        self._room = [(0, rank) for rank in self._sent]
         self._halted: float | None = None
         self._reason: str | None = None
 
     @property
     def in_flight(self) -> int:
         """Tasks handed out and not answered."""
-        return sum(self._load.values())
+        return sum(map(len, self._sent.values()))
 
     def run(self) -> str | None:
         """Hand out until nothing waits and everything is answered.
@@ -258,7 +263,7 @@ class Master:
         pause = SHORTEST_PAUSE
         self._consider_stopping()
         self._hand_out()
-        while self._load and any(self._load.values()):
+        while any(self._sent.values()):
             self._consider_stopping()
             message = self._channel.poll()
             if message is None:
@@ -283,7 +288,7 @@ class Master:
     def _halt(self, reason: str) -> None:
         if self._halted is None:
             self._halted, self._reason = self._clock(), reason
-            for rank in self._load:
+            for rank in self._sent:
                 self._channel.send(rank, ("halt",), urgent=True)
 
     def _receive(self, rank: int, message: tuple[Any, ...]) -> None:
@@ -291,38 +296,45 @@ class Master:
         if kind == "stop":  # a worker was told to stop, by a signal say
             self._halt(message[1])
             return
-        self._load[rank] -= 1
-        self._idle.add(rank)
         if kind == "given up":
+            self._answered(rank, message[1])
             self._hand_out()
             return
         outcome: Outcome = message[1]
+        self._answered(rank, outcome.task)
         if outcome.error is None:
             self._schedule.measured(self._group_of[outcome.task], outcome.seconds)
         self._hand_out()
         self._collect(outcome)
 
+    def _answered(self, rank: int, task: int) -> None:
+        del self._sent[rank][task]
+        heapq.heappush(self._room, (len(self._sent[rank]), rank))
+
     def _hand_out(self) -> None:
-        """Give every worker that has room a task, while there are any."""
-        mean = self._schedule.mean_estimate
-        depth = 2 if mean is not None and mean < QUEUE_AHEAD_BELOW else 1
-        while self._idle and self._halted is None and self._schedule.waiting:
-            # An empty-handed worker goes first.
-            rank = min(self._idle, key=lambda r: (self._load[r], r))
-            if self._load[rank] >= depth:
-                return
+        """Give every worker that has room a task, while there are any; the emptiest goes first."""
+        while self._room and self._halted is None and self._schedule.waiting:
+            load, rank = self._room[0]
+            sent = self._sent[rank]
+            if len(sent) != load or not self._has_room(sent):
+                heapq.heappop(self._room)
+                continue
             task = self._schedule.take(self._limits.time_left())
             if task is None:
                 return
-            self._load[rank] += 1
-            if self._load[rank] >= depth:
-                self._idle.discard(rank)
+            seconds = self._schedule.mean(self._group_of[task])
+            sent[task] = math.inf if seconds is None else seconds
+            heapq.heapreplace(self._room, (len(sent), rank))
             self._channel.send(rank, ("task", task))
 
+    @staticmethod
+    def _has_room(sent: Mapping[int, float]) -> bool:
+        return not sent or (len(sent) <= MOST_AHEAD and sum(sent.values()) < AHEAD)
+
     def _dismiss(self) -> None:
-        for rank in self._load:
+        for rank in self._sent:
             self._channel.send(rank, ("dismissed",))
-        waiting = set(self._load)
+        waiting = set(self._sent)
         while waiting:
             message = self._channel.poll()
             if message is None:

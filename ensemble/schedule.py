@@ -71,11 +71,15 @@ class Schedule:
 
     def estimate(self, group: Hashable) -> float | None:
         """Return the estimated time of one task of a group in s; None if nothing is known yet."""
+        mean, scale = self.mean(group), self._scale
+        if mean is not None or scale is None:
+            return mean
+        return self._groups[group].prior * scale
+
+    def mean(self, group: Hashable) -> float | None:
+        """Return the mean measured time of a task of a group in s; None if none was measured."""
         entry = self._groups[group]
-        if entry.count:
-            return entry.seconds / entry.count
-        scale = self._scale
-        return None if scale is None else entry.prior * scale
+        return entry.seconds / entry.count if entry.count else None
 
     @property
     def mean_estimate(self) -> float | None:

@@ -10,6 +10,8 @@ import time
 import pytest
 
 from ensemble.dispatch import (
+    AHEAD,
+    MOST_AHEAD,
     GivenUp,
     Limits,
     Master,
@@ -86,11 +88,11 @@ class SimulatedRanks:
         return None
 
 
-def simulate(workers, seconds, groups=None, limits=None, **ranks):
+def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **ranks):
     tasks = list(range(len(seconds)))
     group_of = groups or dict.fromkeys(tasks, 0)
     schedule = Schedule(tasks, group_of, dict.fromkeys(set(group_of.values()), 1.0))
-    channel = SimulatedRanks(workers, seconds, **ranks)
+    channel = kind(workers, seconds, **ranks)
     collected: list[Outcome] = []
     master = Master(
         channel,
@@ -142,6 +144,39 @@ def test_short_tasks_are_queued_ahead():
     channel, collected, _, _ = simulate(4, [2e-3] * 4000)
     assert len(collected) == 4000
     assert channel.now <= 1.15 * channel.busy / 4
+
+
+def test_tasks_of_no_time_do_not_wait_for_the_sleeping_master():
+    channel, collected, _, _ = simulate(2, [0.3e-3] * 4000)
+    assert sorted(o.task for o in collected) == list(range(4000))
+    assert channel.now <= 1.15 * channel.busy / 2
+
+
+def test_what_is_queued_is_short_and_never_behind_a_long_task():
+    """Groups a hundred times apart: a worker holds one long task, or some short ones."""
+    seconds = [1.0 if i % 20 == 0 else 0.01 for i in range(2000)]
+    groups = {i: int(seconds[i] == 1.0) for i in range(2000)}
+    held: dict[int, dict[int, float]] = {rank: {} for rank in (1, 2, 3)}
+    most = 0
+
+    class Watched(SimulatedRanks):
+        def send(self, to, message, *, urgent=False):
+            nonlocal most
+            super().send(to, message, urgent=urgent)
+            if message[0] == "task":
+                assert sum(held[to].values()) < 1.001 * AHEAD
+                held[to][message[1]] = self._seconds[message[1]]
+                most = max(most, len(held[to]))
+
+        def poll(self, *, urgent=False):
+            message = super().poll(urgent=urgent)
+            if message is not None and message[1][0] == "outcome":
+                del held[message[0]][message[1][1].task]
+            return message
+
+    channel = simulate(3, seconds, groups, kind=Watched)[0]
+    assert 1 < most <= MOST_AHEAD + 1
+    assert channel.now <= 1.02 * channel.busy / 3
 
 
 def test_an_idle_master_rarely_looks():
