@@ -160,6 +160,36 @@ def test_failures_and_growth_under_mpirun(tmp_path, whole):
     assert differences(out, whole) == []
 
 
+def test_growing_from_10_to_20_realisations_computes_exactly_the_new_ones(tmp_path):
+    out, log = tmp_path / "r.h5", tmp_path / "log"
+    words = ("run", write_campaign(tmp_path, realisations="10"), "--out", out)
+    assert hysteron(*words, ranks=3, fake="").returncode == 0
+    before = rows_of(out)
+    assert len(before) == 40
+    words = ("run", write_campaign(tmp_path, realisations="20"), "--out", out)
+    process = hysteron(*words, ranks=3, fake=f"log={log}")
+    assert process.returncode == 0, process.stderr
+    assert "80 of 80 tasks done; 40 computed" in process.stderr
+    new = [f"{h}:{g}:{r}" for h in (0.7, 0.8) for g in (0.01, 0.04) for r in range(10, 20)]
+    assert sorted(log.read_text().split()) == new
+    after = rows_of(out)
+    assert {task: after[task] for task in before} == before
+    assert set(after) - set(before) == set(new)
+    whole = tmp_path / "whole.h5"
+    assert hysteron("run", tmp_path / "c.toml", "--out", whole, fake="").returncode == 0
+    assert differences(out, whole) == []
+
+
+def rows_of(path) -> dict[str, tuple]:
+    """Return times, rank and loss of each task, named as the fake task's log has it."""
+    with Results(path) as results:
+        columns = [results.column(n).tolist() for n in ("wall_time", "cpu_time", "rank", "loss")]
+        return {
+            f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}": values
+            for task, *values in zip(results.tasks(), *columns, strict=True)
+        }
+
+
 def test_the_rank_0_writer_writes_the_same_file(tmp_path, whole):
     """As where HDF5 has no MPI."""
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
