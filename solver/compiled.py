@@ -19,17 +19,30 @@ from numba import config, njit
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile ``function`` at its first call (numba, nopython), keeping the result on disk."""
+    """Compile ``function`` at its first call (numba, nopython), keeping the result on disk.
+
+    Division by zero gives inf or NaN, as in numpy: a test before every division would keep the
+    loops out of vector registers.
+    """
+    return _compile(function)
+
+
+def compiled_sums(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile ``function`` likewise, and let sums be taken in any order (vector registers)."""
+    return _compile(function, fastmath={"reassoc", "contract", "nsz"})
+
+
+def _compile(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
     folder = _cache_folder()
     dispatcher: Callable[..., Any]
     if folder is None:
-        dispatcher = njit(function)
+        dispatcher = njit(error_model="numpy", **options)(function)
         return dispatcher
     settings: Any = config  # its attributes are made at run time
     before = settings.CACHE_DIR
     try:
         settings.CACHE_DIR = str(folder)  # read when the function is decorated
-        dispatcher = njit(cache=True)(function)
+        dispatcher = njit(cache=True, error_model="numpy", **options)(function)
     finally:
         settings.CACHE_DIR = before
     return dispatcher

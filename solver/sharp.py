@@ -10,7 +10,7 @@ separation.
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -22,28 +22,17 @@ from solver.profile import Array
 from solver.sharp_fields import fields_of
 from solver.sharp_gaps import GapField
 from solver.sharp_opening import work_of_gaps
-from solver.sharp_path import EdgeMechanics, outward, without_gaps, without_patches
+from solver.sharp_path import EdgeMechanics, Point
 from solver.sharp_source import StressSource
 from solver.sharp_touch import Nucleation, Touch
 
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
 _CORRECTED = 0.05  # longest correction of a prediction, in λ_min
-_NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
-_DESCENT_LIMIT = 50_000
 _FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
 _RESOLUTION = 0.02  # resolution of a jump's separation, in units of accuracy·h_max
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
 _BEND = 3e-4  # largest relative error of the trapezoidal rule over one step
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten that rule
-
-
-@dataclass(frozen=True)
-class _Point:
-    """A stable equilibrium on a branch: q0 s, field and tangent."""
-
-    at: float
-    field: GapField
-    tangent: Array
 
 
 class SharpMethod(Method):
@@ -64,11 +53,10 @@ class SharpMethod(Method):
         profile, modulus = problem.profile, problem.half_space.modulus
         self.accuracy = accuracy
         self.q0 = profile.q0
-        self.source = StressSource(profile)
+        tolerance = float(np.clip(_FIELD_ACCURACY * accuracy, 1e-14, 1e-5))
+        self.source = StressSource(profile, tolerance)
         critical = 4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus))
-        self.edges = EdgeMechanics(
-            self.source, critical, float(np.clip(_FIELD_ACCURACY * accuracy, 1e-14, 1e-5))
-        )
+        self.edges = EdgeMechanics(self.source, critical, tolerance)
         self.nucleation = Nucleation(problem, self.edges)
         self.h_max = profile.h_max * self.q0
         self.resolution = _RESOLUTION * accuracy * self.h_max
@@ -159,16 +147,19 @@ class SharpMethod(Method):
             internal=gaps,
         )
 
-    def _slope(self, point: _Point) -> float:
-        """dp/d(q0 s) along the branch."""
-        motion = outward(point.field.gaps) * self._rate(point)
-        return float(point.field.pressure_by_separation + point.field.derivatives[1] @ motion)
-
-    @staticmethod
-    def _rate(point: _Point) -> Array:
-        """dn/d(q0 s) of every edge along the branch."""
-        by_separation = point.field.opening_by_separation.ravel()
-        return -np.asarray(np.linalg.solve(point.tangent, by_separation))
+    def _shifted(self, state: ContactState, field: GapField, at: float) -> ContactState:
+        """State at q0 s = ``at`` with the edges of ``state``: p is linear in s, U quadratic."""
+        half = self.problem.half_space.modulus / 2
+        way = at - field.separation
+        pressure = field.pressure + field.pressure_by_separation * way
+        work = -np.pi * way * (field.pressure + pressure)
+        return replace(
+            state,
+            separation=at / self.q0,
+            mean_stress=pressure * half,
+            elastic_energy=state.elastic_energy + work * half / self.q0**2,
+            stiffness=float("nan"),
+        )
 
     # ------------------------------------------------------------------ following
 
@@ -192,23 +183,21 @@ class SharpMethod(Method):
             if point is None:
                 gaps = yield from self._jump(gaps, at, branch)
             elif at == target:
-                yield self._state(point.field, at, self._slope(point), separation)
+                yield self._state(point.field, at, point.slope, separation)
             else:
                 at, gaps = yield from self._branch(point, target, separation, branch)
         if not len(gaps) and at != target:
             yield self.detached(separation)
 
     def _branch(
-        self, point: _Point, target: float, separation: float, branch: Branch
+        self, point: Point, target: float, separation: float, branch: Branch
     ) -> Generator[ContactState | Jump, None, tuple[float, Array]]:
         """Walk along a stable branch to the target or through its next jump."""
         wanted = np.inf
-        slope = self._slope(point)
+        slope = point.slope
         shown = (point.at, slope)
-        look, trail = (
-            point.at,
-            [point],
-        )  # where to look for touches next; the way since the last look
+        # where to look for touches next; the way since the last look
+        look, trail = point.at, [point]
         while point.at != target:
             step = self._next_step(point, target, wanted)
             reached = self._advance(point, step, target)
@@ -216,11 +205,14 @@ class SharpMethod(Method):
                 if abs(step) > self.resolution:
                     wanted = max(0.25 * abs(step), 0.999 * self.resolution)
                     continue
-                yield self._state(point.field, point.at, slope)
+                last = self._state(point.field, point.at, slope)
+                yield last
                 at = target if step == target - point.at else point.at + step
-                gaps = yield from self._jump(point.field.gaps, at, branch)
+                gaps = yield from self._jump(
+                    point.field.gaps, at, branch, self._shifted(last, point.field, at)
+                )
                 return at, gaps
-            next_slope = self._slope(reached)
+            next_slope = reached.slope
             error = self._trapezoid_error(shown, reached, next_slope)
             if error > 4 and abs(step) > self.resolution:
                 wanted = 0.5 * abs(step)
@@ -231,16 +223,18 @@ class SharpMethod(Method):
                     touched, clearance = self._touched(trail)
                     if touched is not None:
                         point, touches = touched
-                        yield self._state(point.field, point.at, self._slope(point))
+                        last = self._state(point.field, point.at, point.slope)
                         gaps = yield from self._jump(
-                            point.field.gaps, point.at, branch, touches=touches
+                            point.field.gaps, point.at, branch, last, touches=touches
                         )
                         return point.at, gaps
                     look, trail = reached.at - clearance / _FASTEST_CLOSING, [reached]
-            small = self._without_small(reached.field.gaps)
+            small = self.edges.without_small(reached.field.gaps)
             if small is not None:
-                yield self._state(reached.field, reached.at, next_slope)
-                gaps = yield from self._jump(reached.field.gaps, reached.at, branch, start=small)
+                last = self._state(reached.field, reached.at, next_slope)
+                gaps = yield from self._jump(
+                    reached.field.gaps, reached.at, branch, last, start=small
+                )
                 return reached.at, gaps
             point, slope, wanted = reached, next_slope, 2 * abs(step)
             if point.at == target:
@@ -250,27 +244,25 @@ class SharpMethod(Method):
                 shown = (point.at, slope)
         return target, point.field.gaps
 
-    def _next_step(self, point: _Point, target: float, wanted: float) -> float:
+    def _next_step(self, point: Point, target: float, wanted: float) -> float:
         """Next step in q0 s: no edge moves too far by prediction, the target is not passed."""
-        fastest = float(np.abs(self._rate(point)).max())
+        fastest = float(np.abs(point.rate).max())
         size = min(wanted, _PREDICTED * self.edges.wave / max(fastest, 1e-300))
         size = max(size, 0.999 * self.resolution)
         left = target - point.at
         return left if size >= abs(left) else float(np.copysign(size, left))
 
-    def _advance(self, point: _Point, step: float, target: float) -> _Point | None:
+    def _advance(self, point: Point, step: float, target: float) -> Point | None:
         """Predict and correct; None if no stable equilibrium is within reach."""
-        motion = outward(point.field.gaps) * self._rate(point) * step
-        if np.abs(motion).max() > 2 * _PREDICTED * self.edges.wave:
+        if np.abs(point.rate * step).max() > 2 * _PREDICTED * self.edges.wave:
             return None
         at = target if step == target - point.at else point.at + step
-        return self._equilibrium(point.field.gaps + motion.reshape(-1, 2), at)
+        return self._equilibrium(point.predicted(at), at)
 
-    def _equilibrium(self, gaps: Array, at: float) -> _Point | None:
-        found = self.edges.equilibrium(gaps, at, _CORRECTED * self.edges.wave)
-        return None if found is None else _Point(at, *found)
+    def _equilibrium(self, gaps: Array, at: float) -> Point | None:
+        return self.edges.equilibrium(gaps, at, _CORRECTED * self.edges.wave)
 
-    def _trapezoid_error(self, shown: tuple[float, float], point: _Point, slope: float) -> float:
+    def _trapezoid_error(self, shown: tuple[float, float], point: Point, slope: float) -> float:
         """Error of the trapezoidal rule since the last state shown, in units of what is allowed."""
         span = abs(point.at - shown[0])
         scale = max(abs(point.field.pressure), _QUIET * self.h_max)  # p = h_max is σ~ = 1
@@ -283,11 +275,13 @@ class SharpMethod(Method):
         gaps: Array,
         at: float,
         branch: Branch,
+        before: ContactState | None = None,
         start: Array | None = None,
         touches: list[Touch] | None = None,
     ) -> Generator[ContactState | Jump, None, Array]:
         """Descend at fixed separation from ``gaps`` (or ``start``): before, jump, after."""
-        before = self._state(self.edges.field(gaps, at) if len(gaps) else None, at)
+        if before is None:
+            before = self._state(self.edges.field(gaps, at) if len(gaps) else None, at)
         if len(gaps):
             yield before
         point = self._relax(gaps if start is None else start, at, touches or [])
@@ -299,7 +293,7 @@ class SharpMethod(Method):
             point = grown
         after = self.detached(at / self.q0)
         if point is not None:
-            after = self._state(point.field, at, self._slope(point))
+            after = self._state(point.field, at, point.slope)
         period = self.problem.profile.period
         drop = (before.energy - after.energy) / period
         kind, length = classify(before.edges, after.edges, period)
@@ -323,33 +317,15 @@ class SharpMethod(Method):
             np.abs(one - other).max() < 100 * self.edges.settled
         )
 
-    def _relax(self, gaps: Array, at: float, touches: list[Touch]) -> _Point | None:
+    def _relax(self, gaps: Array, at: float, touches: list[Touch]) -> Point | None:
         """Descend to the next minimum of the energy; None when no contact is left."""
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
-        held = None
-        for _ in range(_DESCENT_LIMIT):
-            if not len(gaps):
-                return None
-            moved, held = self.edges.descend(gaps, at, held)
-            size = float(np.abs(moved - gaps).max())
-            gaps = moved
-            small = self._without_small(gaps)
-            if small is not None:
-                gaps = small
-            elif size < _NEAR * self.edges.wave:
-                point = self._equilibrium(gaps, at)
-                if point is not None:
-                    return point
-        raise RuntimeError(f"the descent at s = {at / self.q0} m did not end")
-
-    def _without_small(self, gaps: Array) -> Array | None:
-        """Edges without closed gaps or vanished patches, or None if there are none."""
-        length, patch = self.edges.widths(gaps)
-        if length.min() < self.edges.smallest and len(gaps) > 1:
-            return without_gaps(gaps, length >= self.edges.smallest)
-        if patch.min() < self.edges.smallest:
-            return without_patches(gaps, patch >= self.edges.smallest)
+        while len(gaps):
+            found = self.edges.relax(gaps, at, _CORRECTED * self.edges.wave)
+            if isinstance(found, Point):
+                return found
+            gaps = found
         return None
 
     # ------------------------------------------------------------------ touching
@@ -357,7 +333,7 @@ class SharpMethod(Method):
     def _ready(self, minima: list[Touch]) -> list[Touch]:
         return [t for t in minima if self.nucleation.clearance(t) <= 0]
 
-    def _touched(self, trail: list[_Point]) -> tuple[tuple[_Point, list[Touch]] | None, float]:
+    def _touched(self, trail: list[Point]) -> tuple[tuple[Point, list[Touch]] | None, float]:
         """First point of the trail at which surfaces touch inside a gap, with the touches.
 
         Else None and the least clearance at the end of the trail. The trail starts at a point known
@@ -386,8 +362,7 @@ class SharpMethod(Method):
                 # secant, kept off the ends
                 share = min(max(clear_value / (clear_value - hit_value), 0.02), 0.98)
             aim = clear + (hit.at - clear) * share
-            motion = outward(hit.field.gaps) * self._rate(hit) * (aim - hit.at)
-            point = self._equilibrium(hit.field.gaps + motion.reshape(-1, 2), aim)
+            point = self._equilibrium(hit.predicted(aim), aim)
             if point is None:
                 break
             minima = self.nucleation.minima(point.field)

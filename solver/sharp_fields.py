@@ -43,7 +43,7 @@ def fields_of(problem: Problem, field: GapField | None, separation: float, n: in
     for k, (left, right) in enumerate(field.gaps):
         inside = (place > left) & (place < right)
         fine = fine_opening(field, k, _FIELD_NODES)
-        gap[inside] = _sum_modes(field.table[k], place[inside], fine.modes)
+        gap[inside] = _sum_modes(field.solution.table[k], place[inside], fine.modes)
         pull[contact] += _pull(theta[contact], fine.theta, fine.opening * fine.weight)
     stress = np.zeros(n)
     full = field.source.sample(theta[contact])[:, 0]

@@ -32,31 +32,39 @@ invariance: moving all edges together is moving the profile, whose source is S_f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotrs
 
-from solver.compiled import compiled
+from solver.compiled import compiled, compiled_sums
 from solver.profile import Array
-from solver.sharp_map import ALPHA, LEFT, RIGHT, convergence, map_gaps, theta_at
+from solver.sharp_linear import cholesky, solve_factored
+from solver.sharp_map import ALPHA, LEFT, convergence, map_gaps, theta_at
 from solver.sharp_source import StressSource, gap_moments
 
-MODE_COUNTS = np.array([6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 96, 128], dtype=np.int64)
-"""Numbers of nodes M a gap may have."""
 
+class Rules(NamedTuple):
+    """Gauss-Chebyshev rules of all mode counts M, end to end, for the compiled code.
 
-@dataclass(frozen=True)
-class _Tables:
-    """Rules of all mode counts, end to end, for the compiled code.
-
-    ``start`` and ``square`` are offsets of vectors and matrices; ``eta`` and ``w`` nodes and
-    weights; ``ends`` f(-1) and f(+1) from the nodes' values; ``b`` the straight crack; ``modes``
-    U_n(η_i), rows nodes.
+    Attributes
+    ----------
+    counts : int array
+        The numbers of nodes M that a gap may have; a gap's "kind" is its place here.
+    start, square : int array
+        Offset of the vectors and of the M×M matrices of each kind.
+    eta, w : array
+        Nodes and weights.
+    ends : array, shape (2, ·)
+        f(-1) and f(+1) from the nodes' values.
+    b : array
+        The straight crack.
+    modes : array
+        U_n(η_i), rows nodes.
     """
 
+    counts: NDArray[np.int64]
     start: NDArray[np.int64]
     square: NDArray[np.int64]
     eta: Array
@@ -66,9 +74,9 @@ class _Tables:
     modes: Array
 
 
-def _tables() -> _Tables:
+def _rules(counts: NDArray[np.int64]) -> Rules:
     eta, weight, ends, b, modes = [], [], [], [], []
-    for m in MODE_COUNTS:
+    for m in counts:
         t = np.arange(m, 0, -1) * np.pi / (m + 1)  # η increasing
         w = np.pi / (m + 1) * np.sin(t) ** 2
         n = np.arange(m)
@@ -81,9 +89,10 @@ def _tables() -> _Tables:
         ends.append(np.stack([end @ (-1.0) ** n, end.sum(axis=1)]))
         b.append((straight + straight.T).ravel() / 2)
         modes.append(u.ravel())
-    return _Tables(
-        np.concatenate([[0], np.cumsum(MODE_COUNTS)]),
-        np.concatenate([[0], np.cumsum(MODE_COUNTS**2)]),
+    return Rules(
+        counts,
+        np.concatenate([[0], np.cumsum(counts)]),
+        np.concatenate([[0], np.cumsum(counts**2)]),
         np.concatenate(eta),
         np.concatenate(weight),
         np.concatenate(ends, axis=1),
@@ -92,7 +101,55 @@ def _tables() -> _Tables:
     )
 
 
-TABLES = _tables()
+RULES = _rules(
+    np.array([6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128])
+)
+
+
+class Solution(NamedTuple):
+    """Solution of (1), as the compiled code hands it on; N nodes of all gaps together.
+
+    Attributes
+    ----------
+    table : array
+        Of :func:`solver.sharp_map.map_gaps`.
+    kinds, offset : int array
+        Kind and first node of each gap.
+    theta, weight : array, shape (N,)
+        θ and X of the nodes.
+    slope : array, shape (L, 2)
+        dη/dθ at the gap ends.
+    matrix, factor : array, shape (N, N)
+        B + G and its lower Cholesky factor.
+    rhs, solved : array, shape (N, 2 or 3)
+        Loads S~, X and, if asked for, S~', and (B + G)⁻¹ of them.
+    beyond : array, shape (L, 2, 1 or 2)
+        What the modes of S and S' above M add at the ends.
+    unit_mean : float
+        Xᵀ (B + G)⁻¹ X.
+    pressure : float
+        p = 2p̄/E*.
+    f : array, shape (N,)
+        The openings over sqrt(1-η²).
+    opening : array, shape (2L,)
+        C at each gap end.
+    """
+
+    table: Array
+    kinds: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    theta: Array
+    weight: Array
+    slope: Array
+    matrix: Array
+    factor: Array
+    rhs: Array
+    solved: Array
+    beyond: Array
+    unit_mean: float
+    pressure: float
+    f: Array
+    opening: Array
 
 
 class GapField:
@@ -108,10 +165,8 @@ class GapField:
         q0 s.
     tolerance : float
         Wanted relative accuracy of the interaction between gaps.
-
-    kinds : int array, shape (L,), optional
-        Places in MODE_COUNTS, instead of those that the tolerance asks for. An iteration must keep
-        them: where they change, the field jumps by its error.
+    solution : Solution, optional
+        The solution for these gaps, if it is known already.
 
     Attributes
     ----------
@@ -119,6 +174,11 @@ class GapField:
         C at each gap end.
     pressure : float
         p = 2p̄/E*.
+
+    Raises
+    ------
+    FloatingPointError
+        If the matrix of the gaps is not positive definite to rounding.
     """
 
     def __init__(
@@ -127,63 +187,30 @@ class GapField:
         gaps: Array,
         separation: float,
         tolerance: float,
-        kinds: NDArray[np.intp] | None = None,
+        solution: Solution | None = None,
     ) -> None:
         self.source, self.gaps, self.separation = source, gaps, separation
-        self.table = map_gaps(gaps)
-        if kinds is None:
-            wanted = -np.log(tolerance) / convergence(self.table)
-            kinds = np.minimum(np.searchsorted(MODE_COUNTS, wanted), len(MODE_COUNTS) - 1)
-        self.kinds = kinds
-        self.offset = np.concatenate([[0], np.cumsum(MODE_COUNTS[self.kinds])])
-        self.theta, self.weight, self._slope, self._matrix, self.rhs, self._beyond, self.s = (
-            assemble(
-                self.table, self.kinds, self.offset, MODE_COUNTS,
-                TABLES.start, TABLES.square, TABLES.eta, TABLES.w, TABLES.b, TABLES.modes,
-                source.width, source.panels, source.x, source.w, source.coefficients,
-                source.weights, source.level_start, source.end_x, source.end_w,
-                2,
-            )
-        )  # fmt: skip
-        # The matrix is symmetric, so its transpose is Fortran order without a copy.
-        self._factor, info = dpotrf(self._matrix.T, lower=1, clean=0, overwrite_a=0)
-        if info:
+        if solution is None:
+            kinds = choose_kinds(map_gaps(gaps), -np.log(tolerance), RULES.counts)
+            solution = solve(gaps, separation, kinds, 2, RULES, source.panels)
+        if np.isnan(solution.pressure):
             raise FloatingPointError("the matrix of the gaps is not positive definite")
-        self._solved, _ = dpotrs(self._factor, self.rhs, lower=1)
-        unit = self._solved[:, 1]
-        self._unit_mean = float(self.weight @ unit)
-        self.pressure = (
-            -(2 * np.pi * separation + float(self.weight @ self._solved[:, 0])) / self._unit_mean
-        )
-        self.f = -self._solved[:, 0] - self.pressure * unit
-        self.opening = self._at_ends(self.f, 0)
+        self.solution = solution
+        self.pressure = float(solution.pressure)
+        self.opening = solution.opening.reshape(-1, 2)
 
-    def _at_ends(self, f: Array, field: int | None) -> Array:
-        """C at each gap end of the density f, with the high modes of S (0), S' (1) or none."""
-        out = edge_openings(
-            f[:, None], self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends
-        )
-        result: Array = out[:, 0].reshape(-1, 2)
-        if field is not None:
-            result = result - np.sqrt(2 * self._slope) * self._beyond[:, :, field]
-        return result
-
-    def _regular(self, f: Array) -> Array:
-        """C of regular densities, shape (2L, columns), from their columns of nodal values."""
-        out: Array = edge_openings(
-            f, self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends
-        )
-        return out
-
-    @cached_property
+    @property
     def pressure_by_separation(self) -> float:
         """∂p/∂(q0 s) at fixed edges; negative."""
-        return float(-2 * np.pi / self._unit_mean)
+        return -2 * np.pi / float(self.solution.unit_mean)
 
     @cached_property
     def opening_by_separation(self) -> Array:
         """∂C/∂(q0 s) at fixed edges, shape (L, 2)."""
-        return self._at_ends(-self.pressure_by_separation * self._solved[:, 1], None)
+        of = self.solution
+        unit = np.ascontiguousarray(-self.pressure_by_separation * of.solved[:, 1:2])
+        out: Array = edge_openings(unit, of.slope, of.kinds, of.offset, RULES.start, RULES.ends)
+        return out[:, 0].reshape(-1, 2)
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array]:
@@ -191,28 +218,106 @@ class GapField:
 
         Edges in the order of ``gaps.ravel()``; θ_f grows to the right.
         """
-        load, area = _singular_loads(
-            self.table, self._slope, self.kinds, self.offset, MODE_COUNTS, TABLES.start,
-            TABLES.square, TABLES.eta, TABLES.b, self.theta, self.weight, self._matrix, TABLES.w,
-        )  # fmt: skip
-        y, _ = dpotrs(self._factor, load, lower=1)
-        slope = self._slope.ravel()
-        side = np.tile([-1.0, 1.0], len(self.gaps))
-        p = (area + self.weight @ y) / self._unit_mean
-        y -= np.outer(self._solved[:, 1], p)
-        by_edge: Array = edge_openings(
-            y, self._slope, self.kinds, self.offset, TABLES.start, TABLES.ends
-        )
-        k = np.arange(len(slope))
-        by_edge[k ^ 1, k] += 0.5 * np.sqrt(2 * slope[k ^ 1])  # the singular opening's far end
-        strength = side * self.opening.ravel() * np.sqrt(slope / 8)
-        by_edge *= strength
-        # Translation: all edges together against the profile.
-        drift = -float(self.weight @ self._solved[:, 2]) / self._unit_mean
-        moved = self._at_ends(-self._solved[:, 2] - drift * self._solved[:, 1], 1).ravel()
-        by_edge[k, k] = 0.0
-        by_edge[k, k] = moved - by_edge.sum(axis=1)
-        return by_edge, p * strength
+        by_edge, pressure = derivatives(self.solution, RULES)
+        return by_edge, pressure
+
+
+@compiled
+def choose_kinds(table, digits, counts):  # type: ignore[no-untyped-def]  # compiled
+    """Kind of each gap whose modes leave an error of exp(-digits), or the largest kind."""
+    kinds = np.zeros(table.shape[0], dtype=np.int64)
+    for k in range(table.shape[0]):
+        wanted = digits / convergence(table[k])
+        while kinds[k] < counts.shape[0] - 1 and counts[kinds[k]] < wanted:
+            kinds[k] += 1
+    return kinds
+
+
+@compiled
+def solve(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-untyped-def]
+    """Solve (1) with the source S (``fields`` 1), or S and S' (2) for :func:`derivatives`.
+
+    An iteration must keep the kinds: where they change, the field jumps by its error. The pressure
+    is NaN if the matrix is not positive definite to rounding.
+    """
+    table = map_gaps(gaps)
+    offset = np.zeros(table.shape[0] + 1, dtype=np.int64)
+    for k in range(table.shape[0]):
+        offset[k + 1] = offset[k] + rules.counts[kinds[k]]
+    theta, weight, slope, matrix, rhs, beyond = _assemble(
+        table, kinds, offset, fields, rules, panels
+    )
+    factor, definite = cholesky(matrix)
+    solved = rhs.copy()
+    opening = np.empty(2 * table.shape[0])
+    pressure = np.nan
+    unit_mean = np.nan
+    f = np.empty(theta.shape[0])
+    if definite:
+        solve_factored(factor, solved)
+        load_mean = 0.0
+        unit_mean = 0.0
+        for i in range(theta.shape[0]):
+            load_mean += weight[i] * solved[i, 0]
+            unit_mean += weight[i] * solved[i, 1]
+        pressure = -(2 * np.pi * separation + load_mean) / unit_mean
+        for i in range(theta.shape[0]):
+            f[i] = -solved[i, 0] - pressure * solved[i, 1]
+        opening = edge_openings(f.reshape(-1, 1), slope, kinds, offset, rules.start, rules.ends)[
+            :, 0
+        ].copy()
+        for k in range(table.shape[0]):
+            for side in range(2):
+                opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
+    return Solution(
+        table, kinds, offset, theta, weight, slope, matrix, factor, rhs, solved, beyond,
+        unit_mean, pressure, f, opening,
+    )  # fmt: skip
+
+
+@compiled
+def derivatives(of, rules):  # type: ignore[no-untyped-def]  # compiled
+    """∂C_e/∂θ_f, shape (2L, 2L), and ∂p/∂θ_f, shape (2L,), of a solution with S and S'."""
+    edges = 2 * of.slope.shape[0]
+    load, area = _singular_loads(
+        of.table, of.slope, of.kinds, of.offset, rules.counts, rules.start, rules.square,
+        rules.eta, rules.b, of.theta, of.weight, of.matrix, rules.w,
+    )  # fmt: skip
+    solve_factored(of.factor, load)
+    p = area
+    for i in range(load.shape[0]):
+        for e in range(edges):
+            p[e] += of.weight[i] * load[i, e]
+    p /= of.unit_mean
+    for i in range(load.shape[0]):
+        for e in range(edges):
+            load[i, e] -= of.solved[i, 1] * p[e]
+    by_edge = edge_openings(load, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+    # Translation: all edges together against the profile.
+    drift = 0.0
+    for i in range(load.shape[0]):
+        drift -= of.weight[i] * of.solved[i, 2]
+    drift /= of.unit_mean
+    moving = np.empty((load.shape[0], 1))
+    for i in range(load.shape[0]):
+        moving[i, 0] = -of.solved[i, 2] - drift * of.solved[i, 1]
+    moved = edge_openings(moving, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+    for e in range(edges):
+        slope = of.slope[e // 2, e % 2]
+        far = of.slope[e // 2, 1 - e % 2]
+        by_edge[e ^ 1, e] += 0.5 * np.sqrt(2 * far)  # the singular opening's far end
+        strength = (2 * (e % 2) - 1) * of.opening[e] * np.sqrt(slope / 8)
+        p[e] *= strength
+        for other in range(edges):
+            by_edge[other, e] *= strength
+    for e in range(edges):
+        total = 0.0
+        for other in range(edges):
+            if other != e:
+                total += by_edge[e, other]
+        slope = of.slope[e // 2, e % 2]
+        by_edge[e, e] = moved[e, 0] - np.sqrt(2 * slope) * of.beyond[e // 2, e % 2, 1] - total
+    return by_edge, p
 
 
 @compiled
@@ -237,35 +342,26 @@ def _mapped(alpha, x):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def assemble(  # type: ignore[no-untyped-def]  # compiled
-    table, kinds, offset, counts, start, square, eta, w, b, modes,
-    width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w, fields,
-):  # fmt: skip
-    """Matrix and right-hand sides of (1), with S alone (fields = 1) or S and S' (2).
+def _assemble(table, kinds, offset, fields, rules, panels):  # type: ignore[no-untyped-def]
+    """Matrix and right-hand sides of (1).
 
-    Returns θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~'), what the
-    higher modes add at the ends, and the moments.
+    Returns θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~') and what
+    the higher modes add at the ends.
     """
-    gaps_n = table.shape[0]
-    n = offset[gaps_n]
+    gaps = table.shape[0]
+    n = offset[gaps]
     theta = np.empty(n)
     weight = np.empty(n)  # dθ/dη times the weight of the rule
-    slope = np.empty((gaps_n, 2))  # dη/dθ at the ends
-    rhs = np.empty((fields + 1, n))  # S~, the unit pressure and, last, S~'
-    beyond = np.empty((gaps_n, 2, fields))
-    all_s = np.zeros((n, fields))
+    slope = np.empty((gaps, 2))  # dη/dθ at the ends
+    rhs = np.empty((n, fields + 1))
+    beyond = np.empty((gaps, 2, fields))
     matrix = np.empty((n, n))
-    for k in range(gaps_n):
-        m = counts[kinds[k]]
-        gap = table[k]
-        slope[k, 0] = 1 / theta_at(gap, -1.0)[1]
-        slope[k, 1] = 1 / theta_at(gap, 1.0)[1]
-        s = all_s[offset[k] : offset[k] + m]
-        ends = np.zeros((2, fields))
-        gap_moments(
-            gap, width, panels, node_x, node_w, coefficients, weights, level_start, end_x, end_w,
-            s, ends,
-        )  # fmt: skip
+    for k in range(gaps):
+        kind = kinds[k]
+        m = rules.counts[kind]
+        s = np.empty((m, fields))
+        ends = np.empty((2, fields))
+        gap_moments(table[k], panels, s, ends)
         for field in range(fields):
             low = 0.0
             high = 0.0
@@ -276,39 +372,61 @@ def assemble(  # type: ignore[no-untyped-def]  # compiled
                 sign = -sign
             beyond[k, 0, field] = ends[0, field] - low
             beyond[k, 1, field] = ends[1, field] - high
-        for i in range(m):
-            row = offset[k] + i
-            place = start[kinds[k]] + i
-            theta[row], stretch = theta_at(gap, eta[place])
-            weight[row] = w[place] * stretch
-            rhs[1, row] = weight[row]
-            for field in range(fields):
-                total = 0.0
-                for j in range(m):
-                    total += modes[square[kinds[k]] + i * m + j] * s[j, field]
-                rhs[2 * field, row] = w[place] * total
-            for j in range(i + 1):
-                other = start[kinds[k]] + j
-                value = b[square[kinds[k]] + i * m + j]
-                value -= (
-                    w[place] * w[other] * _mapped(gap[ALPHA], eta[place] - eta[other])
-                    + weight[row]
-                    * weight[offset[k] + j]
-                    * _periodic(theta[row] - theta[offset[k] + j])
-                ) / (4 * np.pi)
-                matrix[row, offset[k] + j] = value
-                matrix[offset[k] + j, row] = value
+        own = slice(offset[k], offset[k + 1])
+        rule = slice(rules.start[kind], rules.start[kind] + m)
+        square = slice(rules.square[kind], rules.square[kind] + m * m)
+        _own_gap(
+            table[k], rules.eta[rule], rules.w[rule], rules.b[square].reshape(m, m),
+            rules.modes[square].reshape(m, m), s, theta[own], weight[own], slope[k], rhs[own],
+            matrix[own, own],
+        )  # fmt: skip
+    _between_gaps(theta, weight, offset, matrix)
+    return theta, weight, slope, matrix, rhs, beyond
+
+
+@compiled
+def _own_gap(  # type: ignore[no-untyped-def]  # compiled
+    gap, eta, w, b, modes, s, theta, weight, slope, rhs, matrix
+):
+    """Nodes, loads and diagonal block of one gap."""
+    m = eta.shape[0]
+    slope[0] = 1 / theta_at(gap, -1.0)[1]
+    slope[1] = 1 / theta_at(gap, 1.0)[1]
+    for i in range(m):
+        theta[i], stretch = theta_at(gap, eta[i])
+        weight[i] = w[i] * stretch
+        rhs[i, 1] = weight[i]
+        for field in range(s.shape[1]):
+            total = 0.0
+            for j in range(m):
+                total += modes[i, j] * s[j, field]
+            rhs[i, 2 * field] = w[i] * total
+    for i in range(m):
+        for j in range(i + 1):
+            far = weight[i] * weight[j] * _periodic(theta[i] - theta[j])
+            near = w[i] * w[j] * _mapped(gap[ALPHA], eta[i] - eta[j])
+            matrix[i, j] = b[i, j] - (near + far) / (4 * np.pi)
+            matrix[j, i] = matrix[i, j]
+
+
+@compiled_sums
+def _between_gaps(theta, weight, offset, matrix):  # type: ignore[no-untyped-def]  # compiled
+    """Blocks of different gaps."""
+    n = theta.shape[0]
     sine = np.sin(0.5 * theta)
     cosine = np.cos(0.5 * theta)
-    for k in range(1, gaps_n):
+    for k in range(offset.shape[0] - 1):
         for i in range(offset[k], offset[k + 1]):
             scale = -weight[i] / (4 * np.pi)
+            si = sine[i]
+            ci = cosine[i]
+            row = matrix[i]
             for j in range(offset[k]):
-                half = sine[i] * cosine[j] - cosine[i] * sine[j]
-                matrix[i, j] = scale * weight[j] / (half * half)
-            for j in range(offset[k]):
-                matrix[j, i] = matrix[i, j]
-    return theta, weight, slope, matrix, rhs.T, beyond, all_s
+                half = si * cosine[j] - ci * sine[j]
+                row[j] = scale * weight[j] / (half * half)
+            for j in range(offset[k + 1], n):
+                half = si * cosine[j] - ci * sine[j]
+                row[j] = scale * weight[j] / (half * half)
 
 
 @compiled
@@ -335,40 +453,47 @@ def _singular_loads(  # type: ignore[no-untyped-def]  # compiled
     rule is exact for polynomials only, a further weight π/(M+1) at the edge itself.
     """
     n = theta.shape[0]
-    gaps_n = table.shape[0]
-    load = np.empty((2 * gaps_n, n))
-    area = np.empty(2 * gaps_n)
-    for k in range(gaps_n):
+    gaps = table.shape[0]
+    load = np.empty((n, 2 * gaps))
+    area = np.empty(2 * gaps)
+    sine = np.sin(0.5 * theta)
+    cosine = np.cos(0.5 * theta)
+    for k in range(gaps):
         m = counts[kinds[k]]
         base = offset[k]
-        for side in range(2):
-            f = 2 * k + side
-            q = np.empty(m)
+        point = np.pi / (m + 1)
+        low = np.empty(m)  # 1/(1 + η) and 1/(1 - η)
+        high = np.empty(m)
+        area[2 * k] = point / slope[k, 0]
+        area[2 * k + 1] = point / slope[k, 1]
+        for j in range(m):
+            x = eta[start[kinds[k]] + j]
+            low[j] = 1 / (1 + x)
+            high[j] = 1 / (1 - x)
+            area[2 * k] += weight[base + j] * low[j]
+            area[2 * k + 1] += weight[base + j] * high[j]
+        edge_sine = np.sin(0.5 * table[k, LEFT : LEFT + 2])
+        edge_cosine = np.cos(0.5 * table[k, LEFT : LEFT + 2])
+        for i in range(n):
+            own = base <= i < base + m
+            total_low = 0.0
+            total_high = 0.0
             for j in range(m):
-                x = eta[start[kinds[k]] + j]
-                q[j] = 1 / (1 + x) if side == 0 else 1 / (1 - x)
-            edge = table[k, LEFT] if side == 0 else table[k, RIGHT]
-            edge_eta = -1.0 if side == 0 else 1.0
-            point = np.pi / (m + 1)
-            area[f] = point / slope[k, side]
-            for j in range(m):
-                area[f] += weight[base + j] * q[j]
-            for i in range(n):
-                total = 0.0
-                if base <= i < base + m:
-                    for j in range(m):
-                        total -= (
-                            matrix[i, base + j] - b[square[kinds[k]] + (i - base) * m + j]
-                        ) * q[j]
+                value = matrix[i, base + j]
+                if own:
+                    value -= b[square[kinds[k]] + (i - base) * m + j]
+                total_low -= value * low[j]
+                total_high -= value * high[j]
+            for side in range(2):
+                edge = table[k, LEFT + side]
+                strength = weight[i] * point / slope[k, side]
+                if own:
                     place = start[kinds[k]] + i - base
-                    total += (
-                        w[place] * point * _mapped(table[k, ALPHA], eta[place] - edge_eta)
-                        + weight[i] * point / slope[k, side] * _periodic(theta[i] - edge)
-                    ) / (4 * np.pi)
+                    mapped = _mapped(table[k, ALPHA], eta[place] - (2 * side - 1))
+                    extra = w[place] * point * mapped + strength * _periodic(theta[i] - edge)
                 else:
-                    for j in range(m):
-                        total -= matrix[i, base + j] * q[j]
-                    half = np.sin(0.5 * (theta[i] - edge))
-                    total += weight[i] * point / slope[k, side] / (4 * np.pi * half * half)
-                load[f, i] = total
-    return load.T, area
+                    half = sine[i] * edge_cosine[side] - cosine[i] * edge_sine[side]
+                    extra = strength / (half * half)
+                total = total_low if side == 0 else total_high
+                load[i, 2 * k + side] = total + extra / (4 * np.pi)
+    return load, area

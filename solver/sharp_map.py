@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 
 from solver.compiled import compiled
-from solver.profile import Array
 
 # Columns of the table of gaps.
 LEFT, RIGHT, LEFT_PATCH, RIGHT_PATCH, ALPHA = 0, 1, 2, 3, 4
@@ -69,6 +68,7 @@ def theta_at(gap, eta):  # type: ignore[no-untyped-def]  # compiled
     return (gap[LEFT] + r if from_left else gap[RIGHT] - r), stretch
 
 
-def convergence(table: Array) -> Array:
-    """Rate ln ρ of each gap: the error of M modes falls as ρ^-M."""
-    return np.asarray(np.arcsinh(np.pi / (2 * table[:, ALPHA])))
+@compiled
+def convergence(gap):  # type: ignore[no-untyped-def]  # compiled
+    """Rate ln ρ of a gap: the error of M modes falls as ρ^-M."""
+    return np.arcsinh(np.pi / (2 * gap[ALPHA]))

@@ -14,11 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import dst
+from scipy.fft import dst, next_fast_len
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp_gaps import MODE_COUNTS, TABLES, GapField
+from solver.sharp_gaps import RULES, GapField
 from solver.sharp_map import theta_at
 from solver.sharp_source import interpolate
 
@@ -41,13 +41,18 @@ class Opening:
 
 
 @compiled
-def _fine_nodes(gap, top, per_wave):  # type: ignore[no-untyped-def]  # compiled
-    """Sine nodes so close that the shortest wave holds ``per_wave`` of them: θ, dθ/dη, sin t."""
+def _fewest_nodes(gap, top, per_wave):  # type: ignore[no-untyped-def]  # compiled
+    """Number of sine nodes so close that the shortest wave holds ``per_wave`` of them."""
     widest = 0.0
     for i in range(1, 24):
         t = np.pi * i / 24
         widest = max(widest, theta_at(gap, np.cos(t))[1] * np.sin(t))
-    count = int(np.ceil(0.5 * per_wave * widest * top)) + _LEAST
+    return int(np.ceil(0.5 * per_wave * widest * top)) + _LEAST
+
+
+@compiled
+def _fine_nodes(gap, count):  # type: ignore[no-untyped-def]  # compiled
+    """``count`` sine nodes: θ, dθ/dη, sin t."""
     theta = np.empty(count)
     stretch = np.empty(count)
     sine = np.empty(count)
@@ -61,8 +66,11 @@ def _fine_nodes(gap, top, per_wave):  # type: ignore[no-untyped-def]  # compiled
 def _sine_modes(field: GapField, k: int, per_wave: float) -> tuple[Array, Array, Array]:
     """θ and dθ of the fine nodes of gap k, and s_n for every mode that they carry."""
     source = field.source
-    theta, stretch, sine = _fine_nodes(field.table[k], source.top, per_wave)
-    s = interpolate(theta, source.width, source.panels, source.coefficients)[:, 0]
+    gap = field.solution.table[k]
+    # the transform is fast where one more than the number of nodes has small factors
+    count = next_fast_len(_fewest_nodes(gap, source.top, per_wave) + 1, real=True) - 1
+    theta, stretch, sine = _fine_nodes(gap, count)
+    s = interpolate(theta, source.panels.width, source.panels.stress)
     span = stretch * sine
     # the transform counts t upwards, the nodes run downwards in t
     modes = dst((s * span)[::-1], type=1) / (len(theta) + 1)
@@ -71,10 +79,10 @@ def _sine_modes(field: GapField, k: int, per_wave: float) -> tuple[Array, Array,
 
 def work_of_gaps(field: GapField) -> float:
     """∫_gaps S_full T dθ."""
-    total = float(field.rhs[:, 0] @ field.f)
+    total = float(field.solution.rhs[:, 0] @ field.solution.f)
     for k in range(len(field.gaps)):
         s = _sine_modes(field, k, ENERGY_NODES)[2]
-        m = int(MODE_COUNTS[field.kinds[k]])
+        m = int(RULES.counts[field.solution.kinds[k]])
         high = s[m:]
         total -= np.pi / 2 * float(np.sum(high * high / np.arange(m + 1, len(s) + 1)))
     return total
@@ -82,11 +90,12 @@ def work_of_gaps(field: GapField) -> float:
 
 def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> Opening:
     """Opening T of gap k at fine nodes."""
+    of = field.solution
     theta, span, s = _sine_modes(field, k, per_wave)
-    m = int(MODE_COUNTS[field.kinds[k]])
-    start, square = TABLES.start[field.kinds[k]], TABLES.square[field.kinds[k]]
-    f = field.f[field.offset[k] : field.offset[k + 1]]
-    u = TABLES.modes[square : square + m * m].reshape(m, m)
+    m = int(RULES.counts[field.solution.kinds[k]])
+    start, square = RULES.start[of.kinds[k]], RULES.square[of.kinds[k]]
+    f = of.f[of.offset[k] : of.offset[k + 1]]
+    u = RULES.modes[square : square + m * m].reshape(m, m)
     b = -s / np.arange(1, len(s) + 1)
-    b[:m] = (2 / np.pi) * (TABLES.w[start : start + m] * f) @ u
+    b[:m] = (2 / np.pi) * (RULES.w[start : start + m] * f) @ u
     return Opening(theta, dst(b, type=1)[::-1] / 2, span, b)

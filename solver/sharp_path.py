@@ -9,19 +9,18 @@ Hessian of the energy divided by C).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.profile import Array
-from solver.sharp_gaps import GapField
-from solver.sharp_run import run_held
+from solver.sharp_gaps import RULES, GapField
+from solver.sharp_run import NARROW, RESTING, Law, descend, equilibrium
 from solver.sharp_source import StressSource
-from solver.sharp_step import off_saddle, running_step
 
-_REUSES = 8  # running steps that share one tangent
-_NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+_NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
+_DESCENT_LIMIT = 100_000
 
 
 @dataclass
@@ -37,13 +36,29 @@ class Counters:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """Symmetric tangent with its scale factors, for the next running steps."""
+class Point:
+    """A stable equilibrium on a branch.
 
-    d: Array
-    matrix: Array
-    last: Array  # the step taken with it
-    runners: int  # edges that ran in that step; 0: the tangent is used up
+    Attributes
+    ----------
+    at : float
+        q0 s.
+    field : GapField
+    rate : array, shape (2L,)
+        dn/d(q0 s) of every edge along the branch, n the outward motion of the contact.
+    slope : float
+        dp/d(q0 s) along the branch.
+    """
+
+    at: float
+    field: GapField
+    rate: Array
+    slope: float
+
+    def predicted(self, at: float) -> Array:
+        """Gaps at q0 s = ``at``, along the tangent."""
+        motion = outward(self.field.gaps) * self.rate * (at - self.at)
+        return self.field.gaps + motion.reshape(-1, 2)
 
 
 class EdgeMechanics:
@@ -74,36 +89,21 @@ class EdgeMechanics:
             self.smallest = min(self.smallest, 0.05 * seed)
         # an opening this far below zero is an overlap that descent cannot weigh
         rough = np.sqrt(source.m2 * self.wave)
-        self.overlapping = 0.1 * max(critical, float(rough))
+        self.law = Law(
+            critical=float(critical),
+            digits=float(-np.log(tolerance)),
+            settled=self.settled,
+            near=_NEAR * self.wave,
+            longest=self.longest_step,
+            smallest=float(self.smallest),
+            overlapping=float(0.1 * max(critical, rough)),
+        )
         self.count = Counters()
 
-    def field(
-        self, gaps: Array, separation: float, kinds: NDArray[np.intp] | None = None
-    ) -> GapField:
+    def field(self, gaps: Array, separation: float) -> GapField:
         """Solve the field of these gaps."""
         self.count.fields += 1
-        return GapField(self.source, gaps, separation, self.tolerance, kinds)
-
-    def residual(self, field: GapField) -> Array:
-        """C_e - C_c at every edge, shape (2L,); positive where contact recedes."""
-        measure, _ = self.source.measure_at(field.gaps.ravel())
-        return np.asarray(field.opening.ravel() - self.critical * np.sqrt(measure))
-
-    def tangent(self, field: GapField) -> Array:
-        """∂(C_e - C_c)/∂n_f, shape (2L, 2L), n the outward motion of the contact."""
-        self.count.derivatives += 1
-        by_edge, _ = field.derivatives
-        measure, slope = self.source.measure_at(field.gaps.ravel())
-        matrix = by_edge.copy()
-        matrix[np.diag_indices_from(matrix)] -= self.critical * slope / (2 * np.sqrt(measure))
-        return matrix * outward(field.gaps)
-
-    def symmetric(self, field: GapField, tangent: Array) -> tuple[Array, Array]:
-        """Scale factors d and the symmetric matrix d_e tangent_ef / d_f."""
-        c = field.opening.ravel()
-        d = np.sqrt(np.maximum(c, self.overlapping))
-        scaled = tangent * (d[:, None] / d[None, :])
-        return d, np.asarray((scaled + scaled.T) / 2)
+        return GapField(self.source, gaps, separation, self.tolerance)
 
     def widths(self, gaps: Array) -> tuple[Array, Array]:
         """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
@@ -112,97 +112,70 @@ class EdgeMechanics:
         patch[-1] = gaps[0, 0] + 2 * np.pi
         return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
 
-    def valid(self, gaps: Array) -> bool:
-        """Whether every gap and patch has a positive length."""
-        length, patch = self.widths(gaps)
-        return bool(length.min() > 0 and patch.min() > 0)
+    def equilibrium(self, gaps: Array, separation: float, reach: float) -> Point | None:
+        """Stable equilibrium near these gaps, or None.
 
-    def equilibrium(
-        self, gaps: Array, separation: float, reach: float
-    ) -> tuple[GapField, Array] | None:
-        """Newton's iteration for C_e = C_c from nearby edges.
-
-        Returns the field and its tangent at the equilibrium, or None if an edge would move further
-        than ``reach`` (in θ), the iteration stalls, or the equilibrium is not stable.
+        None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
+        equilibrium is not stable.
         """
-        start = gaps.ravel()
-        at = start.copy()
-        last = np.inf
-        sign = outward(gaps)
-        kinds = None
-        for _ in range(_NEWTON_LIMIT):
-            self.count.newton_steps += 1
-            trial = at.reshape(-1, 2)
-            if not self.valid(trial):
-                return None
-            field = self.field(trial, separation, kinds)
-            kinds = field.kinds
-            tangent = self.tangent(field)
-            try:
-                step = -sign * np.linalg.solve(tangent, self.residual(field))
-            except np.linalg.LinAlgError:
-                return None
-            size = float(np.abs(step).max())
-            if not np.isfinite(size) or size > max(reach, self.settled) or size > 2 * last:
-                return None
-            if size <= self.settled:
-                return (field, tangent) if self.stable(field, tangent) else None
-            at = at + step
-            if np.abs(at - start).max() > reach:
-                return None
-            last = size
-        return None
-
-    def stable(self, field: GapField, tangent: Array) -> bool:
-        """Whether the equilibrium is a minimum of the energy."""
-        _, matrix = self.symmetric(field, tangent)
+        length, patch = self.widths(gaps)
+        if not (length.min() > 0 and patch.min() > 0):
+            return None
         try:
-            np.linalg.cholesky(matrix)
+            found, at, solution, rate, slope, steps = equilibrium(
+                gaps, separation, max(reach, self.settled), self.law, RULES, self.source.panels
+            )
         except np.linalg.LinAlgError:
-            return False
-        return True
+            return None
+        self.count.newton_steps += steps
+        self.count.fields += steps
+        self.count.derivatives += steps
+        if not found:
+            return None
+        field = GapField(self.source, at, separation, self.tolerance, solution)
+        return Point(separation, field, rate, slope)
 
-    def descend(self, gaps: Array, separation: float, held: Held | None) -> tuple[Array, Held]:
-        """Take one step of energy descent at fixed separation.
+    def relax(self, gaps: Array, separation: float, reach: float) -> Point | Array:
+        """Descend in energy at fixed separation to the next minimum.
 
-        Edges out of equilibrium run in the direction in which the energy falls, all at the same
-        speed (their limit, twice as long for one that runs alone); edges near equilibrium follow
-        them by Newton's step. A patch or gap loses at most a quarter of its length to each edge.
-        While edges run, the tangent of a few steps before (``held``) does as well, unless an edge
-        turns; the openings are always fresh.
+        Returns
+        -------
+        Point or array
+            The minimum, or the gaps without those gaps and patches that have closed or vanished on
+            the way (an empty array when no contact is left).
+
+        Raises
+        ------
+        RuntimeError
+            If the descent does not end.
         """
-        self.count.descent_steps += 1
-        if held is not None and held.runners and len(held.d) == gaps.size:
-            moved, _, _, fields, turns = run_held(
-                self.source, gaps, separation, self.tolerance, (held.matrix, held.d), held.last,
-                held.runners, _REUSES,
-                (self.longest_step, self.smallest, self.overlapping), self.critical,
-            )  # fmt: skip
+        left = _DESCENT_LIMIT
+        while left > 0:
+            gaps, ended, fields, tangents = descend(
+                gaps, separation, left, self.law, RULES, self.source.panels
+            )
             self.count.fields += fields
-            self.count.descent_steps += fields - 1
-            if fields > 1 or not turns:
-                return moved, replace(held, runners=0)
-        field = self.field(gaps, separation)
-        limit = self._limits(gaps, self.longest_step)
-        d, matrix = self.symmetric(field, self.tangent(field))
-        step = running_step(matrix, d, -self.residual(field), limit)
-        # Where surfaces would overlap beside an edge there is nothing to weigh: contact advances.
-        step = np.where(field.opening.ravel() < -self.overlapping, limit, step)
-        if np.abs(step).max() <= self.settled and not self.stable(field, self.tangent(field)):
-            step = off_saddle(matrix, d, limit)
-        runners = int(np.count_nonzero(np.abs(step) > 0.5 * self.longest_step))
-        moved = (gaps.ravel() + outward(gaps) * step).reshape(-1, 2)
-        return moved, Held(d, matrix, step, runners)
+            self.count.descent_steps += fields
+            self.count.derivatives += tangents
+            left -= fields
+            if ended == NARROW:
+                rest = self.without_small(gaps)
+                if rest is not None:
+                    return rest
+            if ended == RESTING:
+                point = self.equilibrium(gaps, separation, reach)
+                if point is not None:
+                    return point
+        raise RuntimeError(f"the descent at q0 s = {separation} did not end")
 
-    def _limits(self, gaps: Array, longest: float) -> Array:
-        """Longest step of each edge: ``longest``, or a quarter of the gap or patch it may close."""
+    def without_small(self, gaps: Array) -> Array | None:
+        """Gaps without closed gaps or vanished patches, or None if there are none."""
         length, patch = self.widths(gaps)
-        limit = np.empty_like(gaps)
-        limit[0, 0] = patch[-1]
-        limit[1:, 0] = patch[:-1]
-        limit[:, 1] = patch
-        np.minimum(limit, length[:, None], out=limit)
-        return np.asarray(np.minimum(longest, 0.25 * limit).ravel())
+        if length.min() < self.smallest and len(gaps) > 1:
+            return without_gaps(gaps, length >= self.smallest)
+        if patch.min() < self.smallest:
+            return without_patches(gaps, patch >= self.smallest)
+        return None
 
 
 def outward(gaps: Array) -> Array:

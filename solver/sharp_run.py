@@ -1,140 +1,245 @@
-"""Running edges, compiled: several steps of a descent that share one tangent.
-
-The same arithmetic as :class:`~solver.sharp_gaps.GapField` without derivatives and
-:func:`~solver.sharp_path.running_step`, in one compiled loop: a step costs half as much.
-"""
+"""Moving edges, compiled: equilibrium by Newton, stability, and descent along a jump."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp_gaps import MODE_COUNTS, TABLES, assemble, edge_openings
-from solver.sharp_map import ALPHA, map_gaps
-from solver.sharp_source import StressSource, measure_at
-from solver.sharp_step import running_step
+from solver.sharp_gaps import choose_kinds, derivatives, edge_openings, solve
+from solver.sharp_linear import is_definite
+from solver.sharp_map import LEFT, LEFT_PATCH, RIGHT, RIGHT_PATCH, map_gaps
+from solver.sharp_source import measure_at
+from solver.sharp_step import off_saddle, running_step
+
+_NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+_REUSES = 8  # running steps that share one tangent
+
+# How a descent ended.
+RESTING, NARROW, UNFINISHED = 0, 1, 2
 
 
-def run_held(
-    source: StressSource,
-    gaps: Array,
-    separation: float,
-    tolerance: float,
-    tangent: tuple[Array, Array],
-    last: Array,
-    runners: int,
-    steps: int,
-    limits: tuple[float, float, float],
-    critical: float,
-) -> tuple[Array, Array, int, int, bool]:
-    """Run for up to ``steps`` steps with a held tangent.
+class Law(NamedTuple):
+    """What moves the edges; lengths in θ.
 
-    Stops before an edge turns, and after a step in which no edge ran or a patch or gap fell below
-    the smallest length.
-
-    Parameters
+    Attributes
     ----------
-    tangent : (matrix, d)
-        Symmetric tangent and its scale factors.
-    last, runners
-        The step before, and the number of edges that ran in it.
-    limits : (longest step, smallest length, overlapping opening)
     critical : float
         Critical opening on a flat piece.
+    digits : float
+        -ln of the relative accuracy of the field.
+    settled : float
+        A correction this small ends Newton's iteration.
+    near : float
+        Descent steps shorter than this are left to Newton's iteration.
+    longest : float
+        Longest step of a running edge.
+    smallest : float
+        Narrower patches and gaps are gone.
+    overlapping : float
+        An opening this far below zero is an overlap that descent cannot weigh.
+    """
+
+    critical: float
+    digits: float
+    settled: float
+    near: float
+    longest: float
+    smallest: float
+    overlapping: float
+
+
+@compiled
+def _narrowest(gaps):  # type: ignore[no-untyped-def]  # compiled
+    """Length of the shortest gap or patch."""
+    table = map_gaps(gaps)
+    least = 2 * np.pi
+    for k in range(table.shape[0]):
+        least = min(least, table[k, RIGHT] - table[k, LEFT], table[k, RIGHT_PATCH])
+    return least
+
+
+@compiled
+def _residual(of, law, panels):  # type: ignore[no-untyped-def]  # compiled
+    """C_e - C_c at every edge; positive where contact recedes. And the derivative of C_c by θ."""
+    edges = of.opening.shape[0]
+    residual = np.empty(edges)
+    drift = np.empty(edges)
+    for e in range(edges):
+        measure, slope = measure_at(of.table[e // 2, LEFT + e % 2], panels)
+        root = np.sqrt(measure)
+        residual[e] = of.opening[e] - law.critical * root
+        drift[e] = law.critical * slope / (2 * root)
+    return residual, drift
+
+
+@compiled
+def _tangent(of, drift, rules):  # type: ignore[no-untyped-def]  # compiled
+    """∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂p/∂θ_f."""
+    matrix, pressure = derivatives(of, rules)
+    for e in range(matrix.shape[0]):
+        matrix[e, e] -= drift[e]
+        for f in range(1, matrix.shape[0], 2):
+            matrix[e, f] = -matrix[e, f]
+    return matrix, pressure
+
+
+@compiled
+def _symmetric(of, tangent, overlapping):  # type: ignore[no-untyped-def]  # compiled
+    """Scale factors d and the symmetric matrix d_e tangent_ef / d_f."""
+    n = tangent.shape[0]
+    d = np.sqrt(np.maximum(of.opening, overlapping))
+    matrix = np.empty((n, n))
+    for e in range(n):
+        for f in range(e + 1):
+            value = 0.5 * (tangent[e, f] * d[e] / d[f] + tangent[f, e] * d[f] / d[e])
+            matrix[e, f] = value
+            matrix[f, e] = value
+    return d, matrix
+
+
+@compiled
+def _moved(gaps, step):  # type: ignore[no-untyped-def]  # compiled
+    """Gaps after an outward motion ``step`` of the contact at every edge."""
+    out = np.empty_like(gaps)
+    for k in range(gaps.shape[0]):
+        out[k, 0] = gaps[k, 0] + step[2 * k]
+        out[k, 1] = gaps[k, 1] - step[2 * k + 1]
+    return out
+
+
+@compiled
+def equilibrium(gaps, separation, reach, law, rules, panels):  # type: ignore[no-untyped-def]
+    """Newton's iteration for C_e = C_c from nearby edges.
+
+    Returns whether a stable equilibrium was found with no edge moving further than ``reach``, its
+    gaps, its solution, the rate dn/d(q0 s) of every edge along the branch, dp/d(q0 s) along it, and
+    the number of corrections.
+
+    Raises
+    ------
+    LinAlgError
+        If a tangent is singular.
+    """
+    at = gaps
+    kinds = choose_kinds(map_gaps(gaps), law.digits, rules.counts)
+    travelled = np.zeros(gaps.size)
+    last = np.inf
+    found = False
+    rate = np.empty(0)
+    slope = np.nan
+    steps = 0
+    while True:
+        steps += 1
+        of = solve(at, separation, kinds, 2, rules, panels)
+        residual, drift = _residual(of, law, panels)
+        tangent, by_edge = _tangent(of, drift, rules)
+        step = np.linalg.solve(tangent, -residual)
+        size = np.abs(step).max()
+        if size <= law.settled:
+            _, matrix = _symmetric(of, tangent, law.overlapping)
+            found = is_definite(matrix)
+            break
+        travelled += step
+        # not written as > : a size that is no number is a failure, too
+        within = size <= reach and size <= 2 * last and np.abs(travelled).max() <= reach
+        if not within or steps == _NEWTON_LIMIT:
+            break
+        last = size
+        moved = _moved(at, step)
+        if not _narrowest(moved) > 0:
+            break
+        at = moved
+    if found:
+        by_separation = -2 * np.pi / of.unit_mean
+        unit = np.empty((of.f.shape[0], 1))
+        for i in range(of.f.shape[0]):
+            unit[i, 0] = -by_separation * of.solved[i, 1]
+        opening = edge_openings(unit, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+        rate = np.linalg.solve(tangent, -opening[:, 0])
+        slope = by_separation
+        for e in range(rate.shape[0]):
+            slope += by_edge[e] * (rate[e] if e % 2 == 0 else -rate[e])
+    return found, at, of, rate, slope, steps
+
+
+@compiled
+def _limits(table, longest):  # type: ignore[no-untyped-def]  # compiled
+    """Longest step of each edge: ``longest``, or a quarter of the gap or patch it may close."""
+    limit = np.empty(2 * table.shape[0])
+    for k in range(table.shape[0]):
+        length = table[k, RIGHT] - table[k, LEFT]
+        for side in range(2):
+            limit[2 * k + side] = min(longest, 0.25 * min(length, table[k, LEFT_PATCH + side]))
+    return limit
+
+
+@compiled
+def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-untyped-def]
+    """Descend in energy at fixed separation, for at most ``most`` steps.
+
+    Edges out of equilibrium run in the direction in which the energy falls, all at the same speed
+    (their limit, twice as long for one that runs alone); edges near equilibrium follow them by
+    Newton's step. A patch or gap loses at most a quarter of its length to each edge. While edges
+    run, a tangent serves several steps, unless an edge turns; the openings are always fresh.
 
     Returns
     -------
-    gaps, last step, runners, fields solved, whether an edge was about to turn
+    gaps, how it ended, fields, tangents
+        RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
+        length, UNFINISHED after the last step.
     """
-    return _run(  # type: ignore[no-any-return]  # compiled code has no types
-        gaps, separation, -np.log(tolerance), *tangent, last, runners, steps, *limits, critical,
-        MODE_COUNTS, TABLES.start, TABLES.square, TABLES.eta, TABLES.w, TABLES.ends, TABLES.b,
-        TABLES.modes, source.width, source.panels, source.x, source.w, source.coefficients,
-        source.weights, source.level_start, source.end_x, source.end_w, source.measure,
-    )  # fmt: skip
-
-
-@compiled
-def _run(  # type: ignore[no-untyped-def]  # compiled
-    gaps, separation, digits, matrix, d, last, runners, steps, longest, smallest, overlapping,
-    critical, counts, start, square, eta, w, ends, b, modes, width, panels, node_x, node_w,
-    coefficients, weights, level_start, end_x, end_w, measure,
-):  # fmt: skip
     count = gaps.shape[0]
+    edges = 2 * count
     fields = 0
-    for _ in range(steps):
-        table = map_gaps(gaps)
-        kinds = np.empty(count, dtype=np.int64)
-        offset = np.zeros(count + 1, dtype=np.int64)
-        for k in range(count):
-            wanted = digits / np.arcsinh(np.pi / (2 * table[k, ALPHA]))
-            kind = 0
-            while kind < counts.shape[0] - 1 and counts[kind] < wanted:
-                kind += 1
-            kinds[k] = kind
-            offset[k + 1] = offset[k] + counts[kind]
-        _, weight, slope, system, rhs, beyond, _ = assemble(
-            table, kinds, offset, counts, start, square, eta, w, b, modes, width, panels, node_x,
-            node_w, coefficients, weights, level_start, end_x, end_w, 1,
-        )  # fmt: skip
+    tangents = 0
+    reuses = 0
+    runners = 0
+    last = np.zeros(edges)
+    d = np.zeros(edges)
+    matrix = np.zeros((edges, edges))
+    while fields < most:
         fields += 1
-        factor = np.linalg.cholesky(system)
-        load = _solve(factor, rhs[:, 0])
-        unit = _solve(factor, rhs[:, 1])
-        pressure = -(2 * np.pi * separation + weight @ load) / (weight @ unit)
-        f = (-load - pressure * unit).reshape(-1, 1)
-        opening = edge_openings(f, slope, kinds, offset, start, ends)[:, 0]
-        value, _ = measure_at(gaps.ravel(), width, panels, measure)
-        pull = np.empty(2 * count)
-        limit = np.empty(2 * count)
-        reach = 2 * longest if runners == 1 else longest
-        for k in range(count):
-            for side in range(2):
-                e = 2 * k + side
-                opening[e] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
-                pull[e] = critical * np.sqrt(value[e]) - opening[e]
-                patch = table[k, 2 + side]  # the width of the patch beyond this end
-                limit[e] = min(reach, 0.25 * min(table[k, 1] - table[k, 0], patch))
-        step = running_step(matrix, d, pull, limit)
-        for e in range(2 * count):
-            if abs(step[e]) > 0.2 * longest and step[e] * last[e] <= 0:
-                return gaps, last, runners, fields, True
+        held = runners > 0 and reuses < _REUSES
+        table = map_gaps(gaps)
+        kinds = choose_kinds(table, law.digits, rules.counts)
+        of = solve(gaps, separation, kinds, 1 if held else 2, rules, panels)
+        residual, drift = _residual(of, law, panels)
+        if held:
+            reuses += 1
+            limit = _limits(table, 2 * law.longest if runners == 1 else law.longest)
+            step = running_step(matrix, d, -residual, limit)
+            turns = False
+            for e in range(edges):
+                if abs(step[e]) > 0.2 * law.longest and step[e] * last[e] <= 0:
+                    turns = True
+            if turns:
+                runners = 0
+                continue
+        else:
+            tangents += 1
+            reuses = 0
+            limit = _limits(table, law.longest)
+            tangent, _ = _tangent(of, drift, rules)
+            d, matrix = _symmetric(of, tangent, law.overlapping)
+            step = running_step(matrix, d, -residual, limit)
+        for e in range(edges):
+            # Where surfaces would overlap beside an edge there is nothing to weigh: contact grows.
+            if of.opening[e] < -law.overlapping:
+                step[e] = limit[e]
+        size = np.abs(step).max()
+        if size <= law.settled and not held and not is_definite(matrix):
+            step = off_saddle(matrix, d, limit)
+            size = np.abs(step).max()
         runners = 0
-        moved = np.empty_like(gaps)
-        for k in range(count):
-            for side in range(2):
-                e = 2 * k + side
-                if opening[e] < -overlapping:
-                    step[e] = limit[e]
-                if abs(step[e]) > 0.5 * longest:
-                    runners += 1
-                moved[k, side] = gaps[k, side] + (step[e] if side == 0 else -step[e])
-        gaps = moved
+        for e in range(edges):
+            if abs(step[e]) > 0.5 * law.longest:
+                runners += 1
+        gaps = _moved(gaps, step)
         last = step
-        if runners == 0:
-            break
-        least = 2 * np.pi
-        for k in range(count):
-            after = gaps[k + 1, 0] if k + 1 < count else gaps[0, 0] + 2 * np.pi
-            least = min(least, gaps[k, 1] - gaps[k, 0], after - gaps[k, 1])
-        if least < smallest:
-            break
-    return gaps, last, runners, fields, False
-
-
-@compiled
-def _solve(factor, right):  # type: ignore[no-untyped-def]  # compiled
-    """Forward and back substitution with the lower Cholesky factor."""
-    n = right.shape[0]
-    x = right.copy()
-    for i in range(n):
-        total = x[i]
-        for j in range(i):
-            total -= factor[i, j] * x[j]
-        x[i] = total / factor[i, i]
-    for i in range(n - 1, -1, -1):
-        x[i] /= factor[i, i]
-        for j in range(i):
-            x[j] -= factor[i, j] * x[i]
-    return x
+        if _narrowest(gaps) < law.smallest:
+            return gaps, NARROW, fields, tangents
+        if size < law.near:
+            return gaps, RESTING, fields, tangents
+    return gaps, UNFINISHED, fields, tangents

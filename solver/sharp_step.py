@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.compiled import compiled
-from solver.profile import Array
+from solver.sharp_linear import factor_rows, solve_column
 
 
 @compiled
@@ -33,9 +33,13 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
                     right[i] -= matrix[free[i], j] * step[j] * d[j]
             for j in range(free.shape[0]):
                 block[i, j] = matrix[free[i], free[j]]
-        values, vectors = np.linalg.eigh(block)
-        floor = 1e-9 * np.abs(values).max()
-        if values[0] <= floor:
+        factor = block.copy()
+        if factor_rows(factor, 1e-9):
+            newton = right.copy()
+            solve_column(factor, newton)
+        else:
+            values, vectors = np.linalg.eigh(block)
+            floor = 1e-9 * np.abs(values).max()
             # The softest mode runs downhill; its largest edge leads. A pull without any share in
             # that mode is a symmetric one: it keeps its symmetry.
             downhill = vectors[:, 0] @ right
@@ -50,7 +54,8 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
                 step[edge] = sign * limit[edge]
                 continue
             values = np.maximum(np.abs(values), floor)
-        newton = (vectors @ ((vectors.T @ right) / values)) / d[free]
+            newton = vectors @ ((vectors.T @ right) / values)
+        newton /= d[free]
         done = True
         for i in range(free.shape[0]):
             edge = free[i]
@@ -67,9 +72,13 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
     return step
 
 
-def off_saddle(matrix: Array, d: Array, limit: Array) -> Array:
+@compiled
+def off_saddle(matrix, d, limit):  # type: ignore[no-untyped-def]  # compiled
     """Step along the softest mode, its first large edge outwards: the way off a saddle."""
     mode = np.linalg.eigh(matrix)[1][:, 0] / d
-    lead = int(np.flatnonzero(np.abs(mode) > 0.99 * np.abs(mode).max())[0])
-    scaled = mode / mode[lead]
-    return np.asarray(np.clip(scaled * limit.min(), -limit, limit))
+    size = np.abs(mode)
+    lead = np.flatnonzero(size > 0.99 * size.max())[0]
+    step = mode * (limit.min() / mode[lead])
+    for e in range(step.shape[0]):
+        step[e] = min(max(step[e], -limit[e]), limit[e])
+    return step

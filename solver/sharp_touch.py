@@ -9,6 +9,7 @@ touch: it is put when the overlap is large enough for the narrowest patch that i
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +62,7 @@ class Nucleation:
     def minima(self, field: GapField) -> list[Touch]:
         """Local minima of the opening inside the gaps."""
         self.edges.count.openings += 1
-        found = []
+        found: list[Touch] = []
         for k in range(len(field.gaps)):
             shape = fine_opening(field, k)
             x, y = shape.theta, shape.opening
@@ -72,7 +73,7 @@ class Nucleation:
             half = (second - first) / (x[i + 1] - x[i - 1])
             slope = first + half * (x[i] - x[i - 1])
             at, low = x[i] - slope / (2 * half), y[i] - slope**2 / (4 * half)
-            found += [Touch(*map(float, t)) for t in zip(at, low, 2 * half, strict=True)]
+            found += map(Touch, at.tolist(), low.tolist(), (2 * half).tolist())
         return found
 
     def clearance(self, touch: Touch) -> float:
@@ -92,6 +93,6 @@ class Nucleation:
         )
 
     def _width(self, touch: Touch) -> float:
-        surface = np.pi * self.edges.critical**2 / 8  # Γ
-        first = (16 * surface / (np.pi * touch.curvature**2)) ** (1 / 3)
-        return float(np.clip(0.5 * first, 3 * self.edges.smallest, self.edges.longest_step))
+        surface = math.pi * self.edges.critical**2 / 8  # Γ
+        first = (16 * surface / (math.pi * touch.curvature**2)) ** (1 / 3)
+        return float(min(max(0.5 * first, 3 * self.edges.smallest), self.edges.longest_step))

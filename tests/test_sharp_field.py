@@ -147,10 +147,7 @@ def test_moments_against_brute_force(source, k):
     gaps = np.array([[1.0, 1.004], [1.02, 3.0], [3.00001, 4.0]])
     gap = map_gaps(gaps)[k]
     s, ends = np.zeros((20, 2)), np.zeros((2, 2))
-    gap_moments(
-        gap, source.width, source.panels, source.x, source.w, source.coefficients,
-        source.weights, source.level_start, source.end_x, source.end_w, s, ends,
-    )  # fmt: skip
+    gap_moments(gap, source.panels, s, ends)
     count = 60_000
     t = (np.arange(count) + 0.5) * np.pi / count
     place = np.array([theta_at(gap, x) for x in np.cos(t)])
