@@ -7,6 +7,7 @@ import io
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -270,6 +271,26 @@ def test_drawing_leaves_the_style_of_the_caller_alone(data):
     assert dict(mpl.rcParams) == before
     code = "import sys, ensemble.report.figures as f; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+
+
+@pytest.mark.parametrize("stretched", [1.0, 1.7, 30.0])
+def test_nothing_is_cut_off_at_the_edges_of_a_figure(data, stretched):
+    """Whatever the ticks: the room that their labels take is found before they are drawn."""
+    fields = data.fields
+    shapes = tuple(
+        shape and replace(shape, displacement=stretched * shape.displacement)
+        for shape in fields.shapes
+    )
+    data = replace(data, fields=replace(fields, shapes=shapes))
+    for item in (*LOOPS, *LOSSES, *MECHANISMS, *SHAPES, *HEIGHTS):
+        if stretched > 1 and item.name != "fig3_shapes":
+            continue
+        with style():
+            figure = item.draw(data)
+            figure.set_dpi(300)
+            figure.draw_without_rendering()
+            box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0, item.name
 
 
 # ---------------------------------------------------------------------- page and command

@@ -60,6 +60,8 @@ def shapes(data: Aggregate) -> Figure:
         separation = shape.h_max * (1 - fields.penetration[k])
         for axes, part in ((whole, slice(None)), (detail, window)):
             _draw_shape(axes, fields, shape, k, separation, part)
+            # Ticks that follow the size of a panel change while the layout is found.
+            axes.locator_params(axis="y", nbins=5)
         label_panel(
             whole,
             rf"$\Delta/h_\mathrm{{max}}$ = {fields.penetration[k]:.2f}, "
