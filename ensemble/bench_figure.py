@@ -55,13 +55,13 @@ def draw(lines: Sequence[Line]) -> Figure:
                     shown[method] = _series(axes, method, chosen)
             label_panel(axes, scenes[k].title)
             axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
-        # One range for all, so that the panels can be compared; room at the right for the labels.
+        # One range for all, so that the panels can be compared; room at the sides for the labels.
         finished = [line for line in lines if math.isfinite(line.error)]
         seconds = [line.measured.cpu_seconds for line in finished]
         errors = [_drawn_error(line) for line in finished]
         for axes in figure.axes if finished else ():
             axes.set(xscale="log", yscale="log")
-            axes.set_xlim(min(seconds) / 1.6, 2.5 * max(seconds))
+            axes.set_xlim(min(seconds) / 2, 2.5 * max(seconds))
             axes.set_ylim(min(errors) / 3, 5 * max(errors))
         legend_above(figure, list(shown.values()), len(shown))
         plain_decades(figure.axes)
@@ -79,12 +79,17 @@ def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
     (drawn,) = axes.plot(
         seconds, errors, color=chosen.colour, marker=chosen.marker, ls=LINES[k], label=method
     )
-    for line, x, y in zip(lines, seconds, errors, strict=True):
+    for place, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
+        # Left below for sharp, right for the others, by turns above and below: runs lie close.
+        left = method == "sharp"
+        below = left or place % 2 == 1
         axes.annotate(
             _short(line),
             (x, y),
-            xytext=(3, 3),
+            xytext=(-3 if left else 3, -3 if below else 3),
             textcoords="offset points",
+            ha="right" if left else "left",
+            va="top" if below else "bottom",
             fontsize=5,
             color="0.25",
         )
