@@ -40,6 +40,8 @@ NOT_RUN = {
     "qsub -l select=2:ncpus=32:mpiprocs=32 -l walltime=12:00:00 -v CAMPAIGN=my.toml,"
     "HYSTERON=$HYSTERON,SCRIPT=PATH/jobs/pbs.sh PATH/jobs/pbs.sh": "needs a PBS",
     "export HYSTERON=PATH/.venv/bin/hysteron": "a place of the reader's",
+    "python benchmarks/endurance.py empty": "a quiet machine; tests/test_mpi.py runs it short",
+    "python benchmarks/endurance.py campaign jobs/example.toml": "as before",
     "python examples/measured_profile.py --to out/measured": "tests/test_measured_profile.py",
     "python examples/measured_profile.py trace.csv --to out/measured": "as before",
 }

@@ -9,13 +9,16 @@ import random
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
 from campaign_support import (
     MPIRUN,
+    ROOT,
     differences,
     done_rows,
+    environment,
     hysteron,
     kill_all,
     ranks_of,
@@ -227,6 +230,33 @@ def test_the_status_during_a_run_under_mpirun(tmp_path):
     assert status["done"] + status["pending"] == 8
     process.communicate(timeout=30)
     assert process.returncode == 0
+
+
+def test_the_endurance_benchmark_runs(tmp_path):
+    """Its figures are for a quiet machine; here only that there are some."""
+
+    def table(*words) -> dict[str, str]:
+        process = subprocess.run(
+            [sys.executable, str(ROOT / "benchmarks" / "endurance.py"), *map(str, words)],
+            env=environment(MPIRUN=MPIRUN),
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=100,
+        )
+        assert process.returncode == 0, process.stderr
+        rows = (line.strip().split("  ", 1) for line in process.stdout.splitlines()[1:])
+        return {row[0]: row[1].strip() for row in rows if len(row) == 2}
+
+    path = write_campaign(tmp_path)
+    words = ("empty", "--campaign", path, "--tasks", 40, "--seconds", 0.05, "--dir", tmp_path)
+    shown = table(*words)
+    assert float(shown["tasks a second"].split()[0]) > 0
+    assert shown["master, of a core"].endswith("under 2 %")
+    shown = table("campaign", path, "--out", "r.h5")
+    assert float(shown["makespan / ideal"].split()[0]) >= 1
+    assert done_rows(tmp_path / "r.h5") == 8
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "r.h5"]
 
 
 def test_waiting_costs_the_master_next_to_nothing(tmp_path):
