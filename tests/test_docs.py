@@ -276,8 +276,12 @@ def test_commands_in_the_text_exist(page: Path) -> None:
 
 def headings(page: Path) -> set[str]:
     """Anchors of the headings of a page, as GitHub makes them."""
-    found = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", text).strip().lower().replace(" ", "-") for text in found}
+    found: set[str] = set()
+    for text in re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE):
+        anchor = re.sub(r"[^\w\- ]", "", text).strip().lower().replace(" ", "-")
+        again = sum(bool(re.fullmatch(rf"{anchor}(-\d+)?", other)) for other in found)
+        found.add(f"{anchor}-{again}" if again else anchor)
+    return found
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
