@@ -205,6 +205,9 @@ class SharpMethod(Method):
                 if abs(step) > self.resolution:
                     wanted = max(0.25 * abs(step), 0.999 * self.resolution)
                     continue
+                touched = self._touched(trail)[0] if len(trail) > 1 else None
+                if touched is not None:
+                    return (yield from self._touch(*touched, branch))
                 last = self._state(point.field, point.at, slope)
                 yield last
                 at = target if step == target - point.at else point.at + step
@@ -222,12 +225,7 @@ class SharpMethod(Method):
                 if reached.at <= look or reached.at == target:
                     touched, clearance = self._touched(trail)
                     if touched is not None:
-                        point, touches = touched
-                        last = self._state(point.field, point.at, point.slope)
-                        gaps = yield from self._jump(
-                            point.field.gaps, point.at, branch, last, touches=touches
-                        )
-                        return point.at, gaps
+                        return (yield from self._touch(*touched, branch))
                     look, trail = reached.at - clearance / _FASTEST_CLOSING, [reached]
             small = self.edges.without_small(reached.field.gaps)
             if small is not None:
@@ -243,6 +241,14 @@ class SharpMethod(Method):
                 yield self._state(point.field, point.at, slope)
                 shown = (point.at, slope)
         return target, point.field.gaps
+
+    def _touch(
+        self, point: Point, touches: list[Touch], branch: Branch
+    ) -> Generator[ContactState | Jump, None, tuple[float, Array]]:
+        """Jump from the point of a branch at which surfaces touch inside a gap."""
+        before = self._state(point.field, point.at, point.slope)
+        gaps = yield from self._jump(point.field.gaps, point.at, branch, before, touches=touches)
+        return point.at, gaps
 
     def _next_step(self, point: Point, target: float, wanted: float) -> float:
         """Next step in q0 s: no edge moves too far by prediction, the target is not passed."""

@@ -15,6 +15,8 @@ from solver.sharp_step import off_saddle, running_step
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
 _REUSES = 8  # running steps that share one tangent
+_NOISE = 1e-3  # a rise of the energy below this share of the work done both ways is rounding
+_LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
 
 # How a descent ended.
 RESTING, NARROW, UNFINISHED = 0, 1, 2
@@ -190,13 +192,15 @@ def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-unty
         RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
         length, UNFINISHED after the last step.
     """
-    count = gaps.shape[0]
-    edges = 2 * count
+    edges = 2 * gaps.shape[0]
     fields = 0
     tangents = 0
     reuses = 0
     runners = 0
+    share = 1.0  # of the longest step; less after a step that raised the energy
+    before = gaps
     last = np.zeros(edges)
+    force = np.zeros(edges)  # of the energy on each edge, before the last step
     d = np.zeros(edges)
     matrix = np.zeros((edges, edges))
     while fields < most:
@@ -206,21 +210,41 @@ def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-unty
         kinds = choose_kinds(table, law.digits, rules.counts)
         of = solve(gaps, separation, kinds, 1 if held else 2, rules, panels)
         residual, drift = _residual(of, law, panels)
+        # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²
+        rise = 0.0
+        fall = 0.0
+        fresh = np.empty(edges)
+        for e in range(edges):
+            fresh[e] = residual[e] * (2 * of.opening[e] - residual[e])
+            work = 0.5 * (force[e] + fresh[e]) * last[e]
+            rise += work
+            fall += abs(work)
+        if rise > _NOISE * fall and share > _LEAST_SHARE and fields > 1:
+            gaps = before
+            share *= 0.5
+            runners = 0
+            last = np.zeros(edges)
+            continue
+        if fall > 0:
+            share = min(1.0, 2 * share)
+        force = fresh
+        longest = share * law.longest
         if held:
             reuses += 1
-            limit = _limits(table, 2 * law.longest if runners == 1 else law.longest)
+            limit = _limits(table, 2 * longest if runners == 1 else longest)
             step = running_step(matrix, d, -residual, limit)
             turns = False
             for e in range(edges):
-                if abs(step[e]) > 0.2 * law.longest and step[e] * last[e] <= 0:
+                if abs(step[e]) > 0.2 * longest and step[e] * last[e] <= 0:
                     turns = True
             if turns:
                 runners = 0
+                last = np.zeros(edges)
                 continue
         else:
             tangents += 1
             reuses = 0
-            limit = _limits(table, law.longest)
+            limit = _limits(table, longest)
             tangent, _ = _tangent(of, drift, rules)
             d, matrix = _symmetric(of, tangent, law.overlapping)
             step = running_step(matrix, d, -residual, limit)
@@ -234,8 +258,9 @@ def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-unty
             size = np.abs(step).max()
         runners = 0
         for e in range(edges):
-            if abs(step[e]) > 0.5 * law.longest:
+            if abs(step[e]) > 0.5 * longest:
                 runners += 1
+        before = gaps
         gaps = _moved(gaps, step)
         last = step
         if _narrowest(gaps) < law.smallest:

@@ -10,66 +10,89 @@ from solver.sharp_linear import factor_rows, solve_column
 
 @compiled
 def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # compiled
-    """Step of every edge: runners at their limit, the others by Newton's step around them.
+    """Step of every edge: a minimum of the energy's quadratic model in the box of the limits.
 
-    ``matrix`` is the symmetric tangent, ``d`` its scale factors, ``pull`` C_c - C. Edges become
-    runners one after the other: those that Newton's step would move beyond their limit, and, while
-    the matrix of the others is not positive definite, the one that its softest mode moves most.
+    ``matrix`` is the symmetric tangent, ``d`` its scale factors, ``pull`` C_c - C. The edges at
+    their limit run, the others follow by Newton's step around them. Edges become runners where
+    Newton's step would move them beyond their limit, and, while the matrix of the others is not
+    positive definite, the one that its softest mode moves most. A runner that the model pulls back
+    is set free again; one that would only run again is turned round.
     """
     n = pull.shape[0]
-    step = np.zeros(n)
+    y = np.zeros(n)  # the step times d
+    bound = limit * d
+    load = pull * d
     runs = np.zeros(n, dtype=np.bool_)
-    scaled = pull * d
-    for _ in range(n + 1):
+    returns = np.zeros(n, dtype=np.int64)
+    for _ in range(4 * n + 4):
         free = np.flatnonzero(~runs)
-        if free.shape[0] == 0:
-            break
-        block = np.empty((free.shape[0], free.shape[0]))
-        right = np.empty(free.shape[0])
-        for i in range(free.shape[0]):
-            right[i] = scaled[free[i]]
-            for j in range(n):
-                if runs[j]:
-                    right[i] -= matrix[free[i], j] * step[j] * d[j]
-            for j in range(free.shape[0]):
-                block[i, j] = matrix[free[i], free[j]]
-        factor = block.copy()
-        if factor_rows(factor, 1e-9):
+        count = free.shape[0]
+        if count > 0:
+            block = np.empty((count, count))
+            right = np.empty(count)
+            for i in range(count):
+                right[i] = load[free[i]]
+                for j in range(n):
+                    if runs[j]:
+                        right[i] -= matrix[free[i], j] * y[j]
+                for j in range(count):
+                    block[i, j] = matrix[free[i], free[j]]
+            factor = block.copy()
             newton = right.copy()
-            solve_column(factor, newton)
-        else:
-            values, vectors = np.linalg.eigh(block)
-            floor = 1e-9 * np.abs(values).max()
-            # The softest mode runs downhill; its largest edge leads. A pull without any share in
-            # that mode is a symmetric one: it keeps its symmetry.
-            downhill = vectors[:, 0] @ right
-            if abs(downhill) > 1e-6 * np.sqrt(right @ right):
-                mode = vectors[:, 0] / d[free]
-                lead = np.argmax(np.abs(mode))
-                edge = free[lead]
-                sign = np.sign(mode[lead]) * np.sign(downhill)
-                if abs(pull[edge]) * d[edge] > 0.5 * np.abs(right).max():
-                    sign = np.sign(pull[edge])
-                runs[edge] = True
-                step[edge] = sign * limit[edge]
+            if factor_rows(factor, 1e-9):
+                solve_column(factor, newton)
+            else:
+                values, vectors = np.linalg.eigh(block)
+                floor = 1e-9 * np.abs(values).max()
+                if values[0] <= floor:
+                    # The softest mode runs downhill; its largest edge leads. A pull without any
+                    # share in that mode is a symmetric one: it keeps its symmetry.
+                    downhill = vectors[:, 0] @ right
+                    if abs(downhill) > 1e-6 * np.sqrt(right @ right):
+                        mode = vectors[:, 0]
+                        lead = np.argmax(np.abs(mode) / d[free])
+                        edge = free[lead]
+                        sign = np.sign(mode[lead]) * np.sign(downhill)
+                        if abs(load[edge]) > 0.5 * np.abs(right).max():
+                            sign = np.sign(load[edge])
+                        runs[edge] = True
+                        y[edge] = sign * bound[edge]
+                        continue
+                values = np.maximum(np.abs(values), floor)
+                newton = vectors @ ((vectors.T @ right) / values)
+            inside = True
+            for i in range(count):
+                edge = free[i]
+                y[edge] = newton[i]
+                if not abs(newton[i]) <= bound[edge]:
+                    runs[edge] = True
+                    y[edge] = np.sign(newton[i]) * bound[edge]
+                    inside = False
+            if not inside:
+                for i in range(count):
+                    if not runs[free[i]]:
+                        y[free[i]] = 0.0
                 continue
-            values = np.maximum(np.abs(values), floor)
-            newton = vectors @ ((vectors.T @ right) / values)
-        newton /= d[free]
-        done = True
-        for i in range(free.shape[0]):
-            edge = free[i]
-            step[edge] = newton[i]
-            if not abs(newton[i]) <= limit[edge]:
-                runs[edge] = True
-                step[edge] = np.sign(newton[i]) * limit[edge]
-                done = False
-        if done:
+        # Is every runner pushed against its limit?
+        worst = 0.0
+        back = -1
+        for e in range(n):
+            if runs[e] and returns[e] < 2:
+                push = load[e]
+                for f in range(n):
+                    push -= matrix[e, f] * y[f]
+                if -push * y[e] > worst * bound[e]:
+                    worst = -push * y[e] / bound[e]
+                    back = e
+        if back < 0:
             break
-        for i in range(free.shape[0]):
-            if not runs[free[i]]:
-                step[free[i]] = 0.0
-    return step
+        returns[back] += 1
+        if returns[back] == 1:
+            runs[back] = False
+            y[back] = 0.0
+        else:
+            y[back] = -y[back]
+    return y / d
 
 
 @compiled
