@@ -318,10 +318,8 @@ class SharpMethod(Method):
         return np.empty((0, 2)) if point is None else point.field.gaps
 
     def _same(self, one: Array, other: Array) -> bool:
-        """Whether two equilibria are one to the accuracy of Newton's iteration."""
-        return one.shape == other.shape and bool(
-            np.abs(one - other).max() < 100 * self.edges.settled
-        )
+        """Whether two equilibria are one to the accuracy at which they are known."""
+        return one.shape == other.shape and bool(np.abs(one - other).max() < 10 * self.edges.coarse)
 
     def _relax(self, gaps: Array, at: float, touches: list[Touch]) -> Point | None:
         """Descend to the next minimum of the energy; None when no contact is left."""

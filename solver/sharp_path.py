@@ -77,6 +77,8 @@ class EdgeMechanics:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
         self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
+        # How far an equilibrium may move with the error of the field.
+        self.coarse = max(self.settled, 10 * tolerance * self.wave)
         # Steps above 0.1 λ_min leap over pinned minima. Where two edges race, which minimum is
         # reached can depend on the step down to 0.05 λ_min, below which no loop was seen to change;
         # an edge that runs alone takes twice that.
@@ -93,6 +95,7 @@ class EdgeMechanics:
             critical=float(critical),
             digits=float(-np.log(tolerance)),
             settled=self.settled,
+            coarse=self.coarse,
             near=_NEAR * self.wave,
             longest=self.longest_step,
             smallest=float(self.smallest),

@@ -33,6 +33,8 @@ class Law(NamedTuple):
         -ln of the relative accuracy of the field.
     settled : float
         A correction this small ends Newton's iteration.
+    coarse : float
+        So far an equilibrium may move with the error of the field; no smaller than ``settled``.
     near : float
         Descent steps shorter than this are left to Newton's iteration.
     longest : float
@@ -46,6 +48,7 @@ class Law(NamedTuple):
     critical: float
     digits: float
     settled: float
+    coarse: float
     near: float
     longest: float
     smallest: float
@@ -139,7 +142,10 @@ def equilibrium(gaps, separation, reach, law, rules, panels):  # type: ignore[no
         tangent, by_edge = _tangent(of, drift, rules)
         step = np.linalg.solve(tangent, -residual)
         size = np.abs(step).max()
-        if size <= law.settled:
+        # The field has steps of the size of its error, where panels or modes change: an iteration
+        # to and fro across one of them is at its end.
+        stalled = size <= law.coarse and size > 0.3 * last
+        if size <= law.settled or stalled:
             _, matrix = _symmetric(of, tangent, law.overlapping)
             found = is_definite(matrix)
             break
@@ -253,7 +259,7 @@ def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-unty
             if of.opening[e] < -law.overlapping:
                 step[e] = limit[e]
         size = np.abs(step).max()
-        if size <= law.settled and not held and not is_definite(matrix):
+        if size <= law.coarse and not held and not is_definite(matrix):
             step = off_saddle(matrix, d, limit)
             size = np.abs(step).max()
         runners = 0
