@@ -7,6 +7,28 @@ import numpy as np
 from solver.compiled import compiled
 from solver.sharp_linear import factor_rows, solve_column
 
+_SWEEPS = 200
+
+
+@compiled
+def _sweep(matrix, load, bound, y):  # type: ignore[no-untyped-def]  # compiled
+    """Minimise ½ yᵀMy - loadᵀy in |y| ≤ bound, one edge after the other, in place."""
+    for _ in range(_SWEEPS):
+        largest = 0.0
+        for e in range(y.shape[0]):
+            pull = load[e]
+            for f in range(y.shape[0]):
+                if f != e:
+                    pull -= matrix[e, f] * y[f]
+            if matrix[e, e] * bound[e] > abs(pull):
+                value = pull / matrix[e, e]
+            else:
+                value = np.sign(pull) * bound[e]
+            largest = max(largest, abs(value - y[e]) / bound[e])
+            y[e] = value
+        if largest < 1e-12:
+            break
+
 
 @compiled
 def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # compiled
@@ -16,14 +38,15 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
     their limit run, the others follow by Newton's step around them. Edges become runners where
     Newton's step would move them beyond their limit, and, while the matrix of the others is not
     positive definite, the one that its softest mode moves most. A runner that the model pulls back
-    is set free again; one that would only run again is turned round.
+    is set free again; if it is pulled back once more, every edge in turn is put where the model is
+    lowest, until none moves.
     """
     n = pull.shape[0]
     y = np.zeros(n)  # the step times d
     bound = limit * d
     load = pull * d
     runs = np.zeros(n, dtype=np.bool_)
-    returns = np.zeros(n, dtype=np.int64)
+    returned = np.zeros(n, dtype=np.bool_)
     for _ in range(4 * n + 4):
         free = np.flatnonzero(~runs)
         count = free.shape[0]
@@ -77,7 +100,7 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
         worst = 0.0
         back = -1
         for e in range(n):
-            if runs[e] and returns[e] < 2:
+            if runs[e]:
                 push = load[e]
                 for f in range(n):
                     push -= matrix[e, f] * y[f]
@@ -86,12 +109,12 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
                     back = e
         if back < 0:
             break
-        returns[back] += 1
-        if returns[back] == 1:
-            runs[back] = False
-            y[back] = 0.0
-        else:
-            y[back] = -y[back]
+        if returned[back]:
+            _sweep(matrix, load, bound, y)
+            break
+        returned[back] = True
+        runs[back] = False
+        y[back] = 0.0
     return y / d
 
 

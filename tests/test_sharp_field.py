@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from explicit_solution import explicit_solution
 
-from solver import self_affine_profile, single_wave
+from solver import HalfSpace, Problem, self_affine_profile, single_wave
+from solver.grid import GridMethod
 from solver.sharp_gaps import GapField
 from solver.sharp_map import map_gaps, theta_at
 from solver.sharp_opening import fine_opening, work_of_gaps
@@ -166,6 +167,38 @@ def test_mean_gap_is_the_separation(source, separation):
         shape = fine_opening(field, k)
         total += float(shape.weight @ shape.opening)
     assert abs(total / (2 * np.pi * separation) - 1) < 1e-9
+
+
+def test_edge_opening_against_the_edge_stress_of_the_grid():
+    """K of four patches on the grid: first order in dx, and the constant of its edge node.
+
+    The stress of a patch's last node is 0.7602 K/sqrt(dx), and the edge lies 0.190 dx inside the
+    outer face of that node (docs/methods.md).
+    """
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=2, ratio=8, h_rms=1e-6, seed=2)
+    source, half_space = StressSource(profile), HalfSpace(1e6, 0.5)
+    separation = 0.3 * profile.h_max
+    wanted = np.array([[0.4, 1.5], [2.0, 2.9], [3.3, 4.6], [5.1, 5.9]])  # patches
+    errors = []
+    for n in (4096, 16384):
+        grid = GridMethod(Problem(profile, half_space, 0.02), nodes=n)
+        first, last = np.round(wanted * n / (2 * np.pi)).astype(int).T
+        contact = grid.solver.empty(separation)
+        for a, b in zip(first, last, strict=True):
+            contact.mask[a : b + 1] = True
+        grid.solver.solve(contact, 1e-10)
+        dx = profile.period / n
+        k_grid = -contact.stress[np.stack([first, last])] * np.sqrt(dx) / 0.7602
+        left, right = ((first - 0.31) * 2 * np.pi / n, (last + 0.31) * 2 * np.pi / n)
+        gaps = np.stack([right, np.append(left[1:], left[0] + 2 * np.pi)], axis=1)
+        opening = GapField(source, gaps, separation * profile.q0, 1e-10).opening
+        # of a gap's ends the left one belongs to the patch before it
+        by_patch = np.stack([np.roll(opening[:, 1], 1), opening[:, 0]])
+        k = by_patch * half_space.modulus / 4 * np.sqrt(2 * np.pi / profile.q0)
+        errors.append(float(np.abs(k_grid - k).max() / np.abs(k).max()))
+    assert errors[0] < 0.02
+    # four times the nodes: a quarter of the error, but for the four digits of the constants
+    assert errors[1] < 0.4 * errors[0] + 2e-4
 
 
 def test_hundreds_of_patches_in_one_period():
