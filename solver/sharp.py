@@ -29,9 +29,9 @@ from solver.sharp_touch import Nucleation, Touch
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
 _CORRECTED = 0.05  # longest correction of a prediction, in λ_min
 _FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
-_RESOLUTION = 0.02  # resolution of a jump's separation, in units of accuracy·h_max
+_RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
-_BEND = 3e-4  # largest relative error of the trapezoidal rule over one step
+_BEND = 1.5e-4  # largest relative error of the trapezoidal rule over one step
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten that rule
 
 
