@@ -299,6 +299,9 @@ def test_more_than_two_hundred_patches():
 def test_number_of_nodes():
     problem = Problem(rough_profile(), HALF_SPACE, 1e-3)  # highest harmonic 12
     assert GridMethod(problem).n == 1024
+    # first order: a tenth of the error takes ten times the nodes, up to 256 per shortest wave
+    assert GridMethod(problem, accuracy=2e-4).n == 2048
+    assert GridMethod(problem, accuracy=1e-6).n == 4096
     assert GridMethod(problem, nodes_per_wave=32).n == 512
     assert GridMethod(problem, nodes=200).n == 200
     method = make_method("grid", problem, nodes_per_wave=100)
