@@ -114,7 +114,7 @@ class SolverTable:
     )
     accuracy: float = _key(number_between(0, 1), "wanted relative error of the loss", 1e-3)
     nodes_per_wave: int | None = _key(
-        whole_number(4, 100_000), "nodes per shortest wave, instead of those of accuracy", None
+        whole_number(8, 100_000), "nodes per shortest wave, instead of those of accuracy", None
     )
     time_limit: float | None = _key(
         positive_number("s"), "longest time of one task in s", None, free=True

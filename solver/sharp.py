@@ -175,23 +175,21 @@ class SharpMethod(Method):
                 return
             at = first
             yield self.detached(at / self.q0)
-            gaps = yield from self._jump(gaps, at, branch, touches=highest)
-        settled = False
-        while len(gaps) and (at != target or not settled):
+            point = yield from self._jump(gaps, at, branch, touches=highest)
+        else:
             point = self._equilibrium(gaps, at)
-            settled = True
             if point is None:
-                gaps = yield from self._jump(gaps, at, branch)
+                point = yield from self._jump(gaps, at, branch)
             elif at == target:
                 yield self._state(point.field, at, point.slope, separation)
-            else:
-                at, gaps = yield from self._branch(point, target, separation, branch)
-        if not len(gaps) and at != target:
+        while point is not None and at != target:
+            at, point = yield from self._branch(point, target, separation, branch)
+        if point is None and at != target:
             yield self.detached(separation)
 
     def _branch(
         self, point: Point, target: float, separation: float, branch: Branch
-    ) -> Generator[ContactState | Jump, None, tuple[float, Array]]:
+    ) -> Generator[ContactState | Jump, None, tuple[float, Point | None]]:
         """Walk along a stable branch to the target or through its next jump."""
         wanted = np.inf
         slope = point.slope
@@ -211,10 +209,10 @@ class SharpMethod(Method):
                 last = self._state(point.field, point.at, slope)
                 yield last
                 at = target if step == target - point.at else point.at + step
-                gaps = yield from self._jump(
+                after = yield from self._jump(
                     point.field.gaps, at, branch, self._shifted(last, point.field, at)
                 )
-                return at, gaps
+                return at, after
             next_slope = reached.slope
             error = self._trapezoid_error(shown, reached, next_slope)
             if error > 4 and abs(step) > self.resolution:
@@ -230,25 +228,25 @@ class SharpMethod(Method):
             small = self.edges.without_small(reached.field.gaps)
             if small is not None:
                 last = self._state(reached.field, reached.at, next_slope)
-                gaps = yield from self._jump(
+                after = yield from self._jump(
                     reached.field.gaps, reached.at, branch, last, start=small
                 )
-                return reached.at, gaps
+                return reached.at, after
             point, slope, wanted = reached, next_slope, 2 * abs(step)
             if point.at == target:
                 yield self._state(point.field, target, slope, separation)
             elif error > 1:
                 yield self._state(point.field, point.at, slope)
                 shown = (point.at, slope)
-        return target, point.field.gaps
+        return target, point
 
     def _touch(
         self, point: Point, touches: list[Touch], branch: Branch
-    ) -> Generator[ContactState | Jump, None, tuple[float, Array]]:
+    ) -> Generator[ContactState | Jump, None, tuple[float, Point | None]]:
         """Jump from the point of a branch at which surfaces touch inside a gap."""
         before = self._state(point.field, point.at, point.slope)
-        gaps = yield from self._jump(point.field.gaps, point.at, branch, before, touches=touches)
-        return point.at, gaps
+        after = yield from self._jump(point.field.gaps, point.at, branch, before, touches=touches)
+        return point.at, after
 
     def _next_step(self, point: Point, target: float, wanted: float) -> float:
         """Next step in q0 s: no edge moves too far by prediction, the target is not passed."""
@@ -284,8 +282,12 @@ class SharpMethod(Method):
         before: ContactState | None = None,
         start: Array | None = None,
         touches: list[Touch] | None = None,
-    ) -> Generator[ContactState | Jump, None, Array]:
-        """Descend at fixed separation from ``gaps`` (or ``start``): before, jump, after."""
+    ) -> Generator[ContactState | Jump, None, Point | None]:
+        """Descend at fixed separation from ``gaps`` (or ``start``): before, jump, after.
+
+        Returns the minimum as it was found: next to a fold it may not be found again from its own
+        edges.
+        """
         if before is None:
             before = self._state(self.edges.field(gaps, at) if len(gaps) else None, at)
         if len(gaps):
@@ -315,7 +317,7 @@ class SharpMethod(Method):
             patch_length=length,
         )
         yield after
-        return np.empty((0, 2)) if point is None else point.field.gaps
+        return point
 
     def _same(self, one: Array, other: Array) -> bool:
         """Whether two equilibria are one to the accuracy at which they are known."""
