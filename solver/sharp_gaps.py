@@ -192,7 +192,7 @@ class GapField:
         self.source, self.gaps, self.separation = source, gaps, separation
         if solution is None:
             kinds = choose_kinds(map_gaps(gaps), -np.log(tolerance), RULES.counts)
-            solution = solve(gaps, separation, kinds, 2, RULES, source.panels)
+            solution = Solution(*solve_plain(gaps, separation, kinds, 2, RULES, source.panels))
         if np.isnan(solution.pressure):
             raise FloatingPointError("the matrix of the gaps is not positive definite")
         self.solution = solution
@@ -249,7 +249,7 @@ def solve(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-un
     )
     factor, definite = cholesky(matrix)
     solved = rhs.copy()
-    opening = np.empty(2 * table.shape[0])
+    opening = np.full(2 * table.shape[0], np.nan)
     pressure = np.nan
     unit_mean = np.nan
     f = np.empty(theta.shape[0])
@@ -273,6 +273,25 @@ def solve(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-un
         table, kinds, offset, theta, weight, slope, matrix, factor, rhs, solved, beyond,
         unit_mean, pressure, f, opening,
     )  # fmt: skip
+
+
+@compiled
+def plain(of):  # type: ignore[no-untyped-def]  # compiled
+    """Give a solution as a plain tuple, for the way back to Python.
+
+    To make a named one, compiled code calls Python, where a signal's handler may run and raise: an
+    exception that is not expected there.
+    """
+    return (
+        of.table, of.kinds, of.offset, of.theta, of.weight, of.slope, of.matrix, of.factor, of.rhs,
+        of.solved, of.beyond, of.unit_mean, of.pressure, of.f, of.opening,
+    )  # fmt: skip
+
+
+@compiled
+def solve_plain(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-untyped-def]
+    """As :func:`solve`, for calls from Python."""
+    return plain(solve(gaps, separation, kinds, fields, rules, panels))
 
 
 @compiled

@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.profile import Array
-from solver.sharp_gaps import RULES, GapField
+from solver.sharp_gaps import RULES, GapField, Solution
 from solver.sharp_run import NARROW, RESTING, Law, descend, equilibrium
 from solver.sharp_source import StressSource
 
 _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
 _DESCENT_LIMIT = 100_000
+_RESTS = 20  # how often a descent may come to rest without a minimum that Newton's iteration finds
+_ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
 
 
 @dataclass
@@ -115,19 +117,29 @@ class EdgeMechanics:
         patch[-1] = gaps[0, 0] + 2 * np.pi
         return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
 
-    def equilibrium(self, gaps: Array, separation: float, reach: float) -> Point | None:
+    def equilibrium(
+        self,
+        gaps: Array,
+        separation: float,
+        reach: float,
+        kinds: NDArray[np.int64] = _ANY,
+        *,
+        patient: bool = True,
+    ) -> Point | None:
         """Stable equilibrium near these gaps, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
-        equilibrium is not stable.
+        equilibrium is not stable. ``kinds`` are the least kinds of the gaps. If not ``patient``,
+        gaps that are nearly in equilibrium are taken as they are.
         """
         length, patch = self.widths(gaps)
         if not (length.min() > 0 and patch.min() > 0):
             return None
         try:
             found, at, solution, rate, slope, steps = equilibrium(
-                gaps, separation, max(reach, self.settled), self.law, RULES, self.source.panels
-            )
+                gaps, separation, max(reach, self.settled), kinds, patient, self.law, RULES,
+                self.source.panels,
+            )  # fmt: skip
         except np.linalg.LinAlgError:
             return None
         self.count.newton_steps += steps
@@ -135,7 +147,7 @@ class EdgeMechanics:
         self.count.derivatives += steps
         if not found:
             return None
-        field = GapField(self.source, at, separation, self.tolerance, solution)
+        field = GapField(self.source, at, separation, self.tolerance, Solution(*solution))
         return Point(separation, field, rate, slope)
 
     def relax(self, gaps: Array, separation: float, reach: float) -> Point | Array:
@@ -153,9 +165,11 @@ class EdgeMechanics:
             If the descent does not end.
         """
         left = _DESCENT_LIMIT
+        kinds = _ANY
+        rests = 0
         while left > 0:
-            gaps, ended, fields, tangents = descend(
-                gaps, separation, left, self.law, RULES, self.source.panels
+            gaps, ended, fields, tangents, kinds = descend(
+                gaps, separation, left, kinds, self.law, RULES, self.source.panels
             )
             self.count.fields += fields
             self.count.descent_steps += fields
@@ -166,7 +180,11 @@ class EdgeMechanics:
                 if rest is not None:
                     return rest
             if ended == RESTING:
-                point = self.equilibrium(gaps, separation, reach)
+                # Next to a fold the field's error may hide whether there is a minimum; whatever
+                # is taken for it, the next step in s decides.
+                rests += 1
+                patient = rests <= _RESTS
+                point = self.equilibrium(gaps, separation, reach, kinds, patient=patient)
                 if point is not None:
                     return point
         raise RuntimeError(f"the descent at q0 s = {separation} did not end")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.compiled import compiled
-from solver.sharp_gaps import choose_kinds, derivatives, edge_openings, solve
+from solver.sharp_gaps import choose_kinds, derivatives, edge_openings, plain, solve
 from solver.sharp_linear import is_definite
 from solver.sharp_map import LEFT, LEFT_PATCH, RIGHT, RIGHT_PATCH, map_gaps
 from solver.sharp_source import measure_at
@@ -115,12 +115,25 @@ def _moved(gaps, step):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def equilibrium(gaps, separation, reach, law, rules, panels):  # type: ignore[no-untyped-def]
+def _at_least(kinds, least):  # type: ignore[no-untyped-def]  # compiled
+    """``kinds``, none below ``least`` (which is empty for no bound).
+
+    While edges move towards one state, a gap must not lose modes again, or the field's error would
+    drive them to and fro.
+    """
+    if least.shape[0] == kinds.shape[0]:
+        return np.maximum(kinds, least)
+    return kinds
+
+
+@compiled
+def equilibrium(gaps, separation, reach, least, patient, law, rules, panels):  # type: ignore[no-untyped-def]
     """Newton's iteration for C_e = C_c from nearby edges.
 
     Returns whether a stable equilibrium was found with no edge moving further than ``reach``, its
     gaps, its solution, the rate dn/d(q0 s) of every edge along the branch, dp/d(q0 s) along it, and
-    the number of corrections.
+    the number of corrections. ``least`` are the least kinds of the gaps, or empty. If not
+    ``patient``, edges out of equilibrium by no more than ``law.near`` are taken as they are.
 
     Raises
     ------
@@ -128,7 +141,7 @@ def equilibrium(gaps, separation, reach, law, rules, panels):  # type: ignore[no
         If a tangent is singular.
     """
     at = gaps
-    kinds = choose_kinds(map_gaps(gaps), law.digits, rules.counts)
+    kinds = _at_least(choose_kinds(map_gaps(gaps), law.digits, rules.counts), least)
     travelled = np.zeros(gaps.size)
     last = np.inf
     found = False
@@ -147,7 +160,10 @@ def equilibrium(gaps, separation, reach, law, rules, panels):  # type: ignore[no
         stalled = size <= law.coarse and size > 0.3 * last
         if size <= law.settled or stalled:
             _, matrix = _symmetric(of, tangent, law.overlapping)
-            found = is_definite(matrix)
+            found = is_definite(matrix) or not patient
+            break
+        if not patient and size <= law.near:
+            found = True
             break
         travelled += step
         # not written as > : a size that is no number is a failure, too
@@ -169,7 +185,7 @@ def equilibrium(gaps, separation, reach, law, rules, panels):  # type: ignore[no
         slope = by_separation
         for e in range(rate.shape[0]):
             slope += by_edge[e] * (rate[e] if e % 2 == 0 else -rate[e])
-    return found, at, of, rate, slope, steps
+    return found, at, plain(of), rate, slope, steps
 
 
 @compiled
@@ -184,7 +200,7 @@ def _limits(table, longest):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-untyped-def]
+def descend(gaps, separation, most, least, law, rules, panels):  # type: ignore[no-untyped-def]
     """Descend in energy at fixed separation, for at most ``most`` steps.
 
     Edges out of equilibrium run in the direction in which the energy falls, all at the same speed
@@ -194,7 +210,7 @@ def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-unty
 
     Returns
     -------
-    gaps, how it ended, fields, tangents
+    gaps, how it ended, fields, tangents, kinds
         RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
         length, UNFINISHED after the last step.
     """
@@ -209,11 +225,12 @@ def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-unty
     force = np.zeros(edges)  # of the energy on each edge, before the last step
     d = np.zeros(edges)
     matrix = np.zeros((edges, edges))
+    kinds = least
     while fields < most:
         fields += 1
         held = runners > 0 and reuses < _REUSES
         table = map_gaps(gaps)
-        kinds = choose_kinds(table, law.digits, rules.counts)
+        kinds = _at_least(choose_kinds(table, law.digits, rules.counts), kinds)
         of = solve(gaps, separation, kinds, 1 if held else 2, rules, panels)
         residual, drift = _residual(of, law, panels)
         # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²
@@ -270,7 +287,7 @@ def descend(gaps, separation, most, law, rules, panels):  # type: ignore[no-unty
         gaps = _moved(gaps, step)
         last = step
         if _narrowest(gaps) < law.smallest:
-            return gaps, NARROW, fields, tangents
+            return gaps, NARROW, fields, tangents, kinds
         if size < law.near:
-            return gaps, RESTING, fields, tangents
-    return gaps, UNFINISHED, fields, tangents
+            return gaps, RESTING, fields, tangents, kinds
+    return gaps, UNFINISHED, fields, tangents, kinds
