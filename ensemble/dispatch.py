@@ -19,11 +19,13 @@ from __future__ import annotations
 import heapq
 import math
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any, Literal, Protocol
 
 from ensemble.schedule import Schedule
@@ -146,13 +148,17 @@ def attempt(
 
 @contextmanager
 def _watched(check: Check) -> Iterator[None]:
-    """Call ``check`` from a timer too: a task may hang long before it next calls it itself."""
+    """Call ``check`` from a timer too: a task may hang long before it next calls it itself.
+
+    Where compiled code hands its results to Python, an exception is not expected: it would be lost,
+    or end the process. There the check waits until the task's own code goes on.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     over = False
 
-    def on_alarm(*_: object) -> None:
+    def look() -> None:
         nonlocal over
         if not over:
             try:
@@ -160,6 +166,17 @@ def _watched(check: Check) -> Iterator[None]:
             except BaseException:
                 over = True  # once is enough: not again while the first one unwinds
                 raise
+
+    def on_alarm(_: int, frame: FrameType | None) -> None:
+        if _handing_over(frame):
+            sys.setprofile(later)
+        else:
+            look()
+
+    def later(frame: FrameType, *_: object) -> None:
+        if not _handing_over(frame):
+            sys.setprofile(None)
+            look()
 
     before = signal.signal(signal.SIGALRM, on_alarm)
     signal.setitimer(signal.ITIMER_REAL, WATCH_INTERVAL, WATCH_INTERVAL)
@@ -169,6 +186,16 @@ def _watched(check: Check) -> Iterator[None]:
         over = True
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+        sys.setprofile(None)
+
+
+def _handing_over(frame: FrameType | None) -> bool:
+    """Whether numba's own code is under way, as it is where compiled code returns."""
+    while frame is not None:
+        if str(frame.f_globals.get("__name__")).startswith("numba."):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def work_alone(

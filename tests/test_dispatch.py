@@ -7,7 +7,9 @@ import random
 import threading
 import time
 
+import numpy as np
 import pytest
+from numba import njit
 
 from ensemble.dispatch import (
     AHEAD,
@@ -261,6 +263,29 @@ def test_a_task_that_hangs_meets_its_time_limit():
     outcomes, _ = alone(compute, limits=Limits(task_seconds=0.3))
     assert [o.error for o in outcomes] == [None, "longer than the time limit of 0.3 s", None]
     assert outcomes[1].seconds < 2
+
+
+@njit
+def _sines(count):
+    """Compiled work that hands arrays back, and runs Python while it does."""
+    out = np.empty(4)
+    total = 0.0
+    for i in range(count):
+        total += np.sin(i)
+    out[:] = total
+    return out, out.copy()
+
+
+def test_a_task_in_compiled_code_meets_its_time_limit():
+    """The timer goes off in compiled code; its exception must not come where results are made."""
+    _sines(1)
+
+    def compute(task, check):
+        while True:
+            _sines(100_000)
+
+    outcomes, _ = alone(compute, limits=Limits(task_seconds=0.05))
+    assert [o.error for o in outcomes] == ["longer than the time limit of 0.05 s"] * 3
 
 
 def test_a_task_cannot_swallow_the_end_of_its_time():
