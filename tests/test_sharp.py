@@ -314,3 +314,34 @@ def test_fields_obey_the_boundary_conditions():
 def test_flat_profile_is_refused():
     with pytest.raises(ValueError, match="flat"):
         Problem(Profile(PERIOD, np.zeros(3, dtype=complex)), SOLID, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("hurst", "n0", "ratio", "gamma", "seed", "accuracy", "max_penetration"),
+    [
+        # a minimum at a fold that the field's error hides and shows again, from step to step
+        (0.43401581445546505, 4, 10, 0.16417912944464388, 798665, 1e-4, 0.5263623158621008),
+        (0.8, 5, 8, 0.01, 1511, 1e-3, 0.9),
+    ],
+)
+def test_loops_that_once_did_not_end(hurst, n0, ratio, gamma, seed, accuracy, max_penetration):
+    result = loop(
+        rough(seed, n0=n0, ratio=ratio, hurst=hurst),
+        gamma,
+        accuracy=accuracy,
+        max_penetration=max_penetration,
+    )
+    assert result.patches[-1] == 0
+    assert abs(result.audit_residual) < 1e-4
+
+
+def test_a_path_goes_on_from_a_minimum_next_to_a_fold():
+    """At s = 0.500853 h_max a jump ends so near to a fold that its state is hardly a minimum."""
+    profile = self_affine_profile(
+        0.8, period=PERIOD, n0=10, ratio=100, seed=765497817817844, c0=1e-13
+    )
+    method = SharpMethod(Problem(profile, SOLID, 0.04), accuracy=1e-3)
+    state = method.detached(profile.h_max)
+    for penetration in (0.0, 0.2, 0.4, 0.6):
+        state = method.follow(state, (1 - penetration) * profile.h_max).states[-1]
+    assert state.patches > 0
