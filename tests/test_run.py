@@ -191,7 +191,8 @@ def test_bad_campaigns_leave_nothing_behind(tmp_path):
     assert "[profile] period is -1.0: it must be a positive" in refused(tmp_path, period="-1.0")
     assert "realisations is 0: it must be" in refused(tmp_path, realisations="0")
     assert "speed is unknown" in refused(tmp_path, jumps="8\nspeed = 3")
-    assert "cannot be computed" in refused(tmp_path, nodes_per_wave="4")
+    assert "nodes_per_wave is 4: it must be" in refused(tmp_path, nodes_per_wave="4")
+    assert "cannot be computed" in refused(tmp_path, method='"sharp"')  # it has no nodes
 
 
 def test_bad_options(tmp_path):
