@@ -42,6 +42,8 @@ NOT_RUN = {
     "export HYSTERON=PATH/.venv/bin/hysteron": "a place of the reader's",
     "python benchmarks/endurance.py empty": "a quiet machine; tests/test_mpi.py runs it short",
     "python benchmarks/endurance.py campaign jobs/example.toml": "as before",
+    "python benchmarks/endurance.py campaign jobs/paper.toml --out paper.h5": "takes minutes",
+    "hysteron report paper.h5 --to paper --beside beside/*.h5": "needs their results",
     "python examples/measured_profile.py --to out/measured": "tests/test_measured_profile.py",
     "python examples/measured_profile.py trace.csv --to out/measured": "as before",
 }
