@@ -10,7 +10,7 @@ CAMPAIGN := jobs/example.toml
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
 
-setup:  ## everything that hysteron needs, into .venv (HYSTERON_APT=no: no system packages)
+setup:  ## everything that adhesis needs, into .venv (ADHESIS_APT=no: no system packages)
 	@tools/setup.sh
 
 setup-test:
@@ -29,10 +29,10 @@ test: setup-test  ## the whole test suite, MPI and (where it can be installed) S
 
 test-kills: setup  ## 20 kills each of a worker, of rank 0 and of the whole job (about 4 minutes)
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
-	    export MPIRUN HYSTERON_KILLS=20 && exec $(bin)/python -m pytest tests/test_mpi.py -k random_moments
+	    export MPIRUN ADHESIS_KILLS=20 && exec $(bin)/python -m pytest tests/ensemble/test_mpi.py -k random_moments
 
 bench: setup  ## speed against error of each method
-	$(bin)/hysteron bench
+	$(bin)/adhesis bench
 
 lock: setup  ## requirements.lock from the versions in .venv
 	@{ sed '/^[^#]/d' requirements.lock; \

@@ -29,13 +29,15 @@ from typing import Any
 
 import numpy as np
 
-import ensemble.run
-from ensemble.campaign import Campaign, load_campaign
-from ensemble.dispatch import Master, Worker
-from ensemble.ranks import world
-from ensemble.schema import DONE, RESULT_COLUMNS, file_size, scales, shape_of
-from ensemble.store import Results, Writer
-from ensemble.task import Task, TaskResult
+import ensemble.run.session
+from ensemble.campaign.file import load_campaign
+from ensemble.campaign.tables import Campaign
+from ensemble.campaign.tasks import Task
+from ensemble.results.schema import DONE, RESULT_COLUMNS, file_size, scales, shape_of
+from ensemble.results.store import Results, Writer
+from ensemble.run.dispatch import Master, Worker
+from ensemble.run.ranks import world
+from ensemble.task.compute import TaskResult
 
 ROOT = Path(__file__).resolve().parent.parent
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -90,7 +92,7 @@ def measure(times: Times) -> None:
             times.writing += time.perf_counter() - started
             times.rows += 1
 
-    vars(ensemble.run).update(Master=TimedMaster, Worker=TimedWorker, Writer=TimedWriter)
+    vars(ensemble.run.session).update(Master=TimedMaster, Worker=TimedWorker, Writer=TimedWriter)
 
 
 def do_nothing(seconds: float) -> Callable[..., TaskResult]:
@@ -119,9 +121,11 @@ def rank(options: argparse.Namespace) -> None:
     times = Times()
     measure(times)
     if options.pretend is not None:
-        vars(ensemble.run).update(run_task=do_nothing(options.pretend), check_task=lambda *_: None)
+        vars(ensemble.run.session).update(
+            run_task=do_nothing(options.pretend), check_task=lambda *_: None
+        )
     comm = world()
-    ensemble.run.run_campaign(load_campaign(options.campaign), options.out, comm)
+    ensemble.run.session.run_campaign(load_campaign(options.campaign), options.out, comm)
     times.run = time.perf_counter() - started
     place = 0 if comm is None else comm.rank
     Path(f"{options.out}.{place}.json").write_text(json.dumps(vars(times)))

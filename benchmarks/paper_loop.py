@@ -11,8 +11,8 @@ from collections import Counter
 
 import numpy as np
 
-from solver import HalfSpace, Problem, run_loop, self_affine_profile
-from solver.grid import GridMethod
+from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
+from solver.grid.method import GridMethod
 
 
 def main() -> None:

@@ -8,15 +8,15 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
-from ensemble.ranks import library_version
+from ensemble.run.ranks import library_version
 
-_PACKAGES = ("hysteron", "numpy", "scipy", "numba", "pyfftw", "h5py", "mpi4py")
+_PACKAGES = ("adhesis", "numpy", "scipy", "numba", "pyfftw", "h5py", "mpi4py")
 
 
 def versions() -> dict[str, str]:
     """Return the root attributes of a results file: versions, commit, and the MPI in use."""
     return {
-        "hysteron_version": _package("hysteron", missing="unknown"),
+        "adhesis_version": _package("adhesis", missing="unknown"),
         "commit": commit(),
         "python": platform.python_version(),
         "numpy": _package("numpy"),

@@ -17,7 +17,7 @@ import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import (
+from adhesis import (
     HalfSpace,
     LoopResult,
     Problem,
@@ -190,7 +190,7 @@ def study(trace: Path, folder: Path) -> None:
     draw(loop, x, z, figure)
     print(
         f"wrote {heights} and {figure}; the same loop:\n"
-        f"hysteron loop --heights {heights} --period {length:.12g} "
+        f"adhesis loop --heights {heights} --period {length:.12g} "
         f"--work-of-adhesion {WORK_OF_ADHESION:g} --young {MATERIAL.young:g} "
         f"--poisson {MATERIAL.poisson:g} --max-penetration {MAX_PENETRATION:g} "
         f"--load-steps {LOAD_STEPS}"

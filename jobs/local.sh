@@ -6,7 +6,7 @@
 # Results: out/NAME.h5, tables and figures: out/NAME/ (NAME from CAMPAIGN.toml), both below the
 # working directory; OUT=DIR puts them elsewhere. A results file of an earlier run is resumed.
 # RANKS: one more than the cores that this process may use, since the rank that hands out only
-# waits. MPIRUN=PATH chooses the launcher. Exit codes are those of hysteron run; 75: stopped early,
+# waits. MPIRUN=PATH chooses the launcher. Exit codes are those of adhesis run; 75: stopped early,
 # run it again to resume.
 set -euo pipefail
 
@@ -19,10 +19,10 @@ out=${OUT:-out}
 
 . "$here/tools/mpi.sh"
 
-if [ -x "$here/.venv/bin/hysteron" ]; then
-    hysteron=$here/.venv/bin/hysteron
-elif ! hysteron=$(command -v hysteron); then
-    echo "jobs/local.sh: hysteron is not installed: run make run, or tools/setup.sh" >&2
+if [ -x "$here/.venv/bin/adhesis" ]; then
+    adhesis=$here/.venv/bin/adhesis
+elif ! adhesis=$(command -v adhesis); then
+    echo "jobs/local.sh: adhesis is not installed: run make run, or tools/setup.sh" >&2
     exit 1
 fi
 mkdir -p "$out"
@@ -50,7 +50,7 @@ stop() {
 }
 trap stop USR1 TERM
 trap 'signalled=yes interrupted=yes' INT # Ctrl-C reaches mpirun by itself
-${launch[@]+"${launch[@]}"} "$hysteron" run "$campaign" --out "$out/$name.h5" </dev/null &
+${launch[@]+"${launch[@]}"} "$adhesis" run "$campaign" --out "$out/$name.h5" </dev/null &
 run=$!
 while :; do
     signalled='' code=0
@@ -66,5 +66,5 @@ if [ "$code" = 75 ]; then
 fi
 # 1: some tasks failed, which the report says too.
 if [ "$code" -gt 1 ] || [ ! -e "$out/$name.h5" ]; then exit "$code"; fi
-"$hysteron" report "$out/$name.h5" --to "$out/$name"
+"$adhesis" report "$out/$name.h5" --to "$out/$name"
 exit "$code"

@@ -6,7 +6,7 @@
 #
 # Submit it from the folder that holds the results ($FILE, default: NAME.h5 there); the report goes
 # to NAME/ beside it when all tasks are done. Further variables for -v, where the defaults do not
-# fit: HYSTERON=path of the hysteron command (default: .venv of the submit folder, then PATH),
+# fit: ADHESIS=path of the adhesis command (default: .venv of the submit folder, then PATH),
 # LAUNCHER="mpiexec" (default: mpirun on all slots of the job), SCRIPT=path of this file (default:
 # jobs/pbs.sh), MAX_RESTARTS=50.
 #
@@ -14,7 +14,7 @@
 # two minutes before, closes the file and exits with 75, and the job is submitted again. A job that
 # is deleted (qdel) is not.
 #
-#PBS -N hysteron
+#PBS -N adhesis
 #PBS -l select=1:ncpus=32:mpiprocs=32
 #PBS -l walltime=24:00:00
 #PBS -j oe
@@ -33,13 +33,13 @@ file=${FILE:-$name.h5}
 restarts=${RESTARTS:-0}
 limit=${MAX_RESTARTS:-50}
 
-if [ -z "${HYSTERON:-}" ]; then
-    HYSTERON=$PBS_O_WORKDIR/.venv/bin/hysteron
-    if [ ! -x "$HYSTERON" ]; then HYSTERON=$(command -v hysteron); fi
+if [ -z "${ADHESIS:-}" ]; then
+    ADHESIS=$PBS_O_WORKDIR/.venv/bin/adhesis
+    if [ ! -x "$ADHESIS" ]; then ADHESIS=$(command -v adhesis); fi
 fi
 slots=$(wc -l <"$PBS_NODEFILE")
 if [ -z "${LAUNCHER:-}" ]; then
-    mpirun=$(dirname "$HYSTERON")/../mpirun # set-up wrote down which one fits
+    mpirun=$(dirname "$ADHESIS")/../mpirun # set-up wrote down which one fits
     if [ -s "$mpirun" ]; then mpirun=$(cat "$mpirun"); else mpirun=mpirun; fi
     LAUNCHER="$mpirun -n $((slots)) -machinefile $PBS_NODEFILE"
 fi
@@ -62,7 +62,7 @@ cancelled=''
 trap 'cancelled=yes; kill -s TERM "$run" 2>/dev/null' TERM
 echo "$(date '+%F %T') job $PBS_JOBID, $((slots)) ranks, start $((restarts + 1)), ${left:-no} s to go"
 run=
-$LAUNCHER "$HYSTERON" run "$campaign" --out "$file" ${walltime[@]+"${walltime[@]}"} &
+$LAUNCHER "$ADHESIS" run "$campaign" --out "$file" ${walltime[@]+"${walltime[@]}"} &
 run=$!
 while :; do
     before=$cancelled
@@ -71,7 +71,7 @@ while :; do
     # A signal ends the wait, but not the run.
     if [ "$cancelled" = "$before" ]; then break; fi
 done
-echo "$(date '+%F %T') hysteron run ended with $code"
+echo "$(date '+%F %T') adhesis run ended with $code"
 
 if [ "$code" = 75 ] && [ -z "$cancelled" ]; then
     if [ "$restarts" -ge "$limit" ]; then
@@ -85,12 +85,12 @@ if [ "$code" = 75 ] && [ -z "$cancelled" ]; then
             if [ "$resource" = nodes ] && [ ${#options[@]} -gt 0 ]; then continue; fi
             if [ -n "$value" ]; then options+=(-l "$resource=$value"); fi
         done
-        variables=CAMPAIGN=$campaign,FILE=$file,HYSTERON=$HYSTERON,RESTARTS=$((restarts + 1))
+        variables=CAMPAIGN=$campaign,FILE=$file,ADHESIS=$ADHESIS,RESTARTS=$((restarts + 1))
         variables+=,MAX_RESTARTS=$limit,SCRIPT=${SCRIPT:-jobs/pbs.sh}
         qsub ${options[@]+"${options[@]}"} -v "$variables" "${SCRIPT:-jobs/pbs.sh}" ||
             echo "could not be submitted; qsub it again to resume"
     fi
 elif [ "$code" -le 1 ] && [ -e "$file" ]; then # 1: some tasks failed, which the report says too
-    "$HYSTERON" report "$file" --to "$name" || code=$?
+    "$ADHESIS" report "$file" --to "$name" || code=$?
 fi
 exit "$code"

@@ -5,7 +5,7 @@
 #
 # Submit it from the folder that holds the results (FILE.h5, default: NAME.h5 there); the report
 # goes to NAME/ beside it when all tasks are done. Set before submitting, where the defaults do not
-# fit: HYSTERON=path of the hysteron command (default: .venv of the submit folder, then PATH),
+# fit: ADHESIS=path of the adhesis command (default: .venv of the submit folder, then PATH),
 # LAUNCHER="srun --mpi=pmix" (default: mpirun if there is one, then srun), MAX_RESTARTS=50. One of
 # the tasks hands out and waits, the others compute.
 #
@@ -13,7 +13,7 @@
 # handing out, closes the file and exits with 75, and the job is put back into the queue. A job
 # that is cancelled is not. After the loss of a node Slurm itself requeues it (--requeue).
 #
-#SBATCH --job-name=hysteron
+#SBATCH --job-name=adhesis
 #SBATCH --ntasks=2
 #SBATCH --cpus-per-task=1
 #SBATCH --time=24:00:00
@@ -37,12 +37,12 @@ name=$(basename "$campaign" .toml)
 file=${2:-$name.h5}
 restarts=${SLURM_RESTART_COUNT:-0}
 
-if [ -z "${HYSTERON:-}" ]; then
-    HYSTERON=$SLURM_SUBMIT_DIR/.venv/bin/hysteron
-    if [ ! -x "$HYSTERON" ]; then HYSTERON=$(command -v hysteron); fi
+if [ -z "${ADHESIS:-}" ]; then
+    ADHESIS=$SLURM_SUBMIT_DIR/.venv/bin/adhesis
+    if [ ! -x "$ADHESIS" ]; then ADHESIS=$(command -v adhesis); fi
 fi
 if [ -z "${LAUNCHER:-}" ]; then
-    mpirun=$(dirname "$HYSTERON")/../mpirun # set-up wrote down which one fits
+    mpirun=$(dirname "$ADHESIS")/../mpirun # set-up wrote down which one fits
     if [ -s "$mpirun" ]; then mpirun=$(cat "$mpirun"); else mpirun=mpirun; fi
     LAUNCHER=srun
     if command -v "$mpirun" >/dev/null; then LAUNCHER="$mpirun -n $SLURM_NTASKS"; fi
@@ -65,7 +65,7 @@ trap 'pass_on USR1' USR1
 trap 'pass_on TERM' TERM
 
 echo "$(date '+%F %T') job $SLURM_JOB_ID on $SLURM_JOB_NODELIST, $SLURM_NTASKS ranks, start $((restarts + 1))"
-$LAUNCHER "$HYSTERON" run "$campaign" --out "$file" &
+$LAUNCHER "$ADHESIS" run "$campaign" --out "$file" &
 run=$!
 while :; do
     signalled=
@@ -74,7 +74,7 @@ while :; do
     # A signal ends the wait, but not the run.
     if [ -z "$signalled" ]; then break; fi
 done
-echo "$(date '+%F %T') hysteron run ended with $code"
+echo "$(date '+%F %T') adhesis run ended with $code"
 
 if [ "$code" = 75 ] && [ -z "$cancelled" ]; then
     if [ "$restarts" -ge "${MAX_RESTARTS:-50}" ]; then
@@ -83,6 +83,6 @@ if [ "$code" = 75 ] && [ -z "$cancelled" ]; then
         scontrol requeue "$SLURM_JOB_ID" || echo "could not be requeued; sbatch it again to resume"
     fi
 elif [ "$code" -le 1 ] && [ -e "$file" ]; then # 1: some tasks failed, which the report says too
-    "$HYSTERON" report "$file" --to "$name" || code=$?
+    "$ADHESIS" report "$file" --to "$name" || code=$?
 fi
 exit "$code"

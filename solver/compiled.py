@@ -52,12 +52,12 @@ def _compile(function: Callable[..., Any], **options: Any) -> Callable[..., Any]
 def _cache_folder() -> Path | None:
     """Folder for the present sources, created; None if there is no place to write."""
     digest = hashlib.sha256()
-    for module in sorted(Path(__file__).parent.glob("*.py")):
+    for module in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(module.read_bytes())
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
         root = Path(base) if base else Path.home() / ".cache"
-        folder = root / "hysteron" / digest.hexdigest()[:16]
+        folder = root / "adhesis" / digest.hexdigest()[:16]
         folder.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):
         return None

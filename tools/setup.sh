@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Sets up everything that `make run` and `make test` need, in .venv of this checkout.
 #
-#   tools/setup.sh            MPI, parallel HDF5, Python packages, hysteron itself
-#   tools/setup.sh --slurm    besides, as root on Debian or Ubuntu, the Slurm that tests/test_slurm.py starts
+#   tools/setup.sh            MPI, parallel HDF5, Python packages, adhesis itself
+#   tools/setup.sh --slurm    besides, as root on Debian or Ubuntu, the Slurm that tests/ensemble/test_slurm.py starts
 #
 # Does nothing if nothing has changed since the last time. Environment:
 #   PYTHON            the interpreter for .venv (default: python3)
 #   HDF5_DIR          a parallel HDF5 to build h5py against (default: looked for)
-#   HYSTERON_APT=no   never install system packages
+#   ADHESIS_APT=no   never install system packages
 # Lists of packages are words on purpose.
 # shellcheck disable=SC2046,SC2086,SC2030,SC2031
 set -euo pipefail
@@ -16,7 +16,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 venv=$root/.venv
 log=$root/.setup/setup.log
-stamp=$venv/hysteron-setup
+stamp=$venv/adhesis-setup
 slurm=no
 if [ "${1:-}" = --slurm ]; then slurm=yes; fi
 SECONDS=0
@@ -61,7 +61,7 @@ required() {
 # ---------------------------------------------------------------------------------- what is here
 
 can_apt() {
-    [ "${HYSTERON_APT:-yes}" != no ] && [ "$(id -u)" = 0 ] && [ -e /etc/debian_version ] &&
+    [ "${ADHESIS_APT:-yes}" != no ] && [ "$(id -u)" = 0 ] && [ -e /etc/debian_version ] &&
         command -v apt-get >/dev/null
 }
 
@@ -134,7 +134,7 @@ key() {
 digest() { key | sha256sum | cut -d ' ' -f 1; }
 
 ready() {
-    find_python && [ -x "$venv/bin/hysteron" ] && [ -e "$stamp" ] && [ "$(cat "$stamp")" = "$(digest)" ]
+    find_python && [ -x "$venv/bin/adhesis" ] && [ -e "$stamp" ] && [ "$(cat "$stamp")" = "$(digest)" ]
 }
 
 # missing PACKAGE…: those that dpkg does not have
@@ -279,9 +279,9 @@ if [ -n "$why_serial" ]; then
 fi
 if ! has_mpi; then
     step "no mpirun in PATH: one from the package mpich" pip install --quiet "mpich==$MPICH" ||
-        warn "no MPI: install one (Debian: openmpi-bin); hysteron run works in one process only"
+        warn "no MPI: install one (Debian: openmpi-bin); adhesis run works in one process only"
 fi
-required "hysteron, editable" pip install --quiet --no-deps --no-build-isolation --editable .
+required "adhesis, editable" pip install --quiet --no-deps --no-build-isolation --editable .
 
 # ----------------------------------------------------------------- the mpirun that fits, and Slurm
 
@@ -309,7 +309,7 @@ choose_launcher() {
     return 1
 }
 step "two ranks that see each other" choose_launcher ||
-    warn "no mpirun here starts ranks that mpi4py sees as one job: hysteron run works in one process only (hysteron doctor tells more)"
+    warn "no mpirun here starts ranks that mpi4py sees as one job: adhesis run works in one process only (adhesis doctor tells more)"
 
 if need_slurm; then install_slurm; fi
 
@@ -317,4 +317,4 @@ if [ -n "$why_serial" ]; then
     warn "no parallel writing, rank 0 writes the results file: $why_serial"
 fi
 digest >"$stamp"
-say "done in $SECONDS s (hysteron doctor tells what was found)"
+say "done in $SECONDS s (adhesis doctor tells what was found)"

@@ -12,7 +12,7 @@ import matplotlib as mpl
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-from solver import HalfSpace, Problem, make_method, run_loop, self_affine_profile
+from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile
 from solver.loop import LoopResult
 
 COLOURS = {"loading": "#1f5fa8", "unloading": "#c4472b"}

@@ -1,4 +1,4 @@
-"""The command line: ``hysteron COMMAND …``, one module a command.
+"""The command line: ``adhesis COMMAND …``, one module a command.
 
 A command module offers ``add_arguments(parser)`` and ``execute(args) -> int`` (the exit code), and
 its docstring's first line is its help. It is imported only when it is called, so that ``status``
@@ -40,13 +40,13 @@ def main(argv: list[str] | None = None) -> int:
     for variable in _ONE_THREAD:
         os.environ.setdefault(variable, "1")
     module = importlib.import_module(f"ensemble.command.{name}")
-    parser = argparse.ArgumentParser(prog=f"hysteron {name}", description=module.__doc__)
+    parser = argparse.ArgumentParser(prog=f"adhesis {name}", description=module.__doc__)
     module.add_arguments(parser)
     args = parser.parse_args(words[1:])
     try:
         code: int = module.execute(args)
     except InputError as error:
-        print(f"hysteron {name}: {error}", file=sys.stderr)
+        print(f"adhesis {name}: {error}", file=sys.stderr)
         return BAD_INPUT
     except BrokenPipeError:
         return 1
@@ -56,9 +56,9 @@ def main(argv: list[str] | None = None) -> int:
 def _overview() -> argparse.ArgumentParser:
     listing = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
     parser = argparse.ArgumentParser(
-        prog="hysteron",
+        prog="adhesis",
         description="Hysteresis loops of rough contacts with zero-range (JKR) adhesion.",
-        epilog=f"commands:\n{listing}\n\nhysteron COMMAND --help tells more.",
+        epilog=f"commands:\n{listing}\n\nadhesis COMMAND --help tells more.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("command", choices=list(COMMANDS), metavar="COMMAND")

@@ -17,16 +17,16 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ensemble.bench_page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page, record
+from ensemble.bench.compare import FULL, QUICK, Line, benchmark, growth, ratios
+from ensemble.bench.page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page, record
 from ensemble.errors import InputError
-from solver.benchmark import FULL, QUICK, Line, benchmark, growth, ratios
 
 _DEFAULT = Path("out/benchmark")
 _WIDTH = 120
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``hysteron bench``."""
+    """Declare the options of ``adhesis bench``."""
     parser.add_argument(
         "--to",
         type=Path,
@@ -76,7 +76,7 @@ def execute(args: argparse.Namespace) -> int:
         console.print(_table("How the cost of sharp grows", GROWTH_COLUMNS, rows))
     compared = ratios(lines)
     _write_csv(args.to / "benchmark.csv", [*lines, *grown])
-    command = "hysteron bench --quick" if args.quick else "hysteron bench"
+    command = "adhesis bench --quick" if args.quick else "adhesis bench"
     text = page(lines, grown, compared, f"`{command}` on {_machine()}")
     (args.to / "benchmark.md").write_text(text, encoding="utf-8")
     _draw(lines, args.to / "benchmark")
@@ -102,7 +102,7 @@ def _write_csv(path: Path, lines: list[Line]) -> None:
 
 
 def _draw(lines: list[Line], stem: Path) -> None:
-    from ensemble.bench_figure import draw  # matplotlib only when everything is measured
+    from ensemble.bench.figure import draw  # matplotlib only when everything is measured
     from ensemble.report.figures.style import save
 
     save(draw(lines), stem)

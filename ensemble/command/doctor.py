@@ -7,7 +7,7 @@ import json
 import os
 from pathlib import Path
 
-from ensemble.doctor import Diagnosis, examine
+from ensemble.doctor.examine import Diagnosis, examine
 from ensemble.errors import InputError
 
 
@@ -39,7 +39,7 @@ def execute(args: argparse.Namespace) -> int:
 def _text(diagnosis: Diagnosis) -> str:
     versions = dict(diagnosis.versions)
     rows = [
-        ("hysteron", f"{versions.pop('hysteron')}, Python {versions.pop('python')}"),
+        ("adhesis", f"{versions.pop('adhesis')}, Python {versions.pop('python')}"),
         ("MPI", f"{versions.pop('mpi')} (mpi4py {versions.pop('mpi4py')})"),
         ("mpirun", _join(diagnosis.mpirun, diagnosis.mpirun_version) or "none"),
         ("HDF5", f"{versions.pop('hdf5')} (h5py {versions.pop('h5py')})"),

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ensemble.errors import InputError
-from ensemble.loop_record import (
+from ensemble.loop.record import (
     FieldStates,
     check_writable,
     loop_document,
@@ -28,9 +28,9 @@ from ensemble.loop_record import (
 from solver.loop import Progress, check_cycle, run_loop
 from solver.material import HalfSpace
 from solver.method import Branch, ContactState, Method
-from solver.methods import METHOD_NAMES, make_method
 from solver.problem import Problem
 from solver.profile import Array, Profile, profile_from_heights, self_affine_profile
+from solver.registry import METHOD_NAMES, make_method
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 _PERIOD, _N0, _RATIO, _H_RMS = 2e-3 * np.pi, 10, 100, 1e-6
@@ -39,7 +39,7 @@ _SECONDS_BETWEEN_LINES = 5.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``hysteron loop``."""
+    """Declare the options of ``adhesis loop``."""
     shape = parser.add_argument_group("profile (either --heights or --hurst)")
     shape.add_argument("--heights", type=Path, metavar="FILE", help=".npy or .csv: heights in m")
     shape.add_argument("--hurst", type=float, metavar="H", help="Hurst exponent, 0 < H < 1")

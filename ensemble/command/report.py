@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the report; returns 0."""
-    from ensemble.report import write_report
+    from ensemble.report.write import write_report
 
     write_report(args.file, args.to, beside=args.beside)
     return 0

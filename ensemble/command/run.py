@@ -1,7 +1,7 @@
 """Run or resume a campaign; under mpirun, rank 0 hands out and the others work.
 
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
-refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of hysteron
+refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
 itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime): run the
 same command again to resume.
 """
@@ -24,7 +24,7 @@ OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFA
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    from ensemble.ranks import launched
+    from ensemble.run.ranks import launched
 
     if launched()[1] > 0:  # rank 0 complains for all
         parser.error = lambda message: sys.exit(BAD_INPUT)  # type: ignore[method-assign]
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Run; returns the exit code, the same on every rank."""
-    from ensemble.ranks import launched, world
+    from ensemble.run.ranks import launched, world
 
     started = time.time()
     first = launched()[1] == 0
@@ -77,10 +77,10 @@ def execute(args: argparse.Namespace) -> int:
         return _run(args, comm, started)
     except InputError as error:
         if first:
-            print(f"hysteron run: {error}", file=sys.stderr, flush=True)
+            print(f"adhesis run: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT
     except WriteError as error:
-        print(f"hysteron run: {error}; what was done is kept", file=sys.stderr, flush=True)
+        print(f"adhesis run: {error}; what was done is kept", file=sys.stderr, flush=True)
         _end_job(comm, WRITE_FAILED)
         os._exit(WRITE_FAILED)  # at an orderly exit HDF5 would try to write again, and crash
     except BaseException:
@@ -97,12 +97,12 @@ def _end_job(comm: Any, code: int) -> None:
 
 
 def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
-    from ensemble.campaign import load_campaign
-    from ensemble.dispatch import Overdue
-    from ensemble.interrupt import deadline, parse_duration
-    from ensemble.progress import duration
-    from ensemble.ranks import together
-    from ensemble.run import Options, run_campaign
+    from ensemble.campaign.file import load_campaign
+    from ensemble.run.dispatch import Overdue
+    from ensemble.run.interrupt import deadline, parse_duration
+    from ensemble.run.progress import duration
+    from ensemble.run.ranks import together
+    from ensemble.run.session import Options, run_campaign
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
@@ -122,7 +122,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
         summary = run_campaign(campaign, path, comm, options, say)
     except Overdue as error:
         # Nobody can be waited for; what was given up anyway is lost, the results file is sound.
-        say(f"hysteron run: {error}; run the same command again to resume")
+        say(f"adhesis run: {error}; run the same command again to resume")
         _end_job(comm, RESUME)
         return RESUME
     if comm is None or comm.rank == 0:
@@ -132,7 +132,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
             f"{summary.computed} computed in {duration(summary.seconds)}"
         )
         if summary.failed:
-            say(f"why they failed: hysteron status {path}; again: hysteron run … --redo failed")
+            say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
         if summary.stopped:
             say(
                 f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "
@@ -145,7 +145,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
 
 
 def _selection(args: argparse.Namespace) -> Any:
-    from ensemble.run import Selection
+    from ensemble.run.session import Selection
 
     hurst = tuple(_number("--hurst", v) for v in args.hurst)
     gamma = tuple(_number("--work-of-adhesion", v) for v in args.work_of_adhesion)

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print the status; returns 0."""
-    from ensemble.status import as_text, read_status
+    from ensemble.results.status import as_text, read_status
 
     if args.watch:
         if args.json:
@@ -49,7 +49,7 @@ def _interval(text: str) -> float:
 
 def _watch(path: Path | str, interval: float) -> int:
     """Show the status again and again: in place on a terminal, else one after the other."""
-    from ensemble.status import as_text, read_status
+    from ensemble.results.status import as_text, read_status
 
     live = _live() if sys.stdout.isatty() else None
     first: tuple[float, int] | None = None
@@ -87,7 +87,7 @@ def _live() -> Any:
 
 def _pace(status: dict[str, Any], seconds: float, finished: int) -> str:
     """Return rate and time left, from what was finished since the watch began."""
-    from ensemble.progress import duration
+    from ensemble.run.progress import duration
 
     if not finished or not status["pending"]:
         return ""

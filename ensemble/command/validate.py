@@ -12,13 +12,13 @@ from rich.console import Console
 from rich.table import Table
 
 from ensemble.errors import InputError
-from solver.validate import METHODS, Row, validate
+from solver.validate.claims import METHODS, Row, validate
 
 _EXCEEDED = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``hysteron validate``."""
+    """Declare the options of ``adhesis validate``."""
     parser.add_argument(
         "--method",
         action="append",

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from ensemble.aggregate import Aggregate
-from ensemble.aggregate_curves import BRANCHES, QUANTILES
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.curves import BRANCHES, QUANTILES
 
 # curve -> (unit, what it is)
 QUANTITIES = {

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ensemble.aggregate import Aggregate
-from ensemble.aggregate_cells import Cell
-from ensemble.aggregate_fields import fitted_slope
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.cells import Cell
+from ensemble.aggregate.fields import fitted_slope
 from ensemble.report import paper
 
 

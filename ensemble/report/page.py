@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ensemble import statistics
-from ensemble.aggregate import Aggregate
-from ensemble.report import findings, paper, state_tables, tables
-from ensemble.report.figures import Illustration
+from ensemble.aggregate import statistics
+from ensemble.aggregate.average import Aggregate
+from ensemble.report import findings, paper
+from ensemble.report.figures.catalogue import Illustration
+from ensemble.report.tables import losses as tables
+from ensemble.report.tables import states as state_tables
 
 Drawn = Mapping[str, str]
 """Stem of a figure -> name of its PNG file, beside the page."""
@@ -112,7 +114,7 @@ def _footnote() -> str:
 
 
 def _origin(data: Aggregate) -> str:
-    shown = ("hysteron_version", "commit", "created", "mpi", "hdf5", "fftw")
+    shown = ("adhesis_version", "commit", "created", "mpi", "hdf5", "fftw")
     parts = [f"{name} {data.attributes[name]}" for name in shown if data.attributes.get(name)]
     return f"Results file: {'; '.join(parts)}." if parts else ""
 

@@ -9,11 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ensemble.aggregate import Aggregate
-from ensemble.aggregate_cells import Cell
-from ensemble.aggregate_curves import BRANCHES
-from ensemble.aggregate_fields import FieldStatistics, Shape
-from ensemble.fields import field_plan
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.cells import Cell
+from ensemble.aggregate.curves import BRANCHES
+from ensemble.aggregate.fields import FieldStatistics, Shape
 from ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     LINES,
@@ -31,6 +30,7 @@ from ensemble.report.figures.style import (
     spread_out,
 )
 from ensemble.report.findings import typical_cell
+from ensemble.task.fields import field_plan
 
 # Gap/h_max below which the density is that of the interpolation beside edges alone.
 _LEAST_GAP = 1e-3

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ensemble.aggregate import Aggregate
-from ensemble.aggregate_cells import Cell
-from ensemble.aggregate_curves import BRANCHES
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.cells import Cell
+from ensemble.aggregate.curves import BRANCHES
 from ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     MM,

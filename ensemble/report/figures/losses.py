@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ensemble.aggregate import Aggregate
-from ensemble.aggregate_cells import Cell, stress_scale
-from ensemble.aggregate_jumps import BIN_EDGES, BINS_PER_DECADE
-from ensemble.beside import Companion
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.cells import Cell, stress_scale
+from ensemble.aggregate.companions import Companion
+from ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
+from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.report import paper
 from ensemble.report.figures.style import (
     LINES,
@@ -32,7 +33,6 @@ from ensemble.report.figures.style import (
     spread_out,
 )
 from ensemble.report.findings import typical_cell
-from ensemble.statistics import Estimate, estimates
 
 
 def loss_against_adhesion(data: Aggregate) -> Figure:

@@ -19,9 +19,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ensemble.aggregate import Aggregate
+from ensemble.aggregate.average import Aggregate
 
-STYLE = Path(__file__).parent.parent / "hysteron.mplstyle"
+STYLE = Path(__file__).parent / "adhesis.mplstyle"
 
 MM = 1 / 25.4  # inches
 ONE_COLUMN = 85 * MM

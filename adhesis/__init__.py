@@ -1,0 +1,31 @@
+"""Hysteresis loops of rough contacts with zero-range (JKR) adhesion: the public names.
+
+Everything that a user of the library needs is imported from here; other names may change without
+notice. Lengths in m, stresses in Pa (compression positive), energies per unit depth in J/m, losses
+per nominal area in J/m². Loads no MPI and no matplotlib.
+"""
+
+from solver.jumps import Jump
+from solver.loop import LoopResult, run_loop
+from solver.material import HalfSpace
+from solver.method import ContactState, Fields, Method, Path
+from solver.problem import Problem
+from solver.profile import Profile, profile_from_heights, self_affine_profile, single_wave
+from solver.registry import make_method
+
+__all__ = [
+    "ContactState",
+    "Fields",
+    "HalfSpace",
+    "Jump",
+    "LoopResult",
+    "Method",
+    "Path",
+    "Problem",
+    "Profile",
+    "make_method",
+    "profile_from_heights",
+    "run_loop",
+    "self_affine_profile",
+    "single_wave",
+]

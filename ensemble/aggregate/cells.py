@@ -1,0 +1,133 @@
+"""Cells of a sweep, one (H, γ) each: the numbers of their finished tasks, and the means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.aggregate.curves import Curve
+from ensemble.aggregate.statistics import Estimate, estimates
+from ensemble.campaign.tables import Campaign
+from ensemble.errors import InputError
+from ensemble.results.schema import DONE, FAILED
+from ensemble.results.store import Results
+from solver.material import HalfSpace
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_PER_TASK = (
+    *("h_max", "h_rms", "m0", "m2", "m4"),
+    *("loss", "loss_dimensionless", "loss_from_drops", "loss_small_scale", "loss_large_scale"),
+    *("audit_residual", "pull_off_penetration", "pull_off_stress"),
+    *("wall_time", "cpu_time", "states", "jump_count"),
+)
+_WITH_INTERVAL = (
+    "loss",
+    "loss_dimensionless",
+    "loss_small_scale",
+    "loss_large_scale",
+    "small_scale_share",
+    "pull_off_stress",
+    "pull_off_penetration",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """All tasks of one (H, γ).
+
+    Attributes
+    ----------
+    hurst, work_of_adhesion : float
+        H; γ in J/m².
+    done, failed, pending : int
+        Tasks.
+    rows : int array, shape (done,)
+        Rows of the done tasks in the file, by realisation.
+    realisation, seed : int array, shape (done,)
+    values : dict of array, each of shape (done,)
+        Per-task numbers under the names of the results file, and ``small_scale_share``
+        (loss_small_scale / loss_from_drops).
+    estimates : dict of Estimate
+        The same, averaged. Only losses and pull-off have an interval.
+    curves : dict of Curve
+        ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``stress`` (σ~),
+        ``stress_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``, ``energy`` (J/m).
+    """
+
+    hurst: float
+    work_of_adhesion: float
+    done: int
+    failed: int
+    pending: int
+    rows: Rows
+    realisation: NDArray[np.int64]
+    seed: NDArray[np.int64]
+    values: dict[str, Array]
+    estimates: dict[str, Estimate]
+    curves: dict[str, Curve]
+
+
+def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
+    """Read every cell, by H, then γ, ascending; without curves.
+
+    Raises
+    ------
+    InputError
+        If no task is finished.
+    """
+    if not np.any(status == DONE):
+        raise InputError(
+            f"{results.path} holds no finished task yet ({np.sum(status == FAILED)} failed, of "
+            f"{status.size}): there is nothing to report"
+        )
+    hurst, gamma = results.column("hurst"), results.column("work_of_adhesion")
+    realisation, seed = results.column("realisation"), results.column("seed")
+    columns = {name: results.column(name) for name in _PER_TASK}
+    cells = []
+    for h, g in sorted(set(zip(hurst.tolist(), gamma.tolist(), strict=True))):
+        mine = np.flatnonzero((hurst == h) & (gamma == g))
+        rows = mine[status[mine] == DONE]
+        rows = rows[np.argsort(realisation[rows], kind="stable")]
+        values = {name: column[rows].astype(float) for name, column in columns.items()}
+        drops = values["loss_from_drops"]
+        values["small_scale_share"] = np.divide(
+            values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
+        )
+        failed = int(np.sum(status[mine] == FAILED))
+        cells.append(
+            Cell(
+                hurst=h,
+                work_of_adhesion=g,
+                done=rows.size,
+                failed=failed,
+                pending=mine.size - rows.size - failed,
+                rows=rows,
+                realisation=realisation[rows].astype(np.int64),
+                seed=seed[rows],
+                values=values,
+                estimates=_estimates(values),
+                curves={},
+            )
+        )
+    return cells
+
+
+def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
+    with_interval = np.array([values[name] for name in _WITH_INTERVAL])
+    found = dict(zip(_WITH_INTERVAL, estimates(with_interval), strict=True))
+    share = found["small_scale_share"]
+    low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval knows no bounds
+    found["small_scale_share"] = replace(share, low=float(low), high=float(high))
+    rest = [name for name in values if name not in found]
+    plain = estimates(np.array([values[name] for name in rest]), with_interval=False)
+    return found | dict(zip(rest, plain, strict=True))
+
+
+def stress_scale(campaign: Campaign, h_max: Array) -> Array:
+    """E* q0 h_max / 2 in Pa, for every h_max in m: σ~ is the mean stress over this."""
+    half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
+    return 0.5 * half_space.modulus * (2 * np.pi / campaign.profile.period) * h_max

@@ -1,0 +1,113 @@
+"""Campaigns set beside one another: the same loops with another resolution, path or spectrum.
+
+Two campaigns that share their seed have the same phases realisation by realisation, so the
+difference of their losses is taken profile by profile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ensemble.aggregate.cells import Cell, read_cells
+from ensemble.aggregate.statistics import Estimate, estimates
+from ensemble.campaign.rules import shown
+from ensemble.campaign.tables import Campaign
+from ensemble.results.store import Results
+
+Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
+
+# What is computed, and what is kept of it, do not change a loop.
+_IGNORED = ("sweep.", "output.", "solver.time_limit")
+
+
+@dataclass(frozen=True, eq=False)
+class Companion:
+    """Another campaign.
+
+    Attributes
+    ----------
+    path : Path
+    campaign : Campaign
+    cells : tuple of Cell
+    differs : tuple of str
+        "key = value" of the keys that differ, with the values of this campaign.
+    kind : str
+        What the difference is about: "resolution" (the solver), "load steps", "penetration" (the
+        largest one, load steps may go with it), "spectrum" (the profile), "other".
+    """
+
+    path: Path
+    campaign: Campaign
+    cells: tuple[Cell, ...]
+    differs: tuple[str, ...]
+    kind: Kind
+
+    def cell(self, hurst: float, work_of_adhesion: float) -> Cell | None:
+        """Return the cell of (H, γ), None if this campaign lacks it."""
+        for cell in self.cells:
+            if (cell.hurst, cell.work_of_adhesion) == (hurst, work_of_adhesion):
+                return cell
+        return None
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Dimensionless loss of a companion less that of the campaign, over the pairs of one cell."""
+
+    here: Estimate
+    there: Estimate
+    difference: Estimate
+
+
+def read_companion(path: Path | str, campaign: Campaign) -> Companion:
+    """Read another results file and say how its campaign differs.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is no results file, or holds no finished task.
+    """
+    with Results(path) as results:
+        other, cells = results.campaign, read_cells(results, results.status())
+    values, keys = other.values(), differing_keys(campaign, other)
+    return Companion(
+        path=Path(path),
+        campaign=other,
+        cells=tuple(cells),
+        differs=tuple(f"{key} = {shown(values[key])}" for key in keys),
+        kind=kind_of(keys),
+    )
+
+
+def differing_keys(here: Campaign, there: Campaign) -> list[str]:
+    """Keys ("cycle.load_steps") in which the loops of two campaigns differ."""
+    one, two = here.values(), there.values()
+    return [key for key in one if one[key] != two[key] and not key.startswith(_IGNORED)]
+
+
+def kind_of(keys: Sequence[str]) -> Kind:
+    """Say what a difference in these keys is about; see :class:`Companion`."""
+    if keys and all(key.startswith("solver.") for key in keys):
+        return "resolution"
+    if list(keys) == ["cycle.load_steps"]:
+        return "load steps"
+    if "cycle.max_penetration" in keys and all(key.startswith("cycle.") for key in keys):
+        return "penetration"
+    if keys and all(key.startswith("profile.") for key in keys):
+        return "spectrum"
+    return "other"
+
+
+def difference(here: Cell, there: Cell) -> Difference | None:
+    """Compare the losses of the realisations that both have finished; None without any."""
+    _, mine, theirs = np.intersect1d(here.seed, there.seed, assume_unique=True, return_indices=True)
+    if not mine.size:
+        return None
+    one = here.values["loss_dimensionless"][mine]
+    two = there.values["loss_dimensionless"][theirs]
+    return Difference(*estimates(np.array([one, two, two - one])))

@@ -1,0 +1,85 @@
+"""Curves over realisations on the common penetration axis: mean, standard deviation, quantiles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.results.blocks import column_blocks
+from ensemble.results.store import Results
+
+Array = NDArray[np.float64]
+
+BRANCHES = ("loading", "unloading")
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A quantity on the penetration axis of one branch, over the realisations of a cell.
+
+    Attributes
+    ----------
+    mean, std : array, shape (points,)
+        std has n - 1 in the denominator; NaN for one realisation.
+        A realisation that has detached counts, with zero.
+    quantiles : array, shape (len(QUANTILES), points)
+    """
+
+    mean: Array
+    std: Array
+    quantiles: Array
+
+
+def average_curves(
+    results: Results,
+    branch: str,
+    name: str,
+    rows: Sequence[NDArray[np.intp]],
+    scales: Mapping[str, Sequence[Array]],
+) -> dict[str, list[Curve]]:
+    """Average the dataset ``branch_name`` over the rows of every cell.
+
+    Parameters
+    ----------
+    results : Results
+    branch : {"loading", "unloading"}
+    name : str
+    rows : one int array for each cell
+    scales : mapping of one array for each cell
+        Curves to make of the dataset: the factor of each row of the cell.
+
+    Returns
+    -------
+    dict of lists
+        For every curve in ``scales`` one :class:`Curve` for each cell; NaN where it has no rows.
+    """
+    points = results.column(f"{branch}_penetration").size
+    done = np.sort(np.concatenate(rows))
+    out = {curve: [_empty(points) for _ in rows] for curve in scales}
+    for columns, table in column_blocks(results, f"{branch}_{name}", done, points):
+        for k, mine in enumerate(rows):
+            if not mine.size:
+                continue
+            raw = table[np.searchsorted(done, mine)]
+            for curve, factors in scales.items():
+                values = raw * factors[k][:, None]
+                average = out[curve][k]
+                average.mean[columns] = values.mean(axis=0)
+                if mine.size > 1:
+                    average.std[columns] = values.std(axis=0, ddof=1)
+                average.quantiles[:, columns] = np.quantile(
+                    values, QUANTILES, axis=0, overwrite_input=True
+                )
+    return out
+
+
+def _empty(points: int) -> Curve:
+    return Curve(
+        mean=np.full(points, np.nan),
+        std=np.full(points, np.nan),
+        quantiles=np.full((len(QUANTILES), points), np.nan),
+    )

@@ -1,0 +1,167 @@
+"""Spectra and densities of chosen states, averaged over realisations; shapes of the first one.
+
+A state without contact has no deformation to speak of and is left out, so every average comes with
+its own number of realisations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.campaign.tables import Campaign
+from ensemble.results.blocks import row_blocks
+from ensemble.results.schema import KEPT
+from ensemble.results.store import Results
+from ensemble.task.fields import field_plan
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Fields of one realisation.
+
+    Attributes
+    ----------
+    row : int
+        In the results file.
+    h_max : float
+        In m.
+    height : array, shape (nodes,)
+        Rigid profile h in m.
+    displacement : array, shape (2, penetrations, nodes)
+        Deformed surface v in m, loading and unloading; NaN where it had no contact.
+    """
+
+    row: int
+    h_max: float
+    height: Array
+    displacement: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FieldStatistics:
+    """Averages of every cell, in the order of the cells.
+
+    Attributes
+    ----------
+    penetration : array, shape (penetrations,)
+        Δ/h_max.
+    position : array, shape (nodes,)
+        Of the shapes, in m.
+    wave_number, gap_bin, height_bin : array
+        Middles of the bins: rad/m, gap/h_max, height/h_rms.
+    psd_height : array, shape (cells, wave numbers)
+        In m³; NaN for a cell without finished tasks.
+    height_density : array, shape (cells, height bins)
+    psd_displacement : array, shape (cells, 2, penetrations, wave numbers)
+        In m³, second axis loading and unloading.
+    gap_density : array, shape (cells, 2, penetrations, gap bins)
+    in_contact : int array, shape (cells, 2, penetrations)
+        Realisations averaged in the last two.
+    shapes : tuple of Shape or None
+        Of the first finished realisation that kept its fields.
+    """
+
+    penetration: Array
+    position: Array
+    wave_number: Array
+    gap_bin: Array
+    height_bin: Array
+    psd_height: Array
+    height_density: Array
+    psd_displacement: Array
+    gap_density: Array
+    in_contact: NDArray[np.int64]
+    shapes: tuple[Shape | None, ...]
+
+
+def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> FieldStatistics:
+    """Average the given rows, one array of rows for each cell."""
+    psd_height, _ = _average(results, "psd_height", rows)
+    height_density, _ = _average(results, "height_density", rows)
+    psd_displacement, in_contact = _average(results, "psd_displacement", rows)
+    gap_density, _ = _average(results, "gap_density", rows)
+    return FieldStatistics(
+        penetration=results.column("field_penetration"),
+        position=results.column("field_position"),
+        wave_number=results.column("wave_number"),
+        gap_bin=results.column("gap_bin"),
+        height_bin=results.column("height_bin"),
+        psd_height=psd_height,
+        height_density=height_density,
+        psd_displacement=psd_displacement,
+        gap_density=gap_density,
+        in_contact=in_contact,
+        shapes=_shapes(results, rows),
+    )
+
+
+def fitted_slope(campaign: Campaign, wave_number: Array, density: Array) -> tuple[float, float]:
+    """Exponent of a power law through a spectrum at small wave numbers, and its standard error.
+
+    Least squares in the logarithms over the lowest decade of the profile's spectrum (over its lower
+    half if it is shorter than two decades). NaN if fewer than three bins lie there.
+    """
+    profile, plan = campaign.profile, field_plan(campaign)
+    lowest = profile.n0 * 2 * np.pi / plan.period
+    span = min(10.0, float(np.sqrt(profile.ratio)))
+    chosen = plan.filled & (wave_number <= lowest * span) & (density > 0)
+    if np.sum(chosen) < 3:
+        return float("nan"), float("nan")
+    x, y = np.log(wave_number[chosen]), np.log(density[chosen])
+    x = x - x.mean()
+    slope = float(x @ y / (x @ x))
+    residual = y - y.mean() - slope * x
+    return slope, float(np.sqrt(residual @ residual / max(1, x.size - 2) / (x @ x)))
+
+
+def _average(
+    results: Results, name: str, rows: Sequence[NDArray[np.intp]]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Mean over the rows of each cell that hold numbers, and how many do.
+
+    The count has the shape of the mean without its last axis.
+    """
+    shape = results.column(name, slice(0, 1)).shape[1:]
+    total = np.zeros((len(rows), *shape))
+    count = np.zeros((len(rows), *shape[:-1]), dtype=np.int64)
+    cell_of = np.full(len(results), -1)
+    for k, mine in enumerate(rows):
+        cell_of[mine] = k
+    for block in row_blocks(len(results), int(np.prod(shape))):
+        chosen = np.flatnonzero(cell_of[block] >= 0)
+        if not chosen.size:
+            continue
+        cells = cell_of[block][chosen]
+        values = results.column(name, block)[chosen].astype(float)
+        held = np.isfinite(values).all(axis=-1)
+        np.add.at(total, cells, np.where(held[..., None], values, 0.0))
+        np.add.at(count, cells, held)
+    with np.errstate(invalid="ignore"):
+        return total / count[..., None], count
+
+
+def _shapes(results: Results, rows: Sequence[NDArray[np.intp]]) -> tuple[Shape | None, ...]:
+    kept = results.column(KEPT)
+    out: list[Shape | None] = []
+    for mine in rows:
+        places = np.flatnonzero(np.isin(kept, mine))
+        if not places.size:
+            out.append(None)
+            continue
+        place = slice(int(places[0]), int(places[0]) + 1)
+        row = int(kept[places[0]])
+        out.append(
+            Shape(
+                row=row,
+                h_max=float(results.column("h_max", slice(row, row + 1))[0]),
+                height=results.column("field_height", place)[0].astype(float),
+                displacement=results.column("field_displacement", place)[0].astype(float),
+            )
+        )
+    return tuple(out)

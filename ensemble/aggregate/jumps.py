@@ -1,0 +1,93 @@
+"""Statistics of the catalogue of jumps: how many, of which kind, how large.
+
+The catalogue (task × jump) is streamed in blocks of rows. A task that made more jumps than the
+catalogue holds kept those with the largest drops; the statistics say how much energy is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.results.blocks import row_blocks
+from ensemble.results.store import Results
+from solver.jumps import JUMP_KINDS, SMALL_SCALE
+
+Array = NDArray[np.float64]
+
+BINS_PER_DECADE = 2
+# Energy drops outside these bounds (J/m²) are counted in the outermost bin.
+SMALLEST, LARGEST = 1e-16, 1e2
+BIN_EDGES: Array = np.logspace(
+    np.log10(SMALLEST),
+    np.log10(LARGEST),
+    1 + BINS_PER_DECADE * round(np.log10(LARGEST / SMALLEST)),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class JumpStatistics:
+    """Jumps of every cell (in the order of the cells given), by kind.
+
+    Attributes
+    ----------
+    kinds : tuple of str
+    small_scale : bool array, shape (kinds,)
+        Whether edges only run inside existing patches.
+    tasks : int array, shape (cells,)
+    number : int array, shape (cells, kinds)
+        Jumps in all tasks together.
+    energy : array, shape (cells, kinds)
+        Their drops, J/m² of nominal area, in all tasks together.
+    histogram : int array, shape (cells, kinds, bins)
+        Jumps by energy drop, between :data:`BIN_EDGES`.
+    truncated : int array, shape (cells,)
+        Tasks that made more jumps than the catalogue holds.
+    """
+
+    kinds: tuple[str, ...]
+    small_scale: NDArray[np.bool_]
+    tasks: NDArray[np.int64]
+    number: NDArray[np.int64]
+    energy: Array
+    histogram: NDArray[np.int64]
+    truncated: NDArray[np.int64]
+
+
+def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpStatistics:
+    """Stream the catalogue of the given rows, one array of rows for each cell."""
+    tasks, slots = len(results), results.campaign.output.jumps
+    cell_of = np.full(tasks, -1)
+    for k, mine in enumerate(rows):
+        cell_of[mine] = k
+    bins = BIN_EDGES.size - 1
+    shape = (len(rows), len(JUMP_KINDS))
+    number = np.zeros(shape, dtype=np.int64)
+    energy = np.zeros(shape)
+    histogram = np.zeros((*shape, bins), dtype=np.int64)
+    for block in row_blocks(tasks, slots):
+        cells = cell_of[block]
+        if not np.any(cells >= 0):
+            continue
+        flags = results.column("jump_kind", block)
+        drops = results.column("jump_energy_drop", block)
+        used = (flags >= 0) & (cells >= 0)[:, None]
+        cell = np.broadcast_to(cells[:, None], flags.shape)[used]
+        kind, drop = flags[used].astype(np.intp), drops[used]
+        place = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)
+        np.add.at(number, (cell, kind), 1)
+        np.add.at(energy, (cell, kind), drop)
+        np.add.at(histogram, (cell, kind, place), 1)
+    count = results.column("jump_count")
+    return JumpStatistics(
+        kinds=tuple(JUMP_KINDS),
+        small_scale=np.array([kind in SMALL_SCALE for kind in JUMP_KINDS]),
+        tasks=np.array([mine.size for mine in rows], dtype=np.int64),
+        number=number,
+        energy=energy,
+        histogram=histogram,
+        truncated=np.array([int(np.sum(count[mine] > slots)) for mine in rows], dtype=np.int64),
+    )

@@ -1,0 +1,105 @@
+"""The figure of the benchmark: error in the loss against CPU time, one panel a scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ensemble.bench.compare import Line
+from ensemble.report.figures.style import (
+    LINES,
+    MM,
+    TWO_COLUMNS,
+    Look,
+    label_panel,
+    legend_above,
+    look,
+    new_figure,
+    plain_decades,
+    style,
+)
+
+_METHODS = ("grid", "sharp", "tamaas")
+_PANELS_IN_A_ROW = 2
+_PANEL_HEIGHT = 62 * MM
+# Errors below this are rounding or chance; they are drawn here.
+_LEAST_ERROR = 1e-10
+
+
+def draw(lines: Sequence[Line]) -> Figure:
+    """Return the figure; runs that did not finish are left out."""
+    scenes = list(dict.fromkeys(line.run.scene for line in lines))
+    columns = min(len(scenes), _PANELS_IN_A_ROW)
+    rows = math.ceil(len(scenes) / columns)
+    with style():
+        figure = new_figure(rows, columns, TWO_COLUMNS, 8 * MM + rows * _PANEL_HEIGHT)
+        shown: dict[str, Line2D] = {}
+        for k, axes in enumerate(figure.axes):
+            if k >= len(scenes):
+                axes.set_visible(False)
+                continue
+            for method in _METHODS:
+                chosen = [
+                    line
+                    for line in lines
+                    if line.run.scene is scenes[k]
+                    and line.run.method == method
+                    and math.isfinite(line.error)
+                ]
+                if chosen:
+                    shown[method] = _series(axes, method, chosen)
+            label_panel(axes, scenes[k].title)
+            axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
+        # One range for all, so that the panels can be compared; room at the sides for the labels.
+        finished = [line for line in lines if math.isfinite(line.error)]
+        seconds = [line.measured.cpu_seconds for line in finished]
+        errors = [_drawn_error(line) for line in finished]
+        for axes in figure.axes if finished else ():
+            axes.set(xscale="log", yscale="log")
+            axes.set_xlim(min(seconds) / 2, 2.5 * max(seconds))
+            axes.set_ylim(min(errors) / 3, 5 * max(errors))
+        legend_above(figure, list(shown.values()), len(shown))
+        plain_decades(figure.axes)
+    return figure
+
+
+def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
+    """Draw one method's runs, each with its setting beside it."""
+    k = _METHODS.index(method)
+    # The darkest for sharp, so that the methods differ in grey too.
+    of_method = {"grid": look(0), "sharp": replace(look(2), marker="s"), "tamaas": look(3)}
+    chosen: Look = of_method[method]
+    seconds = [line.measured.cpu_seconds for line in lines]
+    errors = [_drawn_error(line) for line in lines]
+    (drawn,) = axes.plot(
+        seconds, errors, color=chosen.colour, marker=chosen.marker, ls=LINES[k], label=method
+    )
+    for place, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
+        # Left below for sharp, right for the others, by turns above and below: runs lie close.
+        left = method == "sharp"
+        below = left or place % 2 == 1
+        axes.annotate(
+            _short(line),
+            (x, y),
+            xytext=(-3 if left else 3, -3 if below else 3),
+            textcoords="offset points",
+            ha="right" if left else "left",
+            va="top" if below else "bottom",
+            fontsize=5,
+            color="0.25",
+        )
+    return drawn
+
+
+def _drawn_error(line: Line) -> float:
+    return max(abs(line.error), _LEAST_ERROR)
+
+
+def _short(line: Line) -> str:
+    setting = line.run.setting
+    return f"{setting:.0e}".replace("e-0", "e-") if line.run.method == "sharp" else f"{setting:g}"

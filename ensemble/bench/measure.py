@@ -1,0 +1,222 @@
+"""One measured loop in a process of its own: ``python -m ensemble.bench.measure``.
+
+Peak memory belongs to a process, not to a call, and compiled code comes in at its first use. So
+every measured loop has a fresh process: it reads a :class:`Run` as JSON from its argument, runs a
+small loop first, and prints a :class:`Measurement` as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import resource
+import signal
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from time import process_time
+from typing import Any, Literal
+
+from numba.core import event
+
+from ensemble.bench.scenes import WARM_UP, Scene
+from ensemble.bench.tamaas import tamaas_loop
+from solver.loop import LoopResult, run_loop
+from solver.registry import MethodName, make_method
+
+Measured = Literal["grid", "sharp", "tamaas"]
+
+_SOLUTIONS = {"grid": "solves", "sharp": "fields"}
+# Of the load path of ``grid``; it costs little and leaves the error to the nodes.
+_GRID_ACCURACY = 1e-3
+_WARM_UP_SETTING = {"grid": 8, "sharp": 1e-2}
+# CPU seconds for start, compilation and warm-up, which do not count as the run's.
+_START = 300.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is measured.
+
+    Attributes
+    ----------
+    method : {"grid", "sharp", "tamaas"}
+    setting : float
+        Nodes per shortest wave of ``grid``, accuracy of ``sharp``, range of adhesion of ``tamaas``
+        in units of h_max.
+    load_steps : int
+    seconds : float
+        CPU seconds after which the run is given up.
+    """
+
+    scene: Scene
+    method: Measured
+    setting: float
+    load_steps: int
+    seconds: float
+
+    @property
+    def described(self) -> str:
+        """The setting in short: nodes per shortest wave, accuracy, or range."""
+        if self.method == "grid":
+            return f"{self.setting:g} nodes"
+        if self.method == "tamaas":
+            return f"{self.setting:g} h_max"
+        return f"{self.setting:.0e}"
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a run cost and gave; NaN and zero where it did not finish.
+
+    Attributes
+    ----------
+    cpu_seconds : float
+        From the problem to the finished loop.
+    megabytes, megabytes_before : float
+        Largest resident memory of the process, and the same before the loop: interpreter,
+        libraries, compiled code.
+    loss : float
+        Loop integral in J/m² of nominal area.
+    loss_dimensionless : float
+        W~.
+    audit_residual : float
+        (loop integral - sum of drops) / loop integral.
+    solutions : int
+        Elastic solutions for given edges or contact sets.
+    jumps, patches : int
+        Number of jumps, and most patches at a time.
+    compiled : bool
+        Whether something was compiled during the loop, so that time and memory are too large.
+    note : str
+        Why the run did not finish; else empty.
+    """
+
+    cpu_seconds: float = float("nan")
+    megabytes: float = float("nan")
+    megabytes_before: float = float("nan")
+    loss: float = float("nan")
+    loss_dimensionless: float = float("nan")
+    audit_residual: float = float("nan")
+    solutions: int = 0
+    jumps: int = 0
+    patches: int = 0
+    compiled: bool = False
+    note: str = ""
+
+
+def measure(run: Run) -> Measurement:
+    """Run and measure in a fresh process.
+
+    A run that fails or takes too long is a :class:`Measurement` with a note, not an exception.
+    """
+    # Threads of the linear algebra would burn CPU time on matrices of a few dozen rows.
+    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    # What the warm-up does not meet may be compiled once; the next process finds it in the cache.
+    for _ in range(2):
+        child = subprocess.run(
+            [sys.executable, "-m", "ensemble.bench.measure", json.dumps(asdict(run))],
+            env={**os.environ, **one_thread},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if child.returncode == -signal.SIGXCPU:
+            return Measurement(note=f"given up after {run.seconds:g} s")
+        if child.returncode:
+            last = (child.stderr.strip().splitlines() or [f"exit code {child.returncode}"])[-1]
+            return Measurement(note=f"failed: {last}")
+        measurement = Measurement(**json.loads(child.stdout))
+        if not measurement.compiled:
+            break
+    return measurement
+
+
+def measure_here(run: Run, *, limited: bool = False) -> Measurement:
+    """Run and measure in this process; if ``limited``, end it when ``run.seconds`` are over."""
+    if limited:
+        _limit(_START)
+    if run.method == "tamaas":
+        if limited:
+            _limit(run.seconds)
+        return _measure_tamaas(run)
+    _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
+    before = peak_megabytes()
+    if limited:
+        _limit(run.seconds)
+    compilation: Any = event.TimingListener()  # type: ignore[no-untyped-call]
+    with event.install_listener("numba:compile", compilation):
+        started = process_time()
+        loop = _loop(run.method, run.scene, run.setting, run.load_steps)
+        seconds = process_time() - started
+    return Measurement(
+        cpu_seconds=seconds,
+        megabytes=peak_megabytes(),
+        megabytes_before=before,
+        loss=loop.loss,
+        loss_dimensionless=loop.loss_dimensionless,
+        audit_residual=loop.audit_residual,
+        solutions=int(loop.method[_SOLUTIONS[run.method]]),
+        jumps=len(loop.jumps),
+        patches=int(loop.patches.max()),
+        compiled=compilation.done,
+    )
+
+
+def _loop(method: MethodName, scene: Scene, setting: float, load_steps: int) -> LoopResult:
+    problem = scene.problem()
+    if method == "grid":
+        built = make_method("grid", problem, accuracy=_GRID_ACCURACY, nodes_per_wave=int(setting))
+    else:
+        built = make_method(method, problem, accuracy=setting)
+    return run_loop(built, max_penetration=scene.max_penetration, load_steps=load_steps)
+
+
+def _measure_tamaas(run: Run) -> Measurement:
+    before = peak_megabytes()
+    started = process_time()
+    problem = run.scene.problem()
+    loop = tamaas_loop(
+        problem,
+        reach=run.setting * problem.profile.h_max,
+        max_penetration=run.scene.max_penetration,
+        load_steps=run.load_steps,
+    )
+    return Measurement(
+        cpu_seconds=process_time() - started,
+        megabytes=peak_megabytes(),
+        megabytes_before=before,
+        loss=loop.loss,
+        loss_dimensionless=loop.loss / problem.loss_scale,
+        solutions=loop.states,
+    )
+
+
+def _limit(seconds: float) -> None:
+    """End this process once it has taken so many more seconds of CPU time (rounded up)."""
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(process_time() + seconds), hard))
+
+
+def peak_megabytes() -> float:
+    """Largest resident memory of this process so far, in MB (2²⁰ bytes)."""
+    try:
+        # getrusage would count what the parent had when it started this process.
+        with open("/proc/self/status") as status:
+            peak = next(line for line in status if line.startswith("VmHWM:"))
+        return int(peak.split()[1]) / 1024
+    except (OSError, StopIteration):
+        unit = 1024**2 if sys.platform == "darwin" else 1024
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+def main() -> None:
+    """Measure the run in the first argument."""
+    fields = json.loads(sys.argv[1])
+    run = Run(**{**fields, "scene": Scene(**fields["scene"])})
+    print(json.dumps(asdict(measure_here(run, limited=True))))
+
+
+if __name__ == "__main__":
+    main()

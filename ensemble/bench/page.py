@@ -1,0 +1,129 @@
+"""The tables of the benchmark as cells, as CSV records and as a Markdown page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ensemble.bench.compare import Line, Ratio
+
+LINE_COLUMNS = (
+    "method",
+    "setting",
+    "CPU s",
+    "MB",
+    "W~",
+    "error",
+    "audit",
+    "solutions",
+)
+GROWTH_COLUMNS = ("scene", "setting", "CPU s", "MB", "W~", "patches", "jumps", "solutions", "ms")
+
+
+def line_cells(line: Line) -> list[str]:
+    """Return one line of a scene's table as text."""
+    measured, run = line.measured, line.run
+    if measured.note:
+        return [run.method, run.described, measured.note, *[""] * (len(LINE_COLUMNS) - 3)]
+    return [
+        run.method,
+        run.described,
+        _seconds(measured.cpu_seconds),
+        f"{measured.megabytes:.0f}",
+        f"{measured.loss_dimensionless:.6g}",
+        _signed(line.error),
+        _signed(measured.audit_residual),
+        str(measured.solutions),
+    ]
+
+
+def growth_cells(line: Line) -> list[str]:
+    """Return one line of the table of growth as text."""
+    measured, run = line.measured, line.run
+    if measured.note:
+        return [run.scene.title, run.described, measured.note, *[""] * (len(GROWTH_COLUMNS) - 3)]
+    return [
+        run.scene.title,
+        run.described,
+        _seconds(measured.cpu_seconds),
+        f"{measured.megabytes:.0f}",
+        f"{measured.loss_dimensionless:.6g}",
+        str(measured.patches),
+        str(measured.jumps),
+        str(measured.solutions),
+        f"{1e3 * measured.cpu_seconds / measured.solutions:.2f}",
+    ]
+
+
+def record(line: Line) -> dict[str, object]:
+    """Return one line as a CSV record; what is not known is empty."""
+    measured, run = line.measured, line.run
+    fields: dict[str, object] = {
+        "scene": run.scene.name,
+        "method": run.method,
+        "setting": run.setting,
+        "load_steps": run.load_steps,
+        "cpu_seconds": measured.cpu_seconds,
+        "megabytes": measured.megabytes,
+        "megabytes_before": measured.megabytes_before,
+        "loss": measured.loss,
+        "loss_dimensionless": measured.loss_dimensionless,
+        "error": line.error,
+        "audit_residual": measured.audit_residual,
+        "solutions": measured.solutions,
+        "jumps": measured.jumps,
+        "patches": measured.patches,
+        "reference_loss": line.reference.loss,
+        "reference": line.reference.text,
+        "note": measured.note,
+    }
+    return {
+        key: "" if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in fields.items()
+    }
+
+
+def page(
+    lines: Sequence[Line], grown: Sequence[Line], compared: Sequence[Ratio], made_by: str
+) -> str:
+    """Return the Markdown page: a table for each scene, the ratios, the growth."""
+    parts = [f"Made by {made_by}.", ""]
+    for scene in dict.fromkeys(line.run.scene for line in lines):
+        chosen = [line for line in lines if line.run.scene is scene]
+        parts += [f"### {scene.title[0].upper()}{scene.title[1:]}", ""]
+        parts += [
+            f"Δ~max = {scene.max_penetration:g}, {scene.load_steps} load steps. "
+            f"Reference: {chosen[0].reference.text}.",
+            "",
+            *_markdown(LINE_COLUMNS, [line_cells(line) for line in chosen]),
+            "",
+        ]
+    if compared:
+        parts += ["### CPU time of grid over sharp at equal error", ""]
+        rows = [
+            [
+                ratio.line.run.scene.title,
+                ratio.line.run.described,
+                f"{abs(ratio.line.error):.1e}",
+                f"{ratio.bound} {ratio.value:.2g}".strip(),
+            ]
+            for ratio in compared
+        ]
+        parts += [*_markdown(("scene", "sharp", "error", "grid / sharp"), rows), ""]
+    if grown:
+        parts += ["### How the cost of sharp grows", ""]
+        parts += [*_markdown(GROWTH_COLUMNS, [growth_cells(line) for line in grown]), ""]
+    return "\n".join(parts)
+
+
+def _markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    rule = ["---" if k < 2 else "---:" for k in range(len(columns))]
+    return ["| " + " | ".join(row) + " |" for row in (columns, rule, *rows)]
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.2f}" if value < 10 else f"{value:.1f}"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.1e}" if math.isfinite(value) else ""

@@ -1,0 +1,55 @@
+"""How two campaigns differ, by meaning: what has grown, what is another campaign's.
+
+Order, comments and the spelling of numbers do not matter, and neither do the few keys that cannot
+change a result.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+from ensemble.campaign.rules import shown
+from ensemble.campaign.tables import TABLES, Campaign
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How a campaign differs from the one of a results file.
+
+    Attributes
+    ----------
+    grown : tuple of str
+        Keys of the sweep that only gained values.
+    other : tuple of str
+        One phrase for each other key that differs: its name and both values.
+    """
+
+    grown: tuple[str, ...]
+    other: tuple[str, ...]
+
+
+def compare(old: Campaign, new: Campaign) -> Difference:
+    """Say how ``new`` differs from ``old``; keys that cannot change a result are left out."""
+    before, after = old.values(), new.values()
+    grown, other = [], []
+    for key, was in before.items():
+        value = after[key]
+        if value == was or _is_free(key):
+            continue
+        if _extends(key, was, value):
+            grown.append(key)
+        else:
+            other.append(f"{key} is {shown(value)} here and {shown(was)} there")
+    return Difference(tuple(grown), tuple(other))
+
+
+def _is_free(key: str) -> bool:
+    table, name = key.split(".")
+    return any(f.name == name and f.metadata["free"] for f in fields(TABLES[table]))  # type: ignore[index]
+
+
+def _extends(key: str, was: Any, now: Any) -> bool:
+    if key == "sweep.realisations":
+        return bool(now > was)
+    return key in ("sweep.hurst", "sweep.work_of_adhesion") and set(was) < set(now)

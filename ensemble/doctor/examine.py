@@ -1,0 +1,241 @@
+"""Which MPI, HDF5, FFTW and writer this installation has, and why.
+
+Nothing is assumed: a separate process loads the libraries, and two ranks started by ``mpirun`` say
+whether they see each other and write one file together. Those processes get a time limit and a
+clean environment, so that a broken MPI can neither hang the caller nor be blamed on it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ensemble.run.launch import cores, launch_environment, launcher
+from ensemble.versions import installed, last_lines
+
+_RANKS = 2
+_TIME_LIMIT = 60.0  # s; the first load of the libraries from a cold network disk is slow
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was tried."""
+
+    name: str
+    ok: bool
+    text: str
+    needed: bool = True  # without it the installation is not usable
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What `examine` found."""
+
+    versions: dict[str, str]
+    cores: int
+    mpirun: str
+    mpirun_version: str
+    writer: str  # "mpio" or "rank 0"
+    why: str
+    checks: list[Check] = field(default_factory=list)
+
+    @property
+    def usable(self) -> bool:
+        """Whether a campaign can run here: every check that is needed passed."""
+        return all(check.ok or not check.needed for check in self.checks)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For ``--json``."""
+        return {
+            "usable": self.usable,
+            "writer": self.writer,
+            "why": self.why,
+            "cores": self.cores,
+            "mpirun": self.mpirun,
+            "mpirun_version": self.mpirun_version,
+            "versions": self.versions,
+            "checks": [vars(check) for check in self.checks],
+        }
+
+
+def examine(directory: Path | str | None = None) -> Diagnosis:
+    """Try everything out.
+
+    Parameters
+    ----------
+    directory : path, optional
+        Where two ranks write a file together (and remove it). A parallel file system can differ
+        from the default, the folder for temporary files.
+    """
+    checks = [_loopback()]
+    alone = _run_probe([], directory)
+    found = alone.reports[0] if alone.reports else {}
+    texts = found.get("versions") or installed()
+    checks.append(_libraries(alone, texts))
+
+    mpi_loads = bool(found.get("mpi_loads"))
+    mpirun = launcher()
+    together: _Probe | None = None
+    if not mpi_loads:
+        checks.append(Check("MPI library", False, texts["mpi"], needed=False))
+    elif mpirun is None:
+        text = "no mpirun and no mpiexec in PATH; adhesis run works in one process"
+        checks.append(Check("ranks", False, text, needed=False))
+    else:
+        together = _run_probe([mpirun, "-n", str(_RANKS)], directory)
+        checks.append(_ranks(together, mpirun))
+
+    parallel = bool(found.get("parallel_hdf5"))
+    if not parallel:
+        writer, why = "rank 0", f"this h5py has HDF5 {texts['hdf5']}"
+    elif together is None:
+        writer, why = "rank 0", "no ranks could be started"
+    else:
+        written = _writing(together)
+        checks.append(written)
+        writer = "mpio" if written.ok else "rank 0"
+        why = (
+            "h5py has parallel HDF5, and ranks wrote a file together"
+            if written.ok
+            else written.text
+        )
+    return Diagnosis(
+        versions=texts,
+        cores=cores(),
+        mpirun=mpirun or "",
+        mpirun_version=_mpirun_version(mpirun) if mpirun else "",
+        writer=writer,
+        why=why,
+        checks=checks,
+    )
+
+
+# ------------------------------------------------------------------------------------- the checks
+
+
+@dataclass(frozen=True)
+class _Probe:
+    """What the processes of one probe reported, and how the command ended."""
+
+    reports: list[dict[str, Any]]
+    failure: str  # empty if the command ended well
+
+
+def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
+    with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
+        command = [*launch, sys.executable, "-m", "ensemble.doctor.probe", scratch]
+        if launch:
+            command.append("together")
+        env = launch_environment(_RANKS)
+        # The ranks must find this very package, whatever the working directory is.
+        here = str(Path(__file__).resolve().parent.parent.parent)
+        env["PYTHONPATH"] = os.pathsep.join(filter(None, [here, env.get("PYTHONPATH", "")]))
+        failure = _failure_of(command, env)
+        reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
+        return _Probe([report for report in reports if report], failure)
+
+
+def _failure_of(command: list[str], env: dict[str, str]) -> str:
+    """Run it to its end or the time limit; empty if it ended well."""
+    try:
+        process = subprocess.Popen(
+            command,
+            env=env,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+        )
+    except OSError as error:
+        return str(error)
+    try:
+        output, _ = process.communicate(timeout=_TIME_LIMIT)
+    except subprocess.TimeoutExpired:
+        process.terminate()  # a launcher then ends its ranks, which a kill would leave behind
+        try:
+            process.communicate(timeout=5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+        return f"did not end within {_TIME_LIMIT:.0f} s"
+    if process.returncode:
+        return f"ended with {process.returncode}: {last_lines(output)}"
+    return ""
+
+
+def _read_report(path: Path) -> dict[str, Any]:
+    try:
+        report: dict[str, Any] = json.loads(path.read_text())
+    except (OSError, ValueError):  # the process ended while it wrote
+        return {}
+    return report
+
+
+def _loopback() -> Check:
+    try:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            socket.create_connection(server.getsockname(), timeout=5).close()
+    except OSError as error:
+        text = f"127.0.0.1 cannot be reached ({error}); launchers talk to their ranks through it"
+        return Check("loopback", False, text, needed=False)
+    return Check("loopback", True, "up")
+
+
+def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
+    if not probe.reports:
+        return Check("libraries", False, f"a process that loads them {probe.failure}")
+    broken = [
+        f"{name}: {texts[name]}" for name in ("hdf5", "fftw") if not texts[name][:1].isdigit()
+    ]
+    return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
+
+
+def _ranks(probe: _Probe, mpirun: str) -> Check:
+    sizes = [report["size"] for report in probe.reports if "size" in report]
+    if sizes == [_RANKS] * _RANKS:
+        return Check("ranks", True, f"mpirun -n {_RANKS} gives {_RANKS} ranks that see each other")
+    if len(sizes) == _RANKS and set(sizes) == {1}:
+        library = probe.reports[0]["versions"]["mpi"]
+        text = (
+            f"{mpirun} -n {_RANKS} gives {_RANKS} processes that do not see each other: it belongs "
+            f"to another MPI than mpi4py's ({library}); set MPIRUN to that one's"
+        )
+    else:
+        text = f"{mpirun} -n {_RANKS} {probe.failure or f'gave {len(sizes)} ranks'}"
+    return Check("ranks", False, text)
+
+
+def _writing(probe: _Probe) -> Check:
+    name = "mpio writing available"
+    outcomes = [report.get("mpio", "not tried") for report in probe.reports]
+    if outcomes == ["ok"] * _RANKS:
+        return Check(name, True, f"yes: {_RANKS} ranks wrote one file together, and it read back")
+    reasons = sorted({text for text in outcomes if text != "ok"})
+    return Check(name, False, "no: " + ("; ".join(reasons) or probe.failure or "no rank answered"))
+
+
+def _mpirun_version(mpirun: str) -> str:
+    try:
+        done = subprocess.run(
+            [mpirun, "--version"],
+            env=launch_environment(_RANKS),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=_TIME_LIMIT,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    lines = [" ".join(line.split()) for line in done.stdout.splitlines()]
+    # Open MPI says it in its first line, MPICH's Hydra in its second.
+    return next((line for line in lines if any(c.isdigit() for c in line)), "")

@@ -1,0 +1,4 @@
+"""One loop without a campaign: what ``adhesis loop`` writes.
+
+Import from its modules.
+"""

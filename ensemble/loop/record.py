@@ -1,0 +1,236 @@
+"""What ``adhesis loop`` writes: the JSON of a loop, and the fields at chosen penetrations.
+
+Both files appear whole or not at all: they are written beside their place and renamed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from ensemble.errors import InputError
+from solver.loop import LoopResult
+from solver.method import Branch, ContactState, Fields, Method
+
+_STATE_KEYS = ("branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy")
+_MORE_STATE_KEYS = ("separation", "elastic_energy", "adhesion_energy", "load_step")
+
+
+def loop_document(result: LoopResult) -> dict[str, Any]:
+    """Return the JSON document of a loop; see the README for its keys and units.
+
+    The states are there twice: ``states`` is a list of objects, one per state, and each of its
+    keys is also a list of its own at the top level, for readers that want columns.
+    """
+    profile = result.problem.profile
+    columns = {key: getattr(result, key).tolist() for key in _STATE_KEYS + _MORE_STATE_KEYS}
+    rows = zip(*columns.values(), strict=True)
+    details = dict(result.method)
+    return {
+        "h_max": profile.h_max,
+        "h_rms": profile.h_rms,
+        "m0": profile.m0,
+        "m2": profile.m2,
+        "m4": profile.m4,
+        "period": profile.period,
+        "young": result.problem.half_space.young,
+        "poisson": result.problem.half_space.poisson,
+        "work_of_adhesion": result.problem.work_of_adhesion,
+        "max_penetration": result.max_penetration,
+        "load_steps": result.load_steps,
+        "loss": result.loss,
+        "loss_dimensionless": result.loss_dimensionless,
+        "loss_from_drops": result.loss_from_drops,
+        "audit_residual": result.audit_residual,
+        "pull_off_stress": result.pull_off_stress,
+        "pull_off_penetration": result.pull_off_penetration,
+        "seconds": result.seconds,
+        "method": details.pop("name"),
+        "method_details": {key: _plain(value) for key, value in details.items()},
+        "jumps": [
+            {
+                "branch": jump.branch,
+                "penetration": result.problem.penetration(jump.separation),
+                "energy_drop": jump.energy_drop,
+                "kind": jump.kind,
+                "patches_before": jump.patches_before,
+                "patches_after": jump.patches_after,
+                "contact_before": jump.contact_before,
+                "contact_after": jump.contact_after,
+                "patch_length": jump.patch_length,
+            }
+            for jump in result.jumps
+        ],
+        "states": [dict(zip(columns, row, strict=True)) for row in rows],
+        **columns,
+    }
+
+
+def loop_summary(result: LoopResult) -> str:
+    """Return the loop in a few lines for the terminal."""
+    problem, profile, half_space = result.problem, result.problem.profile, result.problem.half_space
+    present = np.flatnonzero(profile.coefficients)
+    counts = Counter(jump.kind for jump in result.jumps)
+    kinds = ", ".join(f"{count} {kind}" for kind, count in counts.most_common()) or "none"
+    return "\n".join(
+        (
+            f"profile     period {profile.period:.6g} m, harmonics {present[0]} to {present[-1]}, "
+            f"h_rms {profile.h_rms:.4g} m, h_max {profile.h_max:.4g} m, m2 {profile.m2:.4g}",
+            f"contact     E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
+            f"work of adhesion {problem.work_of_adhesion:.4g} J/m²",
+            f"cycle       to penetration {result.max_penetration:g} h_max in {result.load_steps} "
+            f"load steps, detached by {result.pull_off_penetration:.4g} h_max; "
+            f"largest contact fraction {result.contact_fraction.max():.4g}, "
+            f"most patches {result.patches.max()}",
+            f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
+            f"audit       {result.loss_from_drops:.6g} J/m² in {len(result.jumps)} jumps, "
+            f"residual {result.audit_residual:.2e}",
+            f"jumps       {kinds}",
+            f"pull-off    mean tension {result.pull_off_stress:.6g} Pa",
+            f"method      {result.method['name']}, {result.seconds:.1f} s",
+        )
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Return ``value`` with numpy numbers and arrays as the JSON types."""
+    return (
+        value.item() if isinstance(value, np.generic) else getattr(value, "tolist", lambda: value)()
+    )
+
+
+# ---------------------------------------------------------------------- fields
+
+
+@dataclass
+class FieldStates:
+    """Picks the states before the wanted penetrations while a loop runs.
+
+    Parameters
+    ----------
+    method : Method
+    penetrations : sequence of float
+        Δ/h_max.
+    """
+
+    method: Method
+    penetrations: Sequence[float]
+    _before: dict[tuple[Branch, float], ContactState] = field(default_factory=dict)
+    _last: dict[Branch, ContactState] = field(default_factory=dict)
+
+    def visit(self, branch: Branch, state: ContactState) -> None:
+        """Take note of one state of the path; hand this to ``run_loop`` as ``on_state``."""
+        here = self.method.problem.penetration(state.separation)
+        for wanted in self.penetrations:
+            reached = here >= wanted if branch == "loading" else here <= wanted
+            if reached and (branch, wanted) not in self._before:
+                self._before[branch, wanted] = self._last.get(branch, state)
+        self._last[branch] = state
+
+    def collect(self, n: int) -> dict[str, Any]:
+        """Return the fields on n nodes at every wanted penetration of both branches, as arrays.
+
+        ``branch`` and ``penetration`` have shape (k,), ``x`` and ``height`` (n,), ``stress``,
+        ``displacement`` and ``gap`` (k, n), ``edges`` (k, most patches, 2) with NaN for none.
+        """
+        found: list[tuple[Branch, float, ContactState, Fields]] = []
+        branches: tuple[Branch, ...] = ("loading", "unloading")
+        for branch in branches:
+            for wanted in self.penetrations:
+                state = self._state(branch, wanted)
+                found.append((branch, wanted, state, self.method.fields(state, n)))
+        edges = np.full((len(found), max(s.patches for _, _, s, _ in found), 2), np.nan)
+        for row, (_, _, state, _) in zip(edges, found, strict=True):
+            row[: state.patches] = state.edges
+        fields = [f for *_, f in found]
+        return {
+            "branch": np.array([branch for branch, *_ in found]),
+            "penetration": np.array([wanted for _, wanted, *_ in found]),
+            "separation": np.array([state.separation for _, _, state, _ in found]),
+            "mean_stress": np.array([state.mean_stress for _, _, state, _ in found]),
+            "x": fields[0].x,
+            "height": fields[0].height,
+            "stress": np.array([f.stress for f in fields]),
+            "displacement": np.array([f.displacement for f in fields]),
+            "gap": np.array([f.gap for f in fields]),
+            "edges": edges,
+        }
+
+    def _state(self, branch: Branch, wanted: float) -> ContactState:
+        separation = self.method.problem.separation(wanted)
+        before = self._before.get((branch, wanted))
+        if before is None or (branch == "unloading" and not before.patches):
+            return self.method.detached(separation)
+        if before.patches and before.separation == separation:
+            return before
+        return self.method.follow(before, separation).states[-1]
+
+
+# ---------------------------------------------------------------------- files
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a path that cannot be written, before any work is done.
+
+    Raises
+    ------
+    InputError
+        If the directory does not exist or takes no new files, or the path is a directory.
+    """
+    if path.is_dir():
+        raise InputError(f"cannot write {path}: it is a directory")
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no directory {path.parent}")
+    try:
+        if _special(path):
+            path.open("ab").close()
+        else:
+            tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror or error}") from None
+
+
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write ``document`` whole or not at all."""
+    with _whole_file(path) as stream:
+        stream.write((json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
+
+
+def write_npz(path: Path, arrays: dict[str, Any]) -> None:
+    """Write ``arrays`` as a compressed .npz, whole or not at all."""
+    save: Callable[..., None] = np.savez_compressed
+    with _whole_file(path) as stream:
+        save(stream, **arrays)
+
+
+@contextmanager
+def _whole_file(path: Path) -> Iterator[IO[bytes]]:
+    if _special(path):
+        with path.open("wb") as stream:
+            yield stream
+        return
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            yield stream
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)  # mkstemp makes files private; results are for sharing
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _special(path: Path) -> bool:
+    """Whether the path is a device or pipe (/dev/stdout): written in place, not renamed over."""
+    return path.exists() and not path.is_file()

@@ -1,0 +1,137 @@
+"""The figures of the report; what each shows, and the function that draws it from an aggregate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from ensemble.aggregate.average import Aggregate
+from ensemble.report.figures import fields, loops, losses
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """One figure of the report.
+
+    Attributes
+    ----------
+    name : str
+        Stem of its files.
+    title : str
+    caption : str
+        What it shows, as a sentence or two.
+    draw : callable
+    """
+
+    name: str
+    title: str
+    caption: str
+    draw: Callable[[Aggregate], Figure]
+
+
+LOOPS = (
+    Illustration(
+        "fig6_contact_against_stress",
+        "Contact fraction against mean stress (paper's Fig. 6)",
+        "Means over realisations, taken at equal penetration; σ~ = 2p̄/(E* q0 h_max) with each "
+        "realisation's own h_max, compression positive.",
+        loops.contact_against_stress,
+    ),
+    Illustration(
+        "fig7_loop_against_penetration",
+        "Mean stress and contact fraction against penetration (paper's Fig. 7)",
+        "Lines: means over realisations; shading: one standard deviation of a single realisation. "
+        "A realisation that has detached counts with zero.",
+        loops.loop_against_penetration,
+    ),
+)
+LOSSES = (
+    Illustration(
+        "table1_losses",
+        "Loss against work of adhesion (paper's Table 1)",
+        "Means with 95 % intervals; stars: the paper's values, as far as they are known. The "
+        "curves are moved apart a little so that the intervals can be told apart.",
+        losses.loss_against_adhesion,
+    ),
+    Illustration(
+        "loss_against_m2",
+        "Loss against mean square slope",
+        "Means with 95 % intervals. The curves are moved apart a little.",
+        losses.loss_against_slope,
+    ),
+)
+SHAPES = (
+    Illustration(
+        "fig3_shapes",
+        "Deformed shapes (paper's Fig. 3)",
+        "The first realisation that kept its fields, middle H and γ: rigid profile h - s and "
+        "elastic surface v on both branches, at the same separation. In contact the two coincide. "
+        "Right: one and a half of the longest waves around the highest point.",
+        fields.shapes,
+    ),
+    Illustration(
+        "fig4_spectra_loading",
+        "Spectral density on loading (paper's Fig. 4)",
+        "Two-sided, mean over the realisations in contact, middle γ. Thin lines: slopes of a "
+        "self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the profile's "
+        "highest wave number only the edges of contact have power.",
+        fields.spectra_on_loading,
+    ),
+    Illustration(
+        "fig5_spectra_unloading",
+        "Spectral density on unloading (paper's Fig. 5)",
+        "As on loading. At the largest penetration both branches are one state.",
+        fields.spectra_on_unloading,
+    ),
+    Illustration(
+        "fig8_gap_density",
+        "Probability density of the separation (paper's Fig. 8)",
+        "Gap outside contact, in units of each realisation's h_max; the integral is the fraction "
+        "out of contact. Middle γ. At the largest penetration both branches are one state.",
+        fields.gap_density,
+    ),
+)
+HEIGHTS = (
+    Illustration(
+        "fig9_height_density",
+        "Probability density of the heights (paper's Fig. 9)",
+        "Rigid profiles, mean over realisations, with the Gaussian of the same variance.",
+        fields.height_density,
+    ),
+)
+MECHANISMS = (
+    Illustration(
+        "loss_by_mechanism",
+        "Loss by mechanism",
+        "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
+        "large scale: patches appear, merge, split, vanish or pull off. Figures above the bars: "
+        "share of the small scale.",
+        losses.loss_by_mechanism,
+    ),
+    Illustration(
+        "jump_energies",
+        "Distribution of the energy drops",
+        "Jumps of one loop per decade of energy drop, mean over realisations. Drops more than "
+        "eight decades below the largest are not shown.",
+        losses.jump_energies,
+    ),
+    Illustration(
+        "pull_off_stress",
+        "Pull-off stress",
+        "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
+        "a little.",
+        losses.pull_off,
+    ),
+)
+PENETRATIONS = (
+    Illustration(
+        "loss_against_max_penetration",
+        "Loss against the largest penetration",
+        "This campaign and those beside it that differ in max_penetration: means with 95 % "
+        "intervals over the realisations that all of them have finished. The curves are moved "
+        "apart a little.",
+        losses.loss_against_penetration,
+    ),
+)

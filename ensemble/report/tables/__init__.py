@@ -1,0 +1,4 @@
+"""The tables of the report: what a table is, and each table from an aggregate.
+
+Import from its modules.
+"""

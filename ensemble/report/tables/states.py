@@ -1,0 +1,135 @@
+"""The tables of jumps, mechanisms and spectra, from an aggregate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.curves import BRANCHES
+from ensemble.aggregate.fields import fitted_slope
+from ensemble.report.tables.table import (
+    KEY,
+    Column,
+    Table,
+    Value,
+    fixed,
+    make_table,
+    number,
+    percent,
+    plain,
+)
+
+
+def jumps(data: Aggregate) -> Table:
+    """One row for each (H, γ) and kind: how many jumps, and their share of all drops."""
+    found = data.jumps
+    columns = (
+        *KEY,
+        Column("kind", "kind"),
+        Column("scale", "scale"),
+        Column("jumps_per_loop", "jumps a loop", number(3)),
+        Column("energy_per_loop [J/m^2]", "drops a loop (J/m²)", number(3)),
+        Column("share_of_drops", "share", percent),
+    )
+    rows: list[list[Value]] = []
+    for k, cell in enumerate(data.cells):
+        total = float(found.energy[k].sum())
+        for j, kind in enumerate(found.kinds):
+            if not found.number[k, j]:
+                continue
+            rows.append(
+                [
+                    cell.hurst,
+                    cell.work_of_adhesion,
+                    kind,
+                    "small" if found.small_scale[j] else "large",
+                    float(found.number[k, j] / cell.done),
+                    float(found.energy[k, j] / cell.done),
+                    float(found.energy[k, j] / total) if total else None,
+                ]
+            )
+    return make_table("Jumps by kind", columns, rows)
+
+
+def shares_by_kind(data: Aggregate) -> Table:
+    """Share of each kind in the drops, one row for each (H, γ): :func:`jumps` at a glance."""
+    found = data.jumps
+    used = [j for j in range(len(found.kinds)) if found.number[:, j].any()]
+    columns = (*KEY, *(Column(found.kinds[j], found.kinds[j], percent) for j in used))
+    rows: list[list[Value]] = []
+    for k, cell in enumerate(data.cells):
+        total = float(found.energy[k].sum())
+        shares = [float(found.energy[k, j]) / total if total else None for j in used]
+        rows.append([cell.hurst, cell.work_of_adhesion, *shares])
+    return make_table("Share of the drops by kind of the jump", columns, rows)
+
+
+def mechanisms(data: Aggregate) -> Table:
+    """Loss by mechanism and pull-off, one row for each (H, γ)."""
+    columns = (
+        *KEY,
+        Column("small_scale_share", "small-scale share", percent),
+        Column("small_scale_share_ci_low", "95 % from", percent),
+        Column("small_scale_share_ci_high", "to", percent),
+        Column("jumps_per_loop", "jumps a loop", number(3)),
+        Column("pull_off_stress [Pa]", "pull-off (Pa)", number(3)),
+        Column("pull_off_stress_sem [Pa]", "s.e.", number(2)),
+        Column("pull_off_penetration", "at Δ/h_max", number(3)),
+        Column("wall_time [s]", "s a loop", plain),
+    )
+    rows: list[list[Value]] = []
+    for cell in data.cells:
+        share, pull_off = cell.estimates["small_scale_share"], cell.estimates["pull_off_stress"]
+        rows.append(
+            [
+                cell.hurst,
+                cell.work_of_adhesion,
+                share.mean,
+                share.low,
+                share.high,
+                cell.estimates["jump_count"].mean,
+                pull_off.mean,
+                pull_off.sem,
+                cell.estimates["pull_off_penetration"].mean,
+                float(f"{cell.estimates['wall_time'].mean:.3g}"),
+            ]
+        )
+    return make_table("Mechanisms and pull-off", columns, rows)
+
+
+def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
+    """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
+    columns = (
+        *KEY,
+        Column("branch", "branch"),
+        Column("penetration", "Δ/h_max", fixed(2)),
+        Column("realisations", "n"),
+        Column("slope", "slope", fixed(2)),
+        Column("slope_sem", "s.e.", number(1)),
+        Column("slope_persson", "-(2+H)", fixed(2)),
+        Column("slope_profile", "-(2H+1)", fixed(2)),
+    )
+    fields = data.fields
+    rows: list[list[Value]] = []
+    for index, cell in enumerate(data.cells):
+        for branch in branches:
+            b = BRANCHES.index(branch)
+            for k, penetration in enumerate(fields.penetration.tolist()):
+                if not fields.in_contact[index, b, k]:
+                    continue
+                density = fields.psd_displacement[index, b, k]
+                slope, error = fitted_slope(data.campaign, fields.wave_number, density)
+                rows.append(
+                    [
+                        cell.hurst,
+                        cell.work_of_adhesion,
+                        branch,
+                        penetration,
+                        int(fields.in_contact[index, b, k]),
+                        slope,
+                        error,
+                        -(2 + cell.hurst),
+                        -(2 * cell.hurst + 1),
+                    ]
+                )
+    return make_table("Slope of the spectrum of the deformed surface", columns, rows)

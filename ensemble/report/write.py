@@ -1,0 +1,98 @@
+"""The report of a campaign, from its results file alone: tables, curves, figures, one page."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+from ensemble.aggregate.average import Aggregate, aggregate
+from ensemble.errors import InputError
+
+
+def write_report(
+    path: Path | str,
+    directory: Path | str,
+    stream: IO[str] | None = None,
+    beside: Sequence[Path | str] = (),
+) -> Aggregate:
+    """Write ``losses.csv``, ``curves.nc``, the figures and ``report.md``; print the losses.
+
+    Parameters
+    ----------
+    path : path
+        The results file, finished or not.
+    directory : path
+        Made if missing; files of the same names are replaced.
+    stream : text stream, optional
+        Where the tables go; standard output by default.
+    beside : sequence of path
+        Results files of other campaigns to compare with.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to report, or the directory cannot be written.
+    """
+    data = aggregate(path, beside)
+    directory = Path(directory)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        _write_files(data, directory)
+    except OSError as error:
+        raise InputError(f"{directory} cannot be written: {error.strerror or error}") from error
+    _print_summary(data, directory, stream or sys.stdout)
+    return data
+
+
+def _write_files(data: Aggregate, directory: Path) -> None:
+    # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
+    from ensemble.report.curves import write_curves
+    from ensemble.report.figures.catalogue import (
+        HEIGHTS,
+        LOOPS,
+        LOSSES,
+        MECHANISMS,
+        PENETRATIONS,
+        SHAPES,
+    )
+    from ensemble.report.figures.losses import of_penetration
+    from ensemble.report.figures.style import save, style
+    from ensemble.report.page import write_page
+    from ensemble.report.tables import losses, states
+
+    losses.losses(data).write_csv(directory / "losses.csv")
+    losses.paired(data).write_csv(directory / "growth.csv")
+    states.jumps(data).write_csv(directory / "jumps.csv")
+    write_curves(data, directory / "curves.nc")
+    if data.companions:
+        losses.companions(data).write_csv(directory / "beside.csv")
+    states.slopes(data).write_csv(directory / "slopes.csv")
+    with_shapes = (*SHAPES, *HEIGHTS) if data.fields.penetration.size else HEIGHTS
+    sections = (
+        ("loops", LOOPS),
+        ("losses", LOSSES),
+        ("mechanisms", MECHANISMS),
+        ("fields", with_shapes),
+        ("companions", PENETRATIONS if of_penetration(data) else ()),
+    )
+    for _, illustrations in sections:
+        for item in illustrations:
+            with style():
+                figure = item.draw(data)
+            save(figure, directory / item.name)
+    page = write_page(data, sections)
+    (directory / "report.md").write_text(page, encoding="utf-8")
+
+
+def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
+    from ensemble.report import findings
+    from ensemble.report.tables import losses, states
+
+    losses.losses(data).print(stream)
+    print(file=stream)
+    states.mechanisms(data).print(stream)
+    for sentence in (*findings.missing(data), *findings.quality(data)):
+        print(sentence, file=stream)
+    print(f"report: {directory / 'report.md'}", file=stream)

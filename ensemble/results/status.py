@@ -1,0 +1,161 @@
+"""How far a campaign is: counts, times, failures and losses so far, from its results file alone.
+
+Never loads MPI and reads a few bytes a task: it works on a login node, and while the run writes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.results.schema import DONE, FAILED, PENDING
+from ensemble.results.store import Results
+
+_MOST_FAILURES_SHOWN = 10
+_MOST_GROUPS_SHOWN = 60
+_TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
+
+
+def read_status(path: Path | str) -> dict[str, Any]:
+    """Return counts, times and failures of a results file.
+
+    Returns
+    -------
+    dict
+        ``file``, ``tasks``, ``pending``, ``done``, ``failed``; ``seconds`` per done task (``mean``,
+        ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each H and γ with
+        its counts, its mean time and its mean loss with standard error (J/m², and W~);
+        ``failures``, one dict for each failed task.
+
+    Raises
+    ------
+    InputError
+        If the file is not a sound results file.
+    """
+    with Results(path) as results:
+        state = results.status()
+        names = (*_TASK, "wall_time", "loss", "loss_dimensionless")
+        column = {name: results.column(name) for name in names}
+        failed = np.flatnonzero(state == FAILED)
+        errors = results.errors(failed)
+    times = column["wall_time"][state == DONE]
+    failures = [
+        {
+            "row": row,
+            **{name: column[name][row].item() for name in _TASK},
+            "seconds": float(column["wall_time"][row]),
+            "error": error,
+        }
+        for row, error in zip(failed.tolist(), errors, strict=True)
+    ]
+    return {
+        "file": str(path),
+        "tasks": len(state),
+        "pending": int(np.sum(state == PENDING)),
+        "done": int(np.sum(state == DONE)),
+        "failed": len(failed),
+        "seconds": _times(times) if times.size else None,
+        "groups": _groups(state, column),
+        "failures": failures,
+    }
+
+
+def _times(times: NDArray[np.float64]) -> dict[str, float]:
+    return {
+        "mean": float(times.mean()),
+        "median": float(np.median(times)),
+        "max": float(times.max()),
+        "sum": float(times.sum()),
+    }
+
+
+def _groups(state: NDArray[np.uint8], column: dict[str, NDArray[Any]]) -> list[dict[str, Any]]:
+    pairs, group_of = np.unique(
+        np.stack([column["hurst"], column["work_of_adhesion"]]), axis=1, return_inverse=True
+    )
+    group_of = group_of.ravel()
+    size = pairs.shape[1]
+    done = state == DONE
+    count = {
+        name: np.bincount(group_of[state == code], minlength=size)
+        for name, code in (("done", DONE), ("pending", PENDING), ("failed", FAILED))
+    }
+
+    def mean_and_error(name: str) -> list[tuple[float | None, float | None]]:
+        values, group = column[name][done], group_of[done]
+        n = count["done"]
+        mean = np.bincount(group, values, size) / np.maximum(n, 1)
+        square = np.bincount(group, (values - mean[group]) ** 2, size)
+        error = np.sqrt(square / np.maximum(n - 1, 1) / np.maximum(n, 1))
+        return [
+            (float(mean[i]) if n[i] else None, float(error[i]) if n[i] > 1 else None)
+            for i in range(size)
+        ]
+
+    seconds = mean_and_error("wall_time")
+    loss, scaled = mean_and_error("loss"), mean_and_error("loss_dimensionless")
+    return [
+        {
+            "hurst": float(pairs[0, i]),
+            "work_of_adhesion": float(pairs[1, i]),
+            **{name: int(values[i]) for name, values in count.items()},
+            "mean_seconds": seconds[i][0],
+            "loss": loss[i][0],
+            "loss_standard_error": loss[i][1],
+            "loss_dimensionless": scaled[i][0],
+            "loss_dimensionless_standard_error": scaled[i][1],
+        }
+        for i in range(size)
+    ]
+
+
+def as_text(status: dict[str, Any], pace: str = "") -> str:
+    """Return a status as lines for people; ``pace`` is added to the first."""
+    lines = [
+        f"{status['file']}: {status['tasks']} tasks, {status['done']} done, "
+        f"{status['pending']} pending, {status['failed']} failed{pace}"
+    ]
+    if seconds := status["seconds"]:
+        lines.append(
+            f"time per task: mean {seconds['mean']:.3g} s, median {seconds['median']:.3g} s, "
+            f"longest {seconds['max']:.3g} s; all done tasks {seconds['sum'] / 3600:.3g} h"
+        )
+    groups = status["groups"]
+    if len(groups) <= _MOST_GROUPS_SHOWN:
+        lines += ["", "    H  γ in J/m²     done  pending  failed    mean s  loss W~"]
+        lines += [_group_line(group) for group in groups]
+    if status["failures"]:
+        lines += ["", *_failure_lines(status["failures"])]
+    return "\n".join(lines)
+
+
+def _group_line(group: dict[str, Any]) -> str:
+    counts = f"{group['done']:8d} {group['pending']:8d} {group['failed']:7d}"
+    mean, loss = group["mean_seconds"], group["loss_dimensionless"]
+    error = group["loss_dimensionless_standard_error"]
+    return (
+        f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} {counts} "
+        + (f"{mean:9.3g}" if mean is not None else " " * 9)
+        + (f"  {loss:.4g}" if loss is not None else "")
+        + (f" ± {error:.2g}" if error is not None else "")
+    ).rstrip()
+
+
+def _failure_lines(failures: list[dict[str, Any]]) -> list[str]:
+    lines = [
+        f"failed {count}×: {error}"
+        for error, count in Counter(f["error"] for f in failures).most_common(5)
+    ]
+    for f in failures[:_MOST_FAILURES_SHOWN]:
+        lines.append(
+            f"  row {f['row']}: H = {f['hurst']:g}, γ = {f['work_of_adhesion']:g} J/m², "
+            f"realisation {f['realisation']}, seed {f['seed']}, after {f['seconds']:.3g} s"
+        )
+    if len(failures) > _MOST_FAILURES_SHOWN:
+        lines.append(f"  … and {len(failures) - _MOST_FAILURES_SHOWN} more (--json lists all)")
+    lines.append("again: adhesis run CAMPAIGN.toml --redo failed")
+    return lines

@@ -1,0 +1,149 @@
+"""What this project asks of MPI: messages, an honest count of ranks, no rank left waiting.
+
+The only module that imports mpi4py, and only inside its functions: ``status`` and ``report`` run
+where there is no MPI.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from ensemble.errors import InputError
+
+T = TypeVar("T")
+
+_TAG, _URGENT_TAG = 1, 2
+_PAUSE = 2e-3  # s
+
+# How launchers tell a process how many it is one of, and which one; the first that is set counts.
+# Slurm's SLURM_NTASKS is not among them: a batch script has it too, outside any launcher.
+_LAUNCHERS = (
+    ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "Open MPI's mpirun"),
+    ("PMI_SIZE", "PMI_RANK", "MPICH's mpirun"),
+    ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK", "MVAPICH's mpirun"),
+    ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID", "srun"),
+)
+# A process in whose environment none of these stands was started by itself: MPI is left alone,
+# which saves a second and, on some login nodes, the process. Ranks of a launcher that is unknown
+# here are kept apart by the lock of the results file.
+_HINTS = (
+    *("OMPI_COMM_WORLD_", "PMIX_", "PMI_", "PMI1_", "PMI2_", "MPI_LOCAL", "MPIRUN_", "MPIEXEC_"),
+    *("MV2_", "HYDI_", "HYDRA_", "I_MPI_HYDRA", "PALS_", "ALPS_", "JSM_", "FLUX_TASK", "PJM_"),
+    *("PRTE_", "PRRTE_", "PSP_", "SLURM_STEP_NUM_TASKS"),
+)
+
+
+def launched(environ: Mapping[str, str] = os.environ) -> tuple[int, int, str]:
+    """Return (number of processes, this one's place, launcher) as the launcher tells them.
+
+    (1, 0, "") without a launcher.
+    """
+    for size, rank, name in _LAUNCHERS:
+        try:
+            return int(environ[size]), int(environ.get(rank, "0")), name
+        except (KeyError, ValueError):
+            continue
+    return 1, 0, ""
+
+
+def world() -> Any:
+    """Return COMM_WORLD, or None if this process is alone.
+
+    Raises
+    ------
+    InputError
+        If a launcher started several processes and MPI sees one: two MPIs are mixed.
+    """
+    size, _, launcher = launched()
+    if "mpi4py.MPI" not in sys.modules and not any(name.startswith(_HINTS) for name in os.environ):
+        return None
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError, OSError) as error:
+        if size > 1:
+            raise InputError(
+                f"{launcher} started {size} processes, but mpi4py cannot be used here: {error}"
+            ) from error
+        return None
+    comm = MPI.COMM_WORLD
+    if size > 1 and comm.size == 1:
+        library = MPI.Get_library_version().split(",")[0].split("\n")[0].strip("\x00 ")
+        raise InputError(
+            f"{launcher} started {size} processes, but MPI ({library}) sees only one in each: "
+            "the launcher belongs to another MPI than mpi4py; use the mpirun of that one"
+        )
+    return comm if comm.size > 1 else None
+
+
+def library_version() -> str:
+    """Return the MPI library's name and version; "none" where MPI is not in use."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is None or not mpi.Is_initialized():
+        return "none"
+    text: str = mpi.Get_library_version()
+    return text.strip("\x00 ").splitlines()[0]
+
+
+def together(comm: Any, function: Callable[[], T]) -> T:
+    """Run a function on rank 0 and return its value on every rank.
+
+    Raises
+    ------
+    InputError
+        On every rank, if it was raised on rank 0.
+    """
+    if comm is None:
+        return function()
+    answer: tuple[bool, Any] | None = None
+    if comm.rank == 0:
+        try:
+            answer = (True, function())
+        except InputError as error:
+            answer = (False, str(error))
+    # A rank that waits in a broadcast burns a core, which rank 0 may need for its work.
+    arrived = comm.Ibarrier()
+    while not arrived.Test():
+        time.sleep(_PAUSE)
+    good, value = comm.bcast(answer)
+    if not good:
+        raise InputError(value)
+    result: T = value
+    return result
+
+
+class MpiChannel:
+    """:class:`ensemble.run.dispatch.Channel` over MPI.
+
+    Plain probes and receives of pickled bytes: matched probes, mpi4py's default, fail on some
+    networks. One thread a rank, so that nobody else can take a message that was probed.
+    """
+
+    def __init__(self, comm: Any) -> None:
+        from mpi4py import MPI
+
+        self._mpi = MPI
+        self._comm = comm.Dup()
+        self.rank: int = comm.rank
+        self.size: int = comm.size
+
+    def send(self, to: int, message: tuple[Any, ...], *, urgent: bool = False) -> None:
+        """Send a message to a rank."""
+        data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+        self._comm.Send([data, self._mpi.BYTE], dest=to, tag=_URGENT_TAG if urgent else _TAG)
+
+    def poll(self, *, urgent: bool = False) -> tuple[int, tuple[Any, ...]] | None:
+        """Return the next message and who sent it, or None."""
+        status = self._mpi.Status()
+        tag = _URGENT_TAG if urgent else _TAG
+        if not self._comm.Iprobe(source=self._mpi.ANY_SOURCE, tag=tag, status=status):
+            return None
+        source = status.Get_source()
+        data = bytearray(status.Get_count(self._mpi.BYTE))
+        self._comm.Recv([data, self._mpi.BYTE], source=source, tag=tag)
+        message: tuple[Any, ...] = pickle.loads(data)
+        return source, message

@@ -1,0 +1,248 @@
+"""Fields of chosen states of a loop, reduced to a bounded size.
+
+At the chosen penetrations, on both branches, every task keeps the power spectral density of the
+deformed surface and the density of the gap, in bins that depend on the campaign alone, so that they
+can be averaged over realisations. The first realisations of each (H, γ) keep the fields themselves,
+thinned to a bounded number of nodes.
+
+Conventions: the spectral density C of a field v is two-sided, ∫ C(q) dq over all q = mean(v²); on
+harmonics C(m q0) = |v_m|²/q0, and a bin holds the mean over its harmonics. Densities of gap (in
+units of h_max) and height (in units of h_rms) have unit integral over the period; contact has no
+gap, so that the density of the gap integrates to the fraction out of contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.campaign.tables import Campaign
+from solver.method import Branch, ContactState, Fields, Method
+from solver.profile import Array
+
+BRANCHES: tuple[Branch, ...] = ("loading", "unloading")
+
+# Nodes per shortest wave: spectra then reach four times the highest wave number of the profile.
+NODES_PER_WAVE = 8
+_BINS_PER_DECADE = 12
+
+# Gap in units of h_max: from far below the roughness to far above any gap before detachment.
+GAP_EDGES: Array = np.logspace(-4, 2, 6 * 16 + 1)
+HEIGHT_EDGES: Array = np.linspace(-5, 5, 81)
+
+
+@dataclass(frozen=True)
+class FieldPlan:
+    """Which states a campaign keeps fields of, and in which bins.
+
+    Attributes
+    ----------
+    period : float
+        λ in m.
+    lowest_harmonic, highest_harmonic : int
+    max_penetration : float
+    load_steps : int
+    wanted : tuple of float
+        Penetrations Δ/h_max as the campaign gives them.
+    most_nodes : int
+        Of the fields that are kept themselves.
+    realisations : int
+        So many first realisations of each (H, γ) keep the fields themselves.
+    """
+
+    period: float
+    lowest_harmonic: int
+    highest_harmonic: int
+    max_penetration: float
+    load_steps: int
+    wanted: tuple[float, ...]
+    most_nodes: int
+    realisations: int
+
+    @cached_property
+    def penetration(self) -> Array:
+        """Δ/h_max of the states, ascending: the wanted ones moved to the nearest load step."""
+        step = self.max_penetration / self.load_steps
+        index = {round(value / step) for value in self.wanted}
+        return np.array([step * k for k in sorted(index)])
+
+    @cached_property
+    def nodes(self) -> int:
+        """Nodes on which fields are computed, a power of two."""
+        return int(1 << (NODES_PER_WAVE * self.highest_harmonic - 1).bit_length())
+
+    @cached_property
+    def stride(self) -> int:
+        """Every so manieth node of a kept field is stored."""
+        stride = 1
+        while self.nodes // stride > self.most_nodes:
+            stride *= 2
+        return stride
+
+    @cached_property
+    def position(self) -> Array:
+        """Places x of the stored nodes, in m."""
+        count = self.nodes // self.stride
+        return np.linspace(0, self.period, count, endpoint=False)
+
+    @cached_property
+    def harmonic_edges(self) -> NDArray[np.int64]:
+        """First harmonic of each bin of the spectra, and one past the last; each bin has one."""
+        top = self.nodes // 2
+        count = max(2, int(np.ceil(np.log10(top) * _BINS_PER_DECADE)) + 1)
+        return np.unique(np.rint(np.logspace(0, np.log10(top), count)).astype(np.int64))
+
+    @cached_property
+    def filled(self) -> NDArray[np.bool_]:
+        """Bins of the spectra in which the profile has every harmonic, shape (bins,)."""
+        first, last = self.harmonic_edges[:-1], self.harmonic_edges[1:] - 1
+        return np.asarray((first >= self.lowest_harmonic) & (last <= self.highest_harmonic))
+
+    @cached_property
+    def wave_number(self) -> Array:
+        """Wave number of each bin in rad/m: geometric mean of its first and last harmonic."""
+        edges = self.harmonic_edges
+        middle = np.sqrt(edges[:-1] * (edges[1:] - 1.0)).astype(np.float64)
+        return np.asarray(middle * (2 * np.pi / self.period))
+
+    def spectral_density(self, values: Array) -> Array:
+        """Spectral density in the bins, of values with unit u on the nodes, in u² m."""
+        power = np.abs(np.fft.rfft(values) / values.size) ** 2 * (self.period / (2 * np.pi))
+        edges = self.harmonic_edges
+        total = np.add.reduceat(power[: edges[-1]], edges[:-1])
+        return np.asarray(total / np.diff(edges))
+
+    def columns(self) -> Mapping[str, tuple[int, ...]]:
+        """Shapes of the datasets that every task has a row of."""
+        states = (len(BRANCHES), self.penetration.size)
+        spectrum = (self.wave_number.size,)
+        return {
+            "psd_height": spectrum,
+            "height_density": (HEIGHT_EDGES.size - 1,),
+            "psd_displacement": (*states, *spectrum),
+            "gap_density": (*states, GAP_EDGES.size - 1),
+        }
+
+    def kept_columns(self) -> Mapping[str, tuple[int, ...]]:
+        """Shapes of the datasets that only the first realisations have a row of."""
+        nodes = (self.position.size,)
+        states = (len(BRANCHES), self.penetration.size)
+        return {
+            "field_height": nodes,
+            "field_displacement": (*states, *nodes),
+            "field_stress": (*states, *nodes),
+            "field_gap": (*states, *nodes),
+        }
+
+
+def field_plan(campaign: Campaign) -> FieldPlan:
+    """Return the plan of a campaign."""
+    profile, cycle, output = campaign.profile, campaign.cycle, campaign.output
+    top = cycle.max_penetration
+    wanted = output.field_penetrations
+    return FieldPlan(
+        period=profile.period,
+        lowest_harmonic=profile.n0,
+        highest_harmonic=profile.n0 * profile.ratio,
+        max_penetration=top,
+        load_steps=cycle.load_steps,
+        wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,
+        most_nodes=output.field_nodes,
+        realisations=min(output.field_realisations, campaign.sweep.realisations),
+    )
+
+
+class FieldRecorder:
+    """Collects the fields of one loop; :meth:`on_state` goes to ``run_loop``.
+
+    Parameters
+    ----------
+    plan : FieldPlan
+    method : Method
+        The one that runs the loop.
+    keep : bool
+        Whether the fields themselves are kept.
+    """
+
+    def __init__(self, plan: FieldPlan, method: Method, keep: bool) -> None:
+        self._plan, self._method, self._keep = plan, method, keep
+        self._row: dict[str, NDArray[np.float32]] = {
+            name: np.full(shape, np.nan, np.float32) for name, shape in plan.columns().items()
+        }
+        self._kept: dict[str, NDArray[np.float32]] = {
+            name: np.full(shape, np.nan, np.float32) for name, shape in plan.kept_columns().items()
+        }
+        profile = method.problem.profile
+        height = profile.heights(plan.nodes)
+        self._row["psd_height"][:] = plan.spectral_density(height)
+        self._row["height_density"][:] = _density(height / profile.h_rms, HEIGHT_EDGES)
+        self._kept["field_height"][:] = height[:: plan.stride]
+
+    def on_state(self, branch: Branch, state: ContactState) -> None:
+        """Keep the state if its penetration is one of the chosen ones and it has contact."""
+        if not state.patches or not self._plan.penetration.size:
+            return
+        penetration = self._method.problem.penetration(state.separation)
+        distance = np.abs(self._plan.penetration - penetration)
+        nearest = int(np.argmin(distance))
+        # States between load steps lie beside the axis by far more than rounding.
+        if distance[nearest] > 1e-9:
+            return
+        self._record(
+            (BRANCHES.index(branch), nearest), self._method.fields(state, self._plan.nodes)
+        )
+
+    def _record(self, place: tuple[int, int], fields: Fields) -> None:
+        plan, h_max = self._plan, self._method.problem.profile.h_max
+        self._row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
+        shares = gap_shares(fields.gap / h_max, GAP_EDGES)
+        self._row["gap_density"][place] = shares / np.diff(GAP_EDGES)
+        if self._keep:
+            pick = slice(None, None, plan.stride)
+            self._kept["field_displacement"][place] = fields.displacement[pick]
+            self._kept["field_stress"][place] = fields.stress[pick]
+            self._kept["field_gap"][place] = fields.gap[pick]
+
+    def row(self) -> dict[str, NDArray[np.float32]]:
+        """Return the values by dataset; NaN where a state had no contact."""
+        return self._row | self._kept if self._keep else self._row
+
+
+def gap_shares(gap: Array, edges: Array) -> Array:
+    """Share of the period in which the gap lies in each bin.
+
+    Beside an edge of contact the gap rises like the square root of the distance, so steeply that
+    values at nodes alone would give a row of spikes: between nodes it is interpolated so there,
+    linearly elsewhere, and the shares are those of the interpolation, exactly.
+
+    Parameters
+    ----------
+    gap : array, shape (n,)
+        At equally spaced nodes of the period; zero in contact.
+    edges : array, shape (bins + 1,)
+        Ascending, positive. What lies outside counts in the outermost bins.
+
+    Returns
+    -------
+    array, shape (bins,)
+        They add up to the share of the period that is out of contact.
+    """
+    pair = np.sort(np.stack([gap, np.roll(gap, -1)]), axis=0)
+    low, high = pair[:, pair[1] > 0]
+    below = np.zeros(edges.size)  # share with a gap below each edge
+    for k, edge in enumerate(edges[1:-1], start=1):
+        linear = np.clip((edge - low) / np.maximum(high - low, 1e-300), 0, 1)
+        root = np.minimum(edge / high, 1) ** 2
+        below[k] = np.where(low == 0, root, linear).sum()
+    below[-1] = low.size
+    return np.asarray(np.diff(below) / gap.size)
+
+
+def _density(values: Array, edges: Array) -> Array:
+    """Histogram over bins, divided by the number of values and by the width of the bin."""
+    count, _ = np.histogram(values, edges)
+    return np.asarray(count / (np.diff(edges) * values.size))

@@ -1,0 +1,131 @@
+"""Edges of a contact set, and what moving each of them by one node would cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.grid.compliance import EdgeCompliance
+from solver.grid.contact import Contact, Mask
+from solver.profile import Array
+
+Indices = NDArray[np.intp]
+
+
+def patch_ranges(mask: Mask) -> tuple[Indices, Indices]:
+    """First nodes and numbers of nodes of the patches of a contact set, shape (patches,) each.
+
+    Sorted by the first node; a patch may reach round the period. A contact set without a free node
+    is one patch that starts at node 0.
+    """
+    before = np.roll(mask, 1)
+    first = np.flatnonzero(mask & ~before)
+    stop = np.flatnonzero(before & ~mask)
+    if first.size == 0:
+        whole = np.array([0] if mask.any() else [], dtype=np.intp)
+        return whole, whole + mask.size
+    if stop[0] < first[0]:
+        stop = np.concatenate((stop[1:], [stop[0] + mask.size]))
+    return first, stop - first
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The two edges of every patch: left edges first, then right ones; shape (2 patches,) each.
+
+    Attributes
+    ----------
+    side : int array
+        -1 for a left edge, +1 for a right one.
+    inner, outer : int array
+        The contact node and the free node at the edge.
+    width, gap : int array
+        Nodes of the patch, and free nodes beyond the edge.
+    growth, recession : array
+        Energy in J/m of adding ``outer``, of removing ``inner``; infinite where that is ruled out.
+    overlap : bool array
+        Whether ``outer`` overlaps the rigid profile: it joins whatever it costs.
+    """
+
+    side: Indices
+    inner: Indices
+    outer: Indices
+    width: Indices
+    gap: Indices
+    growth: Array
+    recession: Array
+    overlap: NDArray[np.bool_]
+
+
+def survey(
+    contact: Contact,
+    height: Array,
+    adhesion: Array,
+    dx: float,
+    compliance: EdgeCompliance,
+    overlap_below: float,
+) -> Edges:
+    """Price every edge of a contact set.
+
+    Parameters
+    ----------
+    contact : Contact
+    height : array, shape (n,)
+        h in m.
+    adhesion : array, shape (n,)
+        γ sqrt(1 + h'²) in J/m².
+    dx : float
+        In m.
+    compliance : EdgeCompliance
+    overlap_below : float
+        Gap in m below which a node counts as overlapping.
+    """
+    n = height.size
+    first, width = patch_ranges(contact.mask)
+    count = first.size
+    if count == 0:
+        none = np.empty(0, dtype=np.intp)
+        nothing = np.empty(0)
+        return Edges(none, none, none, none, none, nothing, nothing, np.empty(0, dtype=bool))
+    last = first + width - 1
+    gap_right = np.roll(first, -1) - last - 1
+    gap_right[-1] += n
+    gap_left = np.roll(gap_right, 1)
+    side = np.repeat(np.array([-1, 1], dtype=np.intp), count)
+    inner = np.concatenate((first, last)) % n
+    outer = (inner + side) % n
+    gap = np.concatenate((gap_left, gap_right))
+
+    s_grow = np.empty(2 * count)
+    s_recede = np.empty(2 * count)
+    total = int(width.sum())
+    w, gl, gr = width.tolist(), gap_left.tolist(), gap_right.tolist()
+    for k in range(count):
+        before, after = w[k - 1], w[(k + 1) % count]
+        if count == 2:  # one patch, on both sides
+            before, after = before // 2, after - after // 2
+        else:
+            rest = total - w[k] - before - after
+            before, after = before + rest // 2, after + rest - rest // 2
+        for edge, near, near_gap, far_gap, far in (
+            (k, before, gl[k], gr[k], after),
+            (count + k, after, gr[k], gl[k], before),
+        ):
+            others = None if count == 1 else (near, far_gap, far)
+            s_grow[edge] = compliance(w[k], near_gap, others)
+            s_recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
+
+    t = contact.displacement[outer] - height[outer] + contact.separation
+    growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
+    overlap = t < overlap_below
+    # The last free node never joins: the mean gap is the separation, and it is positive.
+    free = n - total
+    if free <= 1:
+        growth[:] = np.inf
+        overlap[:] = False
+    stress = contact.stress[inner]
+    recession = np.where(stress < 0, dx * (adhesion[inner] - 0.5 * stress**2 * s_recede), np.inf)
+    both_widths = np.concatenate((width, width))
+    return Edges(side, inner, outer, both_widths, gap, growth, recession, overlap)

@@ -1,0 +1,79 @@
+"""The elastic half-space on a periodic grid: displacement, stress and energy.
+
+A stress of wave number q ≠ 0 displaces the surface by v_q = 2 σ_q/(E*|q|) (plane strain; Johnson,
+Contact Mechanics, section 13.2). The mean stress moves the half-space as a whole, which the
+separation accounts for: v has zero mean, and the operator's symbol at q = 0 is zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.grid.fourier import RealFourier
+from solver.profile import Array, Profile
+
+
+class ElasticGrid:
+    """Compliance of the half-space on n equally spaced nodes of one period.
+
+    Parameters
+    ----------
+    n : int
+        Number of nodes, even.
+    period : float
+        λ in m.
+    modulus : float
+        E* in Pa.
+
+    Attributes
+    ----------
+    dx : float
+        Distance of two nodes, in m.
+    """
+
+    def __init__(self, n: int, period: float, modulus: float) -> None:
+        self.n = n
+        self.dx = period / n
+        self.modulus = modulus
+        self._fourier = RealFourier(n)
+        q = 2 * np.pi / period * np.arange(n // 2 + 1)
+        self._stiffness = 0.5 * modulus * q / n
+        self._compliance = np.zeros_like(q)
+        self._compliance[1:] = 2 / (modulus * q[1:]) / n
+        # The opposite-order operator is singular at q = 0, a preconditioner must not be: the mean
+        # over the contact is given the stiffness of the longest wave.
+        self._preconditioner = self._stiffness.copy()
+        self._preconditioner[0] = self._stiffness[1]
+
+    def displacement(self, stress: Array) -> Array:
+        """Displacement v in m (zero mean) of a stress in Pa; a buffer, see ``multiply``."""
+        return self._fourier.multiply(self._compliance, stress)
+
+    def stress(self, displacement: Array) -> Array:
+        """Stress in Pa (zero mean) that displaces the surface by v in m; a buffer."""
+        return self._fourier.multiply(self._stiffness, displacement)
+
+    def precondition(self, residual: Array) -> Array:
+        """Stress in Pa that roughly closes a residual displacement in m; a buffer."""
+        return self._fourier.multiply(self._preconditioner, residual)
+
+    def kernel(self) -> Array:
+        """First column of V, shape (n,), in m/Pa: displacement by 1 Pa on node 0."""
+        unit = np.zeros(self.n)
+        unit[0] = 1.0
+        return self.displacement(unit).copy()
+
+    def energy(self, stress: Array, displacement: Array) -> float:
+        """½∫σ v dx over one period, in J/m."""
+        return 0.5 * self.dx * float(np.einsum("i,i->", stress, displacement))
+
+
+def full_contact_stress(profile: Profile, modulus: float, n: int) -> Array:
+    """Stress of full contact, σ_q = E*|q| h_q/2, on n nodes, in Pa (zero mean)."""
+    grid = ElasticGrid(n, profile.period, modulus)
+    return grid.stress(profile.heights(n)).copy()
+
+
+def full_contact_energy(profile: Profile, modulus: float) -> float:
+    """Elastic energy of full contact, (E*/4) Σ_q |q||h_q|² per nominal area, in J/m²."""
+    return 0.25 * modulus * profile.moment(1)

@@ -1,0 +1,96 @@
+"""Pairs of edges that move together: the softest motions of a contact set.
+
+Where a patch is about to shrink or a gap about to close, its two edges go together; one of them
+alone is held back by the other, and moving single nodes would come late by a fraction of a node.
+The two nodes' compliance is the 2 × 2 matrix S = V_JJ - V_JΩ (V_ΩΩ)⁻¹ V_ΩJ, Ω without the pair J:
+adding the pair costs ½ dx tᵀ S⁻¹ t, removing it releases ½ dx σᵀ S σ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from solver.grid.compliance import EdgeCompliance
+from solver.grid.contact import Contact
+from solver.grid.edges import Edges, Indices
+from solver.profile import Array
+
+# More than |S_12|/S_11 of any pair (0.3 across a patch of three nodes).
+_COUPLING = 0.6
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two edges (indices into ``Edges``) that move by one node each.
+
+    ``direction`` is +1 outwards, -1 inwards; ``release`` the energy in J/m.
+    """
+
+    edges: tuple[int, int]
+    direction: int
+    release: float
+
+    def key(self, edges: Edges) -> tuple[int, int, int]:
+        """Name of this move of this contact set."""
+        one, two = self.edges
+        return int(edges.inner[one]), int(edges.inner[two]), self.direction
+
+
+def pairs(
+    contact: Contact,
+    edges: Edges,
+    height: Array,
+    adhesion: Array,
+    dx: float,
+    compliance: EdgeCompliance,
+) -> list[Pair]:
+    """Price the pairs of edges of every patch and of every gap of a contact set (J/m)."""
+    count = edges.side.size // 2
+    width, left, right = edges.width[:count], edges.gap[:count], edges.gap[count:]
+    t = contact.displacement[edges.outer] - height[edges.outer] + contact.separation
+    pull = contact.stress[edges.inner]
+    found: list[Pair] = []
+
+    def near(one: int, two: int, cost: Array, nodes: Indices) -> bool:
+        """Whether the pair can pay at all: S couples its edges by less than half."""
+        adhesive = adhesion[nodes[one]] + adhesion[nodes[two]]
+        return bool(cost[one] + cost[two] < _COUPLING * dx * adhesive)
+
+    def price(one: int, two: int, direction: int, s: Array) -> None:
+        nodes = edges.outer if direction > 0 else edges.inner
+        adhesive = float(adhesion[nodes[one]] + adhesion[nodes[two]])
+        s11, s12, s22 = float(s[0, 0]), float(s[0, 1]), float(s[1, 1])
+        if direction > 0:
+            a, b = float(t[one]), float(t[two])
+            form = (s22 * a * a - 2 * s12 * a * b + s11 * b * b) / (s11 * s22 - s12 * s12)
+            release = dx * (adhesive - 0.5 * form)
+        else:
+            a, b = float(pull[one]), float(pull[two])
+            form = s11 * a * a + 2 * s12 * a * b + s22 * b * b
+            release = dx * (0.5 * form - adhesive)
+        found.append(Pair((one, two), direction, release))
+
+    for k in range(count):
+        w, a, b = int(width[k]), int(left[k]), int(right[k])
+        following = (k + 1) % count
+        after, before = int(width[following]), int(width[k - 1])
+        if count == 1:
+            after = before = 0
+        elif count == 2:
+            before, after = before // 2, after - after // 2
+        # The patch's own edges.
+        one, two = k, count + k
+        if w >= 3 and (count > 1 or a >= 4):
+            if near(one, two, edges.growth, edges.outer):
+                price(one, two, 1, compliance.across_patch(w, a, b, before, after))
+            if near(one, two, edges.recession, edges.inner):
+                price(one, two, -1, compliance.across_patch(w - 2, a + 1, b + 1, before, after))
+        # The edges of the gap on its right.
+        one, two = count + k, following
+        far = int(width[following])
+        if count > 1 and b >= 3 and w > 1 and far > 1:
+            if near(one, two, edges.growth, edges.outer):
+                price(one, two, 1, compliance.across_gap(w, b, far))
+            if near(one, two, edges.recession, edges.inner):
+                price(one, two, -1, compliance.across_gap(w - 1, b + 2, far - 1))
+    return found

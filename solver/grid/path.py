@@ -1,0 +1,170 @@
+"""The path of the method ``grid`` between two separations, with location of the jumps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.grid.contact import Contact
+from solver.grid.edges import Indices, patch_ranges
+from solver.jumps import Jump, classify
+from solver.method import Branch, ContactState
+from solver.profile import Array
+
+if TYPE_CHECKING:
+    from solver.grid.method import GridMethod
+
+
+class Steps:
+    """Sub-steps of one call of ``follow``, with location of the jumps.
+
+    Between two separations Δs apart the energy of the frozen edges less that of the relaxed ones is
+    D. With p̄ the mean stresses, edges that move smoothly give D = ½ λ|Δs||p̄_frozen - p̄_relaxed|,
+    so the excess X = D - that is of third order in Δs: a measure of the error of the trapezoidal
+    rule, and of the audit. If even D - λ|Δs||p̄_frozen - p̄_relaxed| > 0, the new contact set has
+    less energy than the old one already at the old separation: the path has left its local minimum
+    there or in between, which is a jump.
+    """
+
+    def __init__(self, method: GridMethod, branch: Branch) -> None:
+        self.method = method
+        self.branch = branch
+        self.states: list[ContactState] = []
+        self.jumps: list[Jump] = []
+        self.energy = method.relaxation.energy
+        problem = method.problem
+        self.period = problem.profile.period
+        self.h_max = problem.profile.h_max
+        self.adhesion_scale = problem.work_of_adhesion * self.period
+
+    def first_touch(self, separation: float) -> Contact:
+        """Contact at the separation at which the highest crests touch."""
+        method = self.method
+        before = method.detached(separation)
+        self.states.append(before)
+        contact = method.solver.empty(separation)
+        contact.mask[_crests(method)] = True
+        method.solver.solve(contact, method.relaxation.tight)
+        if self.energy(contact) < 0:
+            relaxed = method.relaxation.relax(contact)
+            assert relaxed is not None
+            contact = relaxed
+            self._jump(before, contact)
+        else:
+            contact = method.solver.empty(separation)
+        return contact
+
+    def run(self, contact: Contact, separation: float) -> None:
+        """Go from a relaxed contact to ``separation``, appending states and jumps."""
+        accuracy = self.method.accuracy
+        start = contact.separation
+        step = separation - start
+        # Below this stride a jump is run to its end: only then is it known how well it is located.
+        self.least = accuracy * self.h_max
+        while contact.separation != separation:
+            remaining = separation - contact.separation
+            if abs(step) >= abs(remaining) * (1 - 1e-9):
+                step, target = remaining, separation
+            else:
+                target = contact.separation + step
+            if abs(target - separation) < 1e-12 * self.h_max:
+                target = separation
+            after, located = self._substep(contact, target, abs(step) > self.least)
+            if after is None:
+                self.method.bisections += 1
+                step /= 2
+                continue
+            self.method.substeps += 1
+            if not located:
+                self.states.append(self.method.state(after))
+            contact = after
+            step *= 2
+        if not self.states or self.states[-1].separation != separation:
+            self.states.append(self.method.state(contact))
+
+    def _substep(
+        self, contact: Contact, target: float, divisible: bool
+    ) -> tuple[Contact | None, bool]:
+        """One step to ``target``: the relaxed contact, and whether it jumped.
+
+        No contact: the step must be halved. A jump's two states are appended here.
+        """
+        method = self.method
+        accuracy = method.accuracy
+        stride = abs(target - contact.separation)
+        frozen = contact.copy()
+        frozen.separation = target
+        if method.problem.work_of_adhesion == 0:
+            return method.relaxation.relax_without_adhesion(frozen), False
+        method.solver.solve(frozen, method.relaxation.tight)
+        energy = self.energy(frozen)
+        stress = float(frozen.stress.mean())
+        work = self.period * stride
+        noise = 1e-5 * accuracy * self.adhesion_scale
+
+        def jumped(now: float, relaxing: Contact) -> bool:
+            change = abs(stress - float(relaxing.stress.mean()))
+            return energy - now - work * change > noise
+
+        flips = method.relaxation.flips
+        relaxed = method.relaxation.relax(frozen, jumped if divisible else None)
+        if relaxed is None:
+            return None, False
+        flips = method.relaxation.flips - flips
+        drop = energy - self.energy(relaxed)
+        change = stress - float(relaxed.stress.mean())
+        if jumped(self.energy(relaxed), relaxed):
+            allowed = max(2 * accuracy * drop, 0.02 * accuracy * self.adhesion_scale)
+            if work * abs(change) > allowed and stride > 0.01 * accuracy * self.h_max:
+                self.least = min(0.5 * stride, allowed / (self.period * abs(change)))
+                return None, False
+            before = method.state(frozen)
+            self.states.append(before)
+            self._jump(before, relaxed)
+            return relaxed, True
+        smooth = 0.5 * work * (change if self.branch == "loading" else -change)
+        # One node more or less at each edge is the grid's own unrest, not curvature.
+        unrest = (
+            0.25 * abs(smooth) * min(1.0, 2 * patch_ranges(frozen.mask)[0].size / max(flips, 1))
+        )
+        allowed = 0.3 * accuracy * self.adhesion_scale * stride / self.h_max + unrest
+        if abs(drop - smooth) > allowed and divisible:
+            return None, False
+        return relaxed, False
+
+    def _jump(self, before: ContactState, after: Contact) -> None:
+        method = self.method
+        state = method.state(after)
+        kind, length = classify(before.edges, state.edges, self.period)
+        self.states.append(state)
+        self.jumps.append(
+            Jump(
+                branch=self.branch,
+                separation=after.separation,
+                energy_drop=max(0.0, (before.energy - state.energy) / self.period),
+                kind=kind,
+                patches_before=before.patches,
+                patches_after=state.patches,
+                contact_before=before.contact_fraction,
+                contact_after=state.contact_fraction,
+                patch_length=length,
+            )
+        )
+
+
+def _crests(method: GridMethod) -> Indices:
+    """Nodes nearest to the highest crests of the profile, those of equal height together."""
+    profile, dx, n = method.problem.profile, method.elastic.dx, method.n
+    h = method.height
+    spread = dx**2 * float(np.abs(profile.curvatures(n)).max())
+    top = (h >= np.roll(h, 1)) & (h >= np.roll(h, -1)) & (h >= profile.h_max - spread)
+    nodes = np.flatnonzero(top)
+    x: Array = np.asarray(nodes * dx, dtype=np.float64)
+    for _ in range(6):
+        bend = profile.at(x, 2)
+        x = np.asarray(x - np.clip(profile.at(x, 1) / np.where(bend < 0, bend, -np.inf), -dx, dx))
+    crest = profile.at(x)
+    nodes = nodes[crest >= crest.max() - 1e-9 * profile.h_max]
+    # A crest halfway between two nodes has two highest nodes; one of them nucleates.
+    return np.asarray(nodes[np.diff(nodes, prepend=nodes[-1] - n) > 1])

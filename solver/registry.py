@@ -1,0 +1,75 @@
+"""The methods by name."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+from solver.method import Method
+from solver.problem import Problem
+
+MethodName = Literal["grid", "sharp", "auto"]
+METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
+
+
+def make_method(
+    name: MethodName,
+    problem: Problem,
+    *,
+    accuracy: float = 1e-3,
+    nodes_per_wave: int | None = None,
+) -> Method:
+    """Build the method ``name`` for a problem.
+
+    Parameters
+    ----------
+    name : {"grid", "sharp", "auto"}
+    problem : Problem
+    accuracy : float
+        Wanted relative error of the loss, 0 < accuracy < 1.
+    nodes_per_wave : int, optional
+        For ``grid``: nodes per shortest wave, instead of those that ``accuracy`` asks for.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name or a value outside its range.
+    """
+    if name not in METHOD_NAMES:
+        raise ValueError(f"method is {name!r}: it must be one of {', '.join(METHOD_NAMES)}")
+    if not 0 < accuracy < 1:
+        raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1, both excluded")
+    chosen = None
+    if name == "auto":
+        name, chosen = choose(problem, nodes_per_wave)
+    method: Method
+    if name == "grid":
+        from solver.grid.method import GridMethod
+
+        method = GridMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy)
+    else:
+        from solver.sharp.method import SharpMethod
+
+        if nodes_per_wave is not None:
+            raise ValueError(
+                f"nodes_per_wave is {nodes_per_wave!r}: it belongs to the method 'grid' alone"
+            )
+        method = SharpMethod(problem, accuracy=accuracy)
+    method.chosen = chosen
+    return method
+
+
+def choose(
+    problem: Problem, nodes_per_wave: int | None = None
+) -> tuple[Literal["grid", "sharp"], str]:
+    """Pick the method for a problem, and say why in one sentence.
+
+    The error of ``sharp`` is that of its tolerances, on any spectrum, and with the few patches that
+    adhesion leaves it is much the faster one (docs/methods.md). Without adhesion there are hundreds
+    of patches, the loss is zero whatever the resolution, and the work of ``sharp`` grows with the
+    cube of their number.
+    """
+    if nodes_per_wave is not None:
+        return "grid", "auto: grid, as a number of nodes per wave is given"
+    if problem.work_of_adhesion == 0:
+        return "grid", "auto: grid, as there is no adhesion and so no loss to resolve"
+    return "sharp", "auto: sharp, whose error of the loss is that of its tolerances, not of a grid"

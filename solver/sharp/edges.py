@@ -1,0 +1,240 @@
+"""Moving real-valued edges: equilibrium by Newton, stability, and descent along a jump.
+
+The unknowns are the gap ends θ_e. An edge is in equilibrium where its opening C_e equals the
+critical one, C_c = 4 sqrt(q0 γ sqrt(1+h'²) / (π E*)) (Griffith); contact advances where C_e < C_c.
+With n_e the outward motion of the contact at edge e, the energy of the edges is stable where the
+matrix ∂(C_e - C_c)/∂n_f is positive definite (scaled by sqrt(C_e/C_f) it is symmetric: it is the
+Hessian of the energy divided by C).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.profile import Array
+from solver.sharp.descent import NARROW, RESTING, Law, descend, equilibrium
+from solver.sharp.field import RULES, GapField, Solution
+from solver.sharp.source import StressSource
+
+_NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
+_DESCENT_LIMIT = 100_000
+_RESTS = 20  # how often a descent may come to rest without a minimum that Newton's iteration finds
+_ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
+
+
+@dataclass
+class Counters:
+    """What the work cost: field solutions, derivative solutions, fine openings and energies."""
+
+    fields: int = 0
+    derivatives: int = 0
+    energies: int = 0
+    openings: int = 0
+    newton_steps: int = 0
+    descent_steps: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A stable equilibrium on a branch.
+
+    Attributes
+    ----------
+    at : float
+        q0 s.
+    field : GapField
+    rate : array, shape (2L,)
+        dn/d(q0 s) of every edge along the branch, n the outward motion of the contact.
+    slope : float
+        dp/d(q0 s) along the branch.
+    """
+
+    at: float
+    field: GapField
+    rate: Array
+    slope: float
+
+    def predicted(self, at: float) -> Array:
+        """Gaps at q0 s = ``at``, along the tangent."""
+        motion = outward(self.field.gaps) * self.rate * (at - self.at)
+        return self.field.gaps + motion.reshape(-1, 2)
+
+
+class EdgeMechanics:
+    """Openings, equilibrium and stability of the edges of one problem, in units of 1/q0.
+
+    Parameters
+    ----------
+    source : StressSource
+    critical : float
+        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
+    tolerance : float
+        Relative accuracy of the field.
+    """
+
+    def __init__(self, source: StressSource, critical: float, tolerance: float) -> None:
+        self.source, self.critical, self.tolerance = source, critical, tolerance
+        self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
+        self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
+        # How far an equilibrium may move with the error of the field.
+        self.coarse = max(self.settled, 10 * tolerance * self.wave)
+        # Steps above 0.1 λ_min leap over pinned minima. Where two edges race, which minimum is
+        # reached can depend on the step down to 0.05 λ_min, below which no loop was seen to change;
+        # an edge that runs alone takes twice that.
+        self.longest_step = 0.05 * self.wave
+        # Narrower patches and gaps are gone: far below the width at which a patch on the sharpest
+        # crest first comes to rest, (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8.
+        seed = (2 * critical**2 / source.sharpest**2) ** (1 / 3)
+        self.smallest = 0.005 * self.wave
+        if critical > 0:
+            self.smallest = min(self.smallest, 0.05 * seed)
+        # an opening this far below zero is an overlap that descent cannot weigh
+        rough = np.sqrt(source.m2 * self.wave)
+        self.law = Law(
+            critical=float(critical),
+            digits=float(-np.log(tolerance)),
+            settled=self.settled,
+            coarse=self.coarse,
+            near=_NEAR * self.wave,
+            longest=self.longest_step,
+            smallest=float(self.smallest),
+            overlapping=float(0.1 * max(critical, rough)),
+        )
+        self.count = Counters()
+
+    def field(self, gaps: Array, separation: float) -> GapField:
+        """Solve the field of these gaps."""
+        self.count.fields += 1
+        return GapField(self.source, gaps, separation, self.tolerance)
+
+    def widths(self, gaps: Array) -> tuple[Array, Array]:
+        """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
+        patch = np.empty(len(gaps))
+        patch[:-1] = gaps[1:, 0]
+        patch[-1] = gaps[0, 0] + 2 * np.pi
+        return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
+
+    def equilibrium(
+        self,
+        gaps: Array,
+        separation: float,
+        reach: float,
+        kinds: NDArray[np.int64] = _ANY,
+        *,
+        patient: bool = True,
+    ) -> Point | None:
+        """Stable equilibrium near these gaps, or None.
+
+        None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
+        equilibrium is not stable. ``kinds`` are the least kinds of the gaps. If not ``patient``,
+        gaps that are nearly in equilibrium are taken as they are.
+        """
+        length, patch = self.widths(gaps)
+        if not (length.min() > 0 and patch.min() > 0):
+            return None
+        try:
+            found, at, solution, rate, slope, steps = equilibrium(
+                gaps, separation, max(reach, self.settled), kinds, patient, self.law, RULES,
+                self.source.panels,
+            )  # fmt: skip
+        except np.linalg.LinAlgError:
+            return None
+        self.count.newton_steps += steps
+        self.count.fields += steps
+        self.count.derivatives += steps
+        if not found:
+            return None
+        field = GapField(self.source, at, separation, self.tolerance, Solution(*solution))
+        return Point(separation, field, rate, slope)
+
+    def relax(self, gaps: Array, separation: float, reach: float) -> Point | Array:
+        """Descend in energy at fixed separation to the next minimum.
+
+        Returns
+        -------
+        Point or array
+            The minimum, or the gaps without those gaps and patches that have closed or vanished on
+            the way (an empty array when no contact is left).
+
+        Raises
+        ------
+        RuntimeError
+            If the descent does not end.
+        """
+        left = _DESCENT_LIMIT
+        kinds = _ANY
+        rests = 0
+        while left > 0:
+            gaps, ended, fields, tangents, kinds = descend(
+                gaps, separation, left, kinds, self.law, RULES, self.source.panels
+            )
+            self.count.fields += fields
+            self.count.descent_steps += fields
+            self.count.derivatives += tangents
+            left -= fields
+            if ended == NARROW:
+                rest = self.without_small(gaps)
+                if rest is not None:
+                    return rest
+            if ended == RESTING:
+                # Next to a fold the field's error may hide whether there is a minimum; whatever
+                # is taken for it, the next step in s decides.
+                rests += 1
+                patient = rests <= _RESTS
+                point = self.equilibrium(gaps, separation, reach, kinds, patient=patient)
+                if point is not None:
+                    return point
+        raise RuntimeError(f"the descent at q0 s = {separation} did not end")
+
+    def without_small(self, gaps: Array) -> Array | None:
+        """Gaps without closed gaps or vanished patches, or None if there are none."""
+        length, patch = self.widths(gaps)
+        if length.min() < self.smallest and len(gaps) > 1:
+            return without_gaps(gaps, length >= self.smallest)
+        if patch.min() < self.smallest:
+            return without_patches(gaps, patch >= self.smallest)
+        return None
+
+
+def outward(gaps: Array) -> Array:
+    """+1 at left gap ends, where contact grows to the right, -1 at right ones, shape (2L,)."""
+    sign = np.ones(2 * len(gaps))
+    sign[1::2] = -1.0
+    return sign
+
+
+def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:
+    """Drop the closed gaps: their patches merge."""
+    return gaps[keep]
+
+
+def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
+    """Drop patches, ``keep`` telling of the patch to the right of each gap: their gaps join."""
+    if not keep.any():
+        return np.empty((0, 2))
+    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
+    lefts = gaps[np.roll(keep, 1), 0]
+    rights = gaps[keep, 1]
+    first = lefts[0]
+    rights = np.sort(np.where(rights <= first, rights + 2 * np.pi, rights))
+    return np.stack([lefts, rights], axis=1)
+
+
+def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
+    """Put patches of the given widths into gaps (no gaps at all: into the open surface)."""
+    if len(gaps) == 0:
+        order = np.argsort(centres)
+        left, right = (centres + widths / 2)[order], (centres - widths / 2)[order]
+        return np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1)
+    cuts = []
+    for left, right in gaps:
+        marks = [left]
+        for centre, width in sorted(zip(centres, widths, strict=True)):
+            if left < centre < right:
+                marks += [centre - width / 2, centre + width / 2]
+        marks.append(right)
+        cuts += [marks[i : i + 2] for i in range(0, len(marks), 2)]
+    return np.array(cuts)

@@ -1,0 +1,518 @@
+"""The elastic field of given contact edges: every gap is a crack in a full contact.
+
+Full contact carries the stress σ_full; the gaps relieve it. With θ = q0 x, S = 2σ/E*, T = q0 t (gap
+opening) and |D| the operator with symbol |m|,
+
+    S = S_full + p + |D| T,      S = 0 in the gaps,  T = 0 on the contact,  mean(T) = q0 s,
+
+p = 2p̄/E* the mean stress. In the coordinate η of each gap (:mod:`solver.sharp.coordinate`)
+T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part of |D| is diagonal
+in the Chebyshev polynomials U_n(η), and what remains is smooth. So a few values of f per gap carry
+it all, at the M second-kind Gauss-Chebyshev nodes of each gap:
+
+    (B + G) f = -(S~ + p X),     Xᵀ f = 2π q0 s,                                     (1)
+
+with quadrature weights w, X = w dθ/dη, B the straight crack (the same for every gap of M nodes),
+G_ij = -X_i X_j/(4π sin²(Δθ/2)) between gaps and, in the own gap, the same less the straight crack,
+-(w_i w_j/π)[α²/sinh²(α Δη) - 1/Δη²] - (X_i X_j/4π)[1/sin²(Δθ/2) - 4/Δθ²];
+the matrix is symmetric positive definite, being the elastic energy of the openings. S~ is S_full
+projected on the first M modes; its higher modes meet no smooth kernel and act as in a single
+straight crack, so their share of the edge opening is known in closed form. The error is spectral in
+M and hardly depends on how narrow the patches are.
+
+At an edge T ≈ C sqrt(r), r the distance from the edge in θ, and
+
+    C = sqrt(2 dη/dθ) [f(±1) - (s^± - Σ_{n<M} (±1)^n s_n)],      K = (E*/4) C sqrt(2π/q0) / q0^0,
+    G = K²/(2E*) = π E* C² / (16 q0).
+
+The derivative of the field with respect to an edge is the homogeneous solution with an opening
+∝ 1/sqrt(r) there (Bueckner's and Rice's weight function); the diagonal follows from translation
+invariance: moving all edges together is moving the profile, whose source is S_full'.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.compiled import compiled, compiled_sums
+from solver.profile import Array
+from solver.sharp.coordinate import ALPHA, LEFT, convergence, map_gaps, theta_at
+from solver.sharp.linear import cholesky, solve_factored
+from solver.sharp.source import StressSource, gap_moments
+
+
+class Rules(NamedTuple):
+    """Gauss-Chebyshev rules of all mode counts M, end to end, for the compiled code.
+
+    Attributes
+    ----------
+    counts : int array
+        The numbers of nodes M that a gap may have; a gap's "kind" is its place here.
+    start, square : int array
+        Offset of the vectors and of the M×M matrices of each kind.
+    eta, w : array
+        Nodes and weights.
+    ends : array, shape (2, ·)
+        f(-1) and f(+1) from the nodes' values.
+    b : array
+        The straight crack.
+    modes : array
+        U_n(η_i), rows nodes.
+    """
+
+    counts: NDArray[np.int64]
+    start: NDArray[np.int64]
+    square: NDArray[np.int64]
+    eta: Array
+    w: Array
+    ends: Array
+    b: Array
+    modes: Array
+
+
+def _rules(counts: NDArray[np.int64]) -> Rules:
+    eta, weight, ends, b, modes = [], [], [], [], []
+    for m in counts:
+        t = np.arange(m, 0, -1) * np.pi / (m + 1)  # η increasing
+        w = np.pi / (m + 1) * np.sin(t) ** 2
+        n = np.arange(m)
+        u = np.sin(np.outer(t, n + 1)) / np.sin(t)[:, None]
+        to_modes = (2 / np.pi) * u * w[:, None]  # rows nodes, columns modes
+        straight = (np.pi / 2) * (to_modes * (n + 1)) @ to_modes.T
+        end = to_modes * (n + 1)
+        eta.append(np.cos(t))
+        weight.append(w)
+        ends.append(np.stack([end @ (-1.0) ** n, end.sum(axis=1)]))
+        b.append((straight + straight.T).ravel() / 2)
+        modes.append(u.ravel())
+    return Rules(
+        counts,
+        np.concatenate([[0], np.cumsum(counts)]),
+        np.concatenate([[0], np.cumsum(counts**2)]),
+        np.concatenate(eta),
+        np.concatenate(weight),
+        np.concatenate(ends, axis=1),
+        np.concatenate(b),
+        np.concatenate(modes),
+    )
+
+
+RULES = _rules(
+    np.array([6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128])
+)
+
+
+class Solution(NamedTuple):
+    """Solution of (1), as the compiled code hands it on; N nodes of all gaps together.
+
+    Attributes
+    ----------
+    table : array
+        Of :func:`solver.sharp.coordinate.map_gaps`.
+    kinds, offset : int array
+        Kind and first node of each gap.
+    theta, weight : array, shape (N,)
+        θ and X of the nodes.
+    slope : array, shape (L, 2)
+        dη/dθ at the gap ends.
+    matrix, factor : array, shape (N, N)
+        B + G and its lower Cholesky factor.
+    rhs, solved : array, shape (N, 2 or 3)
+        Loads S~, X and, if asked for, S~', and (B + G)⁻¹ of them.
+    beyond : array, shape (L, 2, 1 or 2)
+        What the modes of S and S' above M add at the ends.
+    unit_mean : float
+        Xᵀ (B + G)⁻¹ X.
+    pressure : float
+        p = 2p̄/E*.
+    f : array, shape (N,)
+        The openings over sqrt(1-η²).
+    opening : array, shape (2L,)
+        C at each gap end.
+    """
+
+    table: Array
+    kinds: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    theta: Array
+    weight: Array
+    slope: Array
+    matrix: Array
+    factor: Array
+    rhs: Array
+    solved: Array
+    beyond: Array
+    unit_mean: float
+    pressure: float
+    f: Array
+    opening: Array
+
+
+class GapField:
+    """Solution of (1) for given gap ends.
+
+    Parameters
+    ----------
+    source : StressSource
+    gaps : array, shape (L, 2)
+        Left and right end of each gap in θ: increasing, the last right end below
+        gaps[0, 0] + 2π.
+    separation : float
+        q0 s.
+    tolerance : float
+        Wanted relative accuracy of the interaction between gaps.
+    solution : Solution, optional
+        The solution for these gaps, if it is known already.
+
+    Attributes
+    ----------
+    opening : array, shape (L, 2)
+        C at each gap end.
+    pressure : float
+        p = 2p̄/E*.
+
+    Raises
+    ------
+    FloatingPointError
+        If the matrix of the gaps is not positive definite to rounding.
+    """
+
+    def __init__(
+        self,
+        source: StressSource,
+        gaps: Array,
+        separation: float,
+        tolerance: float,
+        solution: Solution | None = None,
+    ) -> None:
+        self.source, self.gaps, self.separation = source, gaps, separation
+        if solution is None:
+            kinds = choose_kinds(map_gaps(gaps), -np.log(tolerance), RULES.counts)
+            solution = Solution(*solve_plain(gaps, separation, kinds, 2, RULES, source.panels))
+        if np.isnan(solution.pressure):
+            raise FloatingPointError("the matrix of the gaps is not positive definite")
+        self.solution = solution
+        self.pressure = float(solution.pressure)
+        self.opening = solution.opening.reshape(-1, 2)
+
+    @property
+    def pressure_by_separation(self) -> float:
+        """∂p/∂(q0 s) at fixed edges; negative."""
+        return -2 * np.pi / float(self.solution.unit_mean)
+
+    @cached_property
+    def opening_by_separation(self) -> Array:
+        """∂C/∂(q0 s) at fixed edges, shape (L, 2)."""
+        of = self.solution
+        unit = np.ascontiguousarray(-self.pressure_by_separation * of.solved[:, 1:2])
+        out: Array = edge_openings(unit, of.slope, of.kinds, of.offset, RULES.start, RULES.ends)
+        return out[:, 0].reshape(-1, 2)
+
+    @cached_property
+    def derivatives(self) -> tuple[Array, Array]:
+        """∂C_e/∂θ_f, shape (2L, 2L), and ∂p/∂θ_f, shape (2L,), at fixed separation.
+
+        Edges in the order of ``gaps.ravel()``; θ_f grows to the right.
+        """
+        by_edge, pressure = derivatives(self.solution, RULES)
+        return by_edge, pressure
+
+
+@compiled
+def choose_kinds(table, digits, counts):  # type: ignore[no-untyped-def]  # compiled
+    """Kind of each gap whose modes leave an error of exp(-digits), or the largest kind."""
+    kinds = np.zeros(table.shape[0], dtype=np.int64)
+    for k in range(table.shape[0]):
+        wanted = digits / convergence(table[k])
+        while kinds[k] < counts.shape[0] - 1 and counts[kinds[k]] < wanted:
+            kinds[k] += 1
+    return kinds
+
+
+@compiled
+def solve(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-untyped-def]
+    """Solve (1) with the source S (``fields`` 1), or S and S' (2) for :func:`derivatives`.
+
+    An iteration must keep the kinds: where they change, the field jumps by its error. The pressure
+    is NaN if the matrix is not positive definite to rounding.
+    """
+    table = map_gaps(gaps)
+    offset = np.zeros(table.shape[0] + 1, dtype=np.int64)
+    for k in range(table.shape[0]):
+        offset[k + 1] = offset[k] + rules.counts[kinds[k]]
+    theta, weight, slope, matrix, rhs, beyond = _assemble(
+        table, kinds, offset, fields, rules, panels
+    )
+    factor, definite = cholesky(matrix)
+    solved = rhs.copy()
+    opening = np.full(2 * table.shape[0], np.nan)
+    pressure = np.nan
+    unit_mean = np.nan
+    f = np.empty(theta.shape[0])
+    if definite:
+        solve_factored(factor, solved)
+        load_mean = 0.0
+        unit_mean = 0.0
+        for i in range(theta.shape[0]):
+            load_mean += weight[i] * solved[i, 0]
+            unit_mean += weight[i] * solved[i, 1]
+        pressure = -(2 * np.pi * separation + load_mean) / unit_mean
+        for i in range(theta.shape[0]):
+            f[i] = -solved[i, 0] - pressure * solved[i, 1]
+        opening = edge_openings(f.reshape(-1, 1), slope, kinds, offset, rules.start, rules.ends)[
+            :, 0
+        ].copy()
+        for k in range(table.shape[0]):
+            for side in range(2):
+                opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
+    return Solution(
+        table, kinds, offset, theta, weight, slope, matrix, factor, rhs, solved, beyond,
+        unit_mean, pressure, f, opening,
+    )  # fmt: skip
+
+
+@compiled
+def plain(of):  # type: ignore[no-untyped-def]  # compiled
+    """Give a solution as a plain tuple, for the way back to Python.
+
+    To make a named one, compiled code calls Python, where a signal's handler may run and raise: an
+    exception that is not expected there.
+    """
+    return (
+        of.table, of.kinds, of.offset, of.theta, of.weight, of.slope, of.matrix, of.factor, of.rhs,
+        of.solved, of.beyond, of.unit_mean, of.pressure, of.f, of.opening,
+    )  # fmt: skip
+
+
+@compiled
+def solve_plain(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-untyped-def]
+    """As :func:`solve`, for calls from Python."""
+    return plain(solve(gaps, separation, kinds, fields, rules, panels))
+
+
+@compiled
+def derivatives(of, rules):  # type: ignore[no-untyped-def]  # compiled
+    """∂C_e/∂θ_f, shape (2L, 2L), and ∂p/∂θ_f, shape (2L,), of a solution with S and S'."""
+    edges = 2 * of.slope.shape[0]
+    load, area = _singular_loads(
+        of.table, of.slope, of.kinds, of.offset, rules.counts, rules.start, rules.square,
+        rules.eta, rules.b, of.theta, of.weight, of.matrix, rules.w,
+    )  # fmt: skip
+    solve_factored(of.factor, load)
+    p = area
+    for i in range(load.shape[0]):
+        for e in range(edges):
+            p[e] += of.weight[i] * load[i, e]
+    p /= of.unit_mean
+    for i in range(load.shape[0]):
+        for e in range(edges):
+            load[i, e] -= of.solved[i, 1] * p[e]
+    by_edge = edge_openings(load, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+    # Translation: all edges together against the profile.
+    drift = 0.0
+    for i in range(load.shape[0]):
+        drift -= of.weight[i] * of.solved[i, 2]
+    drift /= of.unit_mean
+    moving = np.empty((load.shape[0], 1))
+    for i in range(load.shape[0]):
+        moving[i, 0] = -of.solved[i, 2] - drift * of.solved[i, 1]
+    moved = edge_openings(moving, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+    for e in range(edges):
+        slope = of.slope[e // 2, e % 2]
+        far = of.slope[e // 2, 1 - e % 2]
+        by_edge[e ^ 1, e] += 0.5 * np.sqrt(2 * far)  # the singular opening's far end
+        strength = (2 * (e % 2) - 1) * of.opening[e] * np.sqrt(slope / 8)
+        p[e] *= strength
+        for other in range(edges):
+            by_edge[other, e] *= strength
+    for e in range(edges):
+        total = 0.0
+        for other in range(edges):
+            if other != e:
+                total += by_edge[e, other]
+        slope = of.slope[e // 2, e % 2]
+        by_edge[e, e] = moved[e, 0] - np.sqrt(2 * slope) * of.beyond[e // 2, e % 2, 1] - total
+    return by_edge, p
+
+
+@compiled
+def _periodic(x):  # type: ignore[no-untyped-def]  # compiled
+    """1/sin²(x/2) - 4/x², x = Δθ: what the own gap feels of its periodic images."""
+    if abs(x) < 0.2:
+        y = x * x
+        return 1 / 3 + y * (1 / 60 + y * (1 / 1512 + y * (1 / 43200 + y / 1330560)))
+    half = np.sin(0.5 * x)
+    return 1 / (half * half) - 4 / (x * x)
+
+
+@compiled
+def _mapped(alpha, x):  # type: ignore[no-untyped-def]  # compiled
+    """4 [α²/sinh²(αx) - 1/x²], x = Δη: the own gap's kernel beyond a straight crack in η."""
+    y = alpha * x
+    if abs(y) < 0.3:
+        y *= y
+        series = -1 / 3 + y * (1 / 15 + y * (-2 / 189 + y * (1 / 675 - y * 2 / 10395)))
+        return 4 * alpha * alpha * series
+    return 4 * ((alpha / np.sinh(y)) ** 2 - 1 / (x * x))
+
+
+@compiled
+def _assemble(table, kinds, offset, fields, rules, panels):  # type: ignore[no-untyped-def]
+    """Matrix and right-hand sides of (1).
+
+    Returns θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~') and what
+    the higher modes add at the ends.
+    """
+    gaps = table.shape[0]
+    n = offset[gaps]
+    theta = np.empty(n)
+    weight = np.empty(n)  # dθ/dη times the weight of the rule
+    slope = np.empty((gaps, 2))  # dη/dθ at the ends
+    rhs = np.empty((n, fields + 1))
+    beyond = np.empty((gaps, 2, fields))
+    matrix = np.empty((n, n))
+    for k in range(gaps):
+        kind = kinds[k]
+        m = rules.counts[kind]
+        s = np.empty((m, fields))
+        ends = np.empty((2, fields))
+        gap_moments(table[k], panels, s, ends)
+        for field in range(fields):
+            low = 0.0
+            high = 0.0
+            sign = 1.0
+            for j in range(m):
+                high += s[j, field]
+                low += sign * s[j, field]
+                sign = -sign
+            beyond[k, 0, field] = ends[0, field] - low
+            beyond[k, 1, field] = ends[1, field] - high
+        own = slice(offset[k], offset[k + 1])
+        rule = slice(rules.start[kind], rules.start[kind] + m)
+        square = slice(rules.square[kind], rules.square[kind] + m * m)
+        _own_gap(
+            table[k], rules.eta[rule], rules.w[rule], rules.b[square].reshape(m, m),
+            rules.modes[square].reshape(m, m), s, theta[own], weight[own], slope[k], rhs[own],
+            matrix[own, own],
+        )  # fmt: skip
+    _between_gaps(theta, weight, offset, matrix)
+    return theta, weight, slope, matrix, rhs, beyond
+
+
+@compiled
+def _own_gap(  # type: ignore[no-untyped-def]  # compiled
+    gap, eta, w, b, modes, s, theta, weight, slope, rhs, matrix
+):
+    """Nodes, loads and diagonal block of one gap."""
+    m = eta.shape[0]
+    slope[0] = 1 / theta_at(gap, -1.0)[1]
+    slope[1] = 1 / theta_at(gap, 1.0)[1]
+    for i in range(m):
+        theta[i], stretch = theta_at(gap, eta[i])
+        weight[i] = w[i] * stretch
+        rhs[i, 1] = weight[i]
+        for field in range(s.shape[1]):
+            total = 0.0
+            for j in range(m):
+                total += modes[i, j] * s[j, field]
+            rhs[i, 2 * field] = w[i] * total
+    for i in range(m):
+        for j in range(i + 1):
+            far = weight[i] * weight[j] * _periodic(theta[i] - theta[j])
+            near = w[i] * w[j] * _mapped(gap[ALPHA], eta[i] - eta[j])
+            matrix[i, j] = b[i, j] - (near + far) / (4 * np.pi)
+            matrix[j, i] = matrix[i, j]
+
+
+@compiled_sums
+def _between_gaps(theta, weight, offset, matrix):  # type: ignore[no-untyped-def]  # compiled
+    """Blocks of different gaps."""
+    n = theta.shape[0]
+    sine = np.sin(0.5 * theta)
+    cosine = np.cos(0.5 * theta)
+    for k in range(offset.shape[0] - 1):
+        for i in range(offset[k], offset[k + 1]):
+            scale = -weight[i] / (4 * np.pi)
+            si = sine[i]
+            ci = cosine[i]
+            row = matrix[i]
+            for j in range(offset[k]):
+                half = si * cosine[j] - ci * sine[j]
+                row[j] = scale * weight[j] / (half * half)
+            for j in range(offset[k + 1], n):
+                half = si * cosine[j] - ci * sine[j]
+                row[j] = scale * weight[j] / (half * half)
+
+
+@compiled
+def edge_openings(f, slope, kinds, offset, start, ends):  # type: ignore[no-untyped-def]  # compiled
+    """sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
+    out = np.zeros((2 * slope.shape[0], f.shape[1]))
+    for k in range(slope.shape[0]):
+        for side in range(2):
+            scale = np.sqrt(2 * slope[k, side])
+            for i in range(offset[k + 1] - offset[k]):
+                factor = scale * ends[side, start[kinds[k]] + i]
+                for j in range(f.shape[1]):
+                    out[2 * k + side, j] += factor * f[offset[k] + i, j]
+    return out
+
+
+@compiled
+def _singular_loads(  # type: ignore[no-untyped-def]  # compiled
+    table, slope, kinds, offset, counts, start, square, eta, b, theta, weight, matrix, w
+):  # fmt: skip
+    """Right-hand sides of the regular part of the solution singular at each edge, and its area.
+
+    The opening sqrt((1∓η)/(1±η)) of the own gap has the density 1/(1±η) at the nodes and, as the
+    rule is exact for polynomials only, a further weight π/(M+1) at the edge itself.
+    """
+    n = theta.shape[0]
+    gaps = table.shape[0]
+    load = np.empty((n, 2 * gaps))
+    area = np.empty(2 * gaps)
+    sine = np.sin(0.5 * theta)
+    cosine = np.cos(0.5 * theta)
+    for k in range(gaps):
+        m = counts[kinds[k]]
+        base = offset[k]
+        point = np.pi / (m + 1)
+        low = np.empty(m)  # 1/(1 + η) and 1/(1 - η)
+        high = np.empty(m)
+        area[2 * k] = point / slope[k, 0]
+        area[2 * k + 1] = point / slope[k, 1]
+        for j in range(m):
+            x = eta[start[kinds[k]] + j]
+            low[j] = 1 / (1 + x)
+            high[j] = 1 / (1 - x)
+            area[2 * k] += weight[base + j] * low[j]
+            area[2 * k + 1] += weight[base + j] * high[j]
+        edge_sine = np.sin(0.5 * table[k, LEFT : LEFT + 2])
+        edge_cosine = np.cos(0.5 * table[k, LEFT : LEFT + 2])
+        for i in range(n):
+            own = base <= i < base + m
+            total_low = 0.0
+            total_high = 0.0
+            for j in range(m):
+                value = matrix[i, base + j]
+                if own:
+                    value -= b[square[kinds[k]] + (i - base) * m + j]
+                total_low -= value * low[j]
+                total_high -= value * high[j]
+            for side in range(2):
+                edge = table[k, LEFT + side]
+                strength = weight[i] * point / slope[k, side]
+                if own:
+                    place = start[kinds[k]] + i - base
+                    mapped = _mapped(table[k, ALPHA], eta[place] - (2 * side - 1))
+                    extra = w[place] * point * mapped + strength * _periodic(theta[i] - edge)
+                else:
+                    half = sine[i] * edge_cosine[side] - cosine[i] * edge_sine[side]
+                    extra = strength / (half * half)
+                total = total_low if side == 0 else total_high
+                load[i, 2 * k + side] = total + extra / (4 * np.pi)
+    return load, area

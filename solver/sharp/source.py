@@ -1,0 +1,434 @@
+"""The full-contact stress as a source for gaps: compressed panels, and its moments over a gap.
+
+Method ``sharp`` sees the rough profile only through the full-contact stress S(θ) = 2σ_full/E*,
+θ = q0 x. In the coordinate η of a gap (:mod:`solver.sharp.coordinate`; its ends are η = ∓1) it
+needs
+
+    s_n  = (2/π) ∫ S U_n(η) sqrt(1 - η²) dθ,        n = 0 … M-1   (second-kind Chebyshev moments)
+    s^±  = (1/π) ∫ S sqrt((1 ± η)/(1 ∓ η)) dθ = Σ_n (±1)^n s_n    (what drives each end)
+
+The weights are smooth away from the ends of the gap, S is not. So S is compressed once, on a binary
+tree of panels: on each panel ∫ S f ≈ Σ_i ω_i f(x_i) at the p Gauss-Legendre nodes, exact when f is
+a polynomial of degree below p. A gap is tiled with panels no longer than their distance from its
+ends; the cost of a moment grows with log(gap/λ_min), not with the number of wave numbers. The two
+end pieces, with their square-root weight, are integrated with S interpolated on the finest panels.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev, legendre
+from numpy.typing import NDArray
+
+from solver.compiled import compiled, compiled_sums
+from solver.profile import Array, Profile
+from solver.sharp.coordinate import (
+    ALPHA,
+    LEFT,
+    LEFT_PATCH,
+    RIGHT,
+    RIGHT_PATCH,
+    one_minus_plus,
+    theta_at,
+)
+
+# Nodes p of a panel, by the tolerance they serve. The finest panel is at most half a shortest wave
+# long: interpolation there leaves (π/2)^p/(p! 2^(p-1)) of the shortest wave's amplitude. A panel as
+# long as its distance from a singularity leaves 5.8^-p.
+_NODES = ((1e-5, 8), (1e-7, 10), (2e-9, 12), (0.0, 14))
+
+_SHORT_GAP = 4  # gaps shorter than so many finest panels are integrated directly
+_PHASE = 3.0  # radians of the highest Chebyshev mode that one panel may span
+_SAFE = 2.0  # modes·length/distance of a panel up to which it surely spans less
+
+
+class Panels(NamedTuple):
+    """What the compiled code needs of a source; p nodes a panel.
+
+    Attributes
+    ----------
+    width : float
+        Length of a finest panel in θ.
+    finest : int
+        Number of finest panels; the shortest wave covers at least two.
+    x, w : array, shape (p,)
+        Gauss-Legendre rule of a panel.
+    stress, slope, measure : array, shape (finest, p)
+        Chebyshev coefficients of S, S' and sqrt(1 + h'²) on each finest panel.
+    weights : array, shape (2, 2·finest, p)
+        ω for S and for S', of every panel of every level, the finest level first.
+    level_start : int array
+        Row of ``weights`` at which each level starts.
+    end_x, end_w : array
+        Gauss-Legendre rule on (0, 1) of an end piece (at most one shortest wave, in sqrt scale).
+    """
+
+    width: float
+    finest: int
+    x: Array
+    w: Array
+    stress: Array
+    slope: Array
+    measure: Array
+    weights: Array
+    level_start: NDArray[np.int64]
+    end_x: Array
+    end_w: Array
+
+
+class StressSource:
+    """Full-contact stress S = 2σ_full/E* and its derivative on a tree of panels over [0, 2π).
+
+    Parameters
+    ----------
+    profile : Profile
+    tolerance : float
+        Wanted accuracy of moments and values, relative to the stress of the shortest waves.
+
+    Attributes
+    ----------
+    top : int
+        Highest harmonic.
+    m2 : float
+        Mean square slope.
+    sharpest : float
+        Largest |h''|, in units of q0.
+    panels : Panels
+    """
+
+    def __init__(self, profile: Profile, tolerance: float = 0.0) -> None:
+        self.top = top = profile.highest_harmonic
+        p = next(nodes for limit, nodes in _NODES if tolerance >= limit)
+        count = 1 << int(np.ceil(np.log2(max(2 * top + 1, 16))))
+        width = 2 * np.pi / count
+        x, w = legendre.leggauss(p)
+        m = np.arange(profile.coefficients.size)
+        h = profile.coefficients * profile.q0
+        self.m2 = profile.m2
+        self.sharpest = float(np.abs(profile.curvatures(8 * top)).max()) / profile.q0
+        stress = _on_panels(m * h, x, count)  # symbol |q| of the half-space
+        slope = _on_panels(1j * m * m * h, x, count)
+        measure = np.sqrt(1 + _on_panels(1j * m * h, x, count) ** 2)
+
+        to_chebyshev = np.linalg.inv(chebyshev.chebvander(x, p - 1)).T
+        self._primitive = chebyshev.chebint(np.eye(p), lbnd=-1, axis=0)
+        # ∫ sqrt(1 + h'²) dθ from 0 to the start of each finest panel
+        self._measure_before = np.concatenate([[0.0], np.cumsum((measure @ w) * width / 2)])
+
+        # ω of the finest level, then each parent from its two children: exact for polynomials.
+        to_left, to_right = (_lagrange(x, (x + side) / 2) for side in (-1.0, 1.0))
+        level = np.stack([stress, slope]) * (w * width / 2)
+        levels = [level]
+        while level.shape[1] > 1:
+            level = level[:, 0::2] @ to_left + level[:, 1::2] @ to_right
+            levels.append(level)
+        sizes = [k.shape[1] for k in levels]
+        t, v = legendre.leggauss(2 * p - 4)
+        self.panels = Panels(
+            width=width,
+            finest=count,
+            x=x,
+            w=w,
+            stress=np.ascontiguousarray(stress @ to_chebyshev),
+            slope=np.ascontiguousarray(slope @ to_chebyshev),
+            measure=np.ascontiguousarray(measure @ to_chebyshev),
+            weights=np.ascontiguousarray(np.concatenate(levels, axis=1)),
+            level_start=np.cumsum([0, *sizes[:-1]]),
+            end_x=(t + 1) / 2,
+            end_w=v / 2,
+        )
+
+    def sample(self, theta: Array) -> Array:
+        """(S, S') at any angles, shape (len(theta), 2)."""
+        at = np.ascontiguousarray(theta)
+        width, stress, slope = self.panels.width, self.panels.stress, self.panels.slope
+        return np.stack([interpolate(at, width, stress), interpolate(at, width, slope)], axis=1)
+
+    def measure_between(self, left: Array, right: Array) -> float:
+        """Sum over the intervals of ∫ sqrt(1 + h'²) dθ from ``left`` to ``right``."""
+        return float((self._measure_to(right) - self._measure_to(left)).sum())
+
+    def _measure_to(self, theta: Array) -> Array:
+        width, count, measure = self.panels.width, self.panels.finest, self.panels.measure
+        turns, rest = np.divmod(theta, 2 * np.pi)
+        k = np.minimum((rest / width).astype(int), count - 1)
+        x = np.clip(2 * (rest / width - k) - 1, -1, 1)
+        basis = np.cos(np.multiply.outer(np.arccos(x), np.arange(measure.shape[1] + 1)))
+        part = np.sum(basis * (measure[k] @ self._primitive.T), axis=1) * width / 2
+        return np.asarray(turns * self._measure_before[-1] + self._measure_before[k] + part)
+
+
+def _on_panels(a: NDArray[np.complex128], x: Array, count: int) -> Array:
+    """Values of Σ a_m e^{imθ} at the nodes of the finest panels, shape (count, len(x))."""
+    m = np.arange(a.size)
+    out = np.empty((count, x.size))
+    for i, node in enumerate(x):
+        shifted = np.zeros(count // 2 + 1, dtype=np.complex128)
+        size = min(a.size, shifted.size)
+        shifted[:size] = (a * np.exp(1j * m * (np.pi / count) * (node + 1)))[:size]
+        out[:, i] = np.fft.irfft(shifted, count) * count
+    return out
+
+
+def _lagrange(nodes: Array, x: Array) -> Array:
+    """Lagrange polynomials of ``nodes`` at ``x``, shape (len(x), len(nodes))."""
+    degree = len(nodes) - 1
+    return np.asarray(
+        legendre.legvander(x, degree) @ np.linalg.inv(legendre.legvander(nodes, degree))
+    )
+
+
+@compiled
+def _clenshaw(coefficients, x):  # type: ignore[no-untyped-def]  # compiled
+    b1 = 0.0
+    b2 = 0.0
+    for j in range(coefficients.shape[0] - 1, 0, -1):
+        b1, b2 = 2 * x * b1 - b2 + coefficients[j], b1
+    return x * b1 - b2 + coefficients[0]
+
+
+@compiled
+def _value(coefficients, place):  # type: ignore[no-untyped-def]  # compiled
+    """The piecewise series at θ = place · panel width."""
+    k = int(np.floor(place))
+    # the number of panels is a power of two
+    return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
+
+
+@compiled
+def interpolate(theta, width, coefficients):  # type: ignore[no-untyped-def]  # compiled
+    """Values of a piecewise series at each angle, shape (len(theta),)."""
+    out = np.empty(theta.shape[0])
+    for i in range(theta.shape[0]):
+        out[i] = _value(coefficients, theta[i] / width)
+    return out
+
+
+@compiled
+def measure_at(theta, panels):  # type: ignore[no-untyped-def]  # compiled
+    """sqrt(1 + h'²) and its θ-derivative at one angle."""
+    place = theta / panels.width
+    k = int(np.floor(place))
+    x = 2 * (place - k) - 1
+    c = panels.measure[k & (panels.finest - 1)]
+    # d/dx of Σ c_j T_j = Σ j c_j U_{j-1}
+    u_prev = 0.0
+    u = 1.0
+    total = 0.0
+    for j in range(1, c.shape[0]):
+        total += j * c[j] * u
+        u, u_prev = 2 * x * u - u_prev, u
+    return _clenshaw(c, x), total * 2 / panels.width
+
+
+# Nodes of a gap's moments: rows 1 - η, 1 + η, ∫S dθ and ∫S' dθ of each.
+_MINUS, _PLUS, _STRESS, _SLOPE = 0, 1, 2, 3
+
+
+@compiled
+def _room(nodes, count, more):  # type: ignore[no-untyped-def]  # compiled
+    """``nodes`` with room for ``more`` columns beyond ``count``."""
+    if count + more <= nodes.shape[1]:
+        return nodes
+    wider = np.empty((nodes.shape[0], 2 * (count + more)))
+    wider[:, :count] = nodes[:, :count]
+    return wider
+
+
+@compiled
+def _end_piece(gap, side, length, panels, nodes, count):  # type: ignore[no-untyped-def]  # compiled
+    """Nodes from the end of a gap inwards, in cells graded to the patch beyond that end."""
+    beyond = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
+    at = 0.0
+    stop = min(length, beyond)
+    while at < length:
+        first = at == 0.0
+        rule = panels.end_x.shape[0] if first else panels.x.shape[0]
+        nodes = _room(nodes, count, rule)
+        for i in range(rule):
+            if first:
+                y = panels.end_x[i]
+                r = y * y * stop  # the square root at the end becomes smooth in y
+                weight = 2 * y * panels.end_w[i] * stop
+            else:
+                r = at + (stop - at) * (panels.x[i] + 1) / 2
+                weight = panels.w[i] * (stop - at) / 2
+            place = (gap[LEFT] + r if side == 0 else gap[RIGHT] - r) / panels.width
+            nodes[_MINUS, count], nodes[_PLUS, count] = one_minus_plus(gap, r, side)
+            nodes[_STRESS, count] = weight * _value(panels.stress, place)
+            if nodes.shape[0] > _SLOPE:
+                nodes[_SLOPE, count] = weight * _value(panels.slope, place)
+            count += 1
+        at = stop
+        stop = min(2 * at, length)
+        if length - stop < 0.25 * at:
+            stop = length
+    return nodes, count
+
+
+@compiled_sums
+def _panel_nodes(gap, tiles, tiled, width, x, weights, nodes, count):  # type: ignore[no-untyped-def]
+    """Nodes of compressed panels; ``tiles`` holds first finest panel, size and row of each.
+
+    A panel is no longer than its distance from either end, so the logarithm of the map differs at
+    its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
+    """
+    p = x.shape[0]
+    length = gap[RIGHT] - gap[LEFT]
+    for tile in range(tiled):
+        centre = (tiles[0, tile] + 0.5 * tiles[1, tile]) * width - gap[LEFT]
+        half = 0.5 * tiles[1, tile] * width
+        row = tiles[2, tile]
+        side = 0 if centre < length - centre else 1
+        own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
+        far = length + (gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH])
+        if side == 1:
+            centre, half = length - centre, -half
+        a = own + centre
+        b = far - centre
+        near = np.log1p(centre * (1 / own + 1 / far) / (1 - centre / far))
+        scale = 1 / (2 * gap[ALPHA])
+        nearer = nodes[_PLUS - side]
+        farther = nodes[_MINUS + side]
+        for i in range(p):
+            d = half * x[i]
+            z = d * (a + b) / (2 * a * b + d * (b - a))
+            y = z * z
+            series = 1 / 15 + y * (1 / 17 + y * (1 / 19 + y * (1 / 21 + y / 23)))
+            series = 1 / 7 + y * (1 / 9 + y * (1 / 11 + y * (1 / 13 + y * series)))
+            series = 1 + y * (1 / 3 + y * (1 / 5 + y * series))
+            nearer[count + i] = (near + 2 * z * series) * scale
+        for i in range(p):
+            farther[count + i] = 2 - nearer[count + i]
+        for field in range(nodes.shape[0] - _STRESS):
+            for i in range(p):
+                nodes[_STRESS + field, count + i] = weights[field, row, i]
+        count += p
+    return count
+
+
+@compiled
+def _short_gap(gap, modes, panels, nodes):  # type: ignore[no-untyped-def]  # compiled
+    """Gauss-Chebyshev nodes of the first kind in η: they serve s_n and s^± alike."""
+    count = max(3 * panels.x.shape[0] + 6, 2 * modes)
+    nodes = _room(nodes, 0, count)
+    for i in range(count):
+        t = (i + 0.5) * np.pi / count
+        theta, stretch = theta_at(gap, np.cos(t))
+        weight = np.pi / count * np.sin(t) * stretch
+        nodes[_MINUS, i] = 2 * np.sin(t / 2) ** 2
+        nodes[_PLUS, i] = 2 * np.cos(t / 2) ** 2
+        nodes[_STRESS, i] = weight * _value(panels.stress, theta / panels.width)
+        if nodes.shape[0] > _SLOPE:
+            nodes[_SLOPE, i] = weight * _value(panels.slope, theta / panels.width)
+    return nodes, count
+
+
+@compiled
+def _nodes_of(gap, modes, panels, fields):  # type: ignore[no-untyped-def]  # compiled
+    """Nodes of the moments of one gap and their number."""
+    nodes = np.empty((2 + fields, 1024))
+    left = gap[LEFT]
+    right = gap[RIGHT]
+    width = panels.width
+    if right - left <= _SHORT_GAP * width:
+        return _short_gap(gap, modes, panels, nodes)
+    first = int(np.floor(left / width)) + 2  # an end piece is one to two finest panels long
+    last = int(np.ceil(right / width)) - 2
+    nodes, count = _end_piece(gap, 0, first * width - left, panels, nodes, 0)
+    nodes, count = _end_piece(gap, 1, right - last * width, panels, nodes, count)
+    levels = panels.level_start.shape[0]
+    tiles = np.empty((3, max(0, last - first)), dtype=np.int64)
+    tiled = 0
+    at = first
+    while at < last:
+        level = 0
+        size = 1
+        while level + 1 < levels:
+            twice = 2 * size
+            if at & (twice - 1) != 0 or at + twice > last:
+                break
+            start = at * width - left
+            stop = right - (at + twice) * width
+            if start < twice * width or stop < twice * width:
+                break
+            # the highest mode turns by modes·Δη/sqrt(1-η²) over the panel
+            if modes * twice * width > _SAFE * min(start, stop):
+                a_minus, a_plus = one_minus_plus(gap, start, 0)
+                b_minus, b_plus = one_minus_plus(gap, stop, 1)
+                nearest = min(a_minus * a_plus, b_minus * b_plus)
+                if modes * (b_plus - a_plus) > _PHASE * np.sqrt(nearest):
+                    break
+            level += 1
+            size = twice
+        tiles[0, tiled] = at
+        tiles[1, tiled] = size
+        tiles[2, tiled] = panels.level_start[level] + (
+            (at >> level) & ((panels.finest >> level) - 1)
+        )
+        tiled += 1
+        at += size
+    nodes = _room(nodes, count, tiled * panels.x.shape[0])
+    count = _panel_nodes(gap, tiles, tiled, width, panels.x, panels.weights, nodes, count)
+    return nodes, count
+
+
+@compiled_sums
+def _add_up(nodes, count, s, ends):  # type: ignore[no-untyped-def]  # compiled
+    """Moments of the nodes, by the recurrence of sin((n+1)t), cos t = η."""
+    fields = s.shape[1]
+    twice = np.empty(count)
+    current = np.empty(count)
+    previous = np.zeros(count)
+    low0 = 0.0
+    high0 = 0.0
+    for i in range(count):
+        minus = nodes[_MINUS, i]
+        plus = nodes[_PLUS, i]
+        root = np.sqrt(minus * plus)
+        current[i] = root
+        twice[i] = 2 * (plus - 1 if plus < minus else 1 - minus)
+        share = nodes[_STRESS, i] / (root * np.pi)
+        low0 += share * minus
+        high0 += share * plus
+    ends[0, 0] = low0
+    ends[1, 0] = high0
+    if fields > 1:
+        low1 = 0.0
+        high1 = 0.0
+        for i in range(count):
+            share = nodes[_SLOPE, i] / (current[i] * np.pi)
+            low1 += share * nodes[_MINUS, i]
+            high1 += share * nodes[_PLUS, i]
+        ends[0, 1] = low1
+        ends[1, 1] = high1
+    for n in range(s.shape[0]):
+        total0 = 0.0
+        total1 = 0.0
+        if fields > 1:
+            for i in range(count):
+                total0 += nodes[_STRESS, i] * current[i]
+                total1 += nodes[_SLOPE, i] * current[i]
+        else:
+            for i in range(count):
+                total0 += nodes[_STRESS, i] * current[i]
+        s[n, 0] = total0 * (2 / np.pi)
+        if fields > 1:
+            s[n, 1] = total1 * (2 / np.pi)
+        for i in range(count):
+            value = twice[i] * current[i] - previous[i]
+            previous[i] = current[i]
+            current[i] = value
+
+
+@compiled
+def gap_moments(gap, panels, s, ends):  # type: ignore[no-untyped-def]  # compiled
+    """Moments of (S, S') over a gap: fills ``s``, shape (modes, 2), and ``ends``, (2, 2).
+
+    With ``s`` of shape (modes, 1) those of S alone. ``gap`` is a row of
+    :func:`solver.sharp.coordinate.map_gaps`.
+    """
+    nodes, count = _nodes_of(gap, s.shape[0], panels, s.shape[1])
+    _add_up(nodes, count, s, ends)

@@ -1,0 +1,300 @@
+"""The methods against the closed forms: :func:`validate` gives rows of (claim, error, bound).
+
+What is claimed, and why the bounds are what they are (:mod:`solver.validate.judge` for the rest):
+
+*   losses: the promise of the method (grid: 0.5 % at no more than 4096 nodes; sharp: 1e-8);
+*   energies along the branch: the adhesion energy 2γe of the resolution e at both edges;
+*   a small contact is not quite a parabola's: with ψ = πa/λ the repulsion is short by less than
+    ψ²/3 of itself, the tension over by less than ψ²/6 (1 + ψ²), exactly from the two closed forms;
+*   almost full contact differs from full contact, by reciprocity ½⟨σh⟩ = U_full + ½⟨σ_full t⟩
+    exactly, so by no more than ½ s max|σ_full| over the gaps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from solver.loop import run_loop
+from solver.method import ContactState
+from solver.problem import Problem
+from solver.profile import Array, Profile, self_affine_profile
+from solver.references.full_contact import full_contact_energy, full_contact_stress
+from solver.references.parabola import parabola_load, parabola_pull_off
+from solver.references.periodic_punch import pull_off_stress
+from solver.registry import MethodName, make_method
+from solver.validate.judge import (
+    ALPHAS,
+    AMPLITUDE,
+    GRIDS,
+    HALF_SPACE,
+    METHODS,
+    MODULUS,
+    PERIOD,
+    STANDARDS,
+    Judge,
+    Row,
+    joined,
+    problem_of,
+    wave_of,
+)
+
+__all__ = ["METHODS", "Row", "validate"]
+
+
+def validate(
+    method_names: Sequence[MethodName] = METHODS, *, on_row: Callable[[Row], None] | None = None
+) -> list[Row]:
+    """Judge the methods by the closed forms.
+
+    Parameters
+    ----------
+    method_names : sequence of str
+        Of :data:`METHODS`.
+    on_row : callable, optional
+        Called with every row as it is found.
+
+    Raises
+    ------
+    ValueError
+        For a name that is not in :data:`METHODS`.
+    """
+    rows: list[Row] = []
+    for name in method_names:
+        if name not in STANDARDS:
+            raise ValueError(f"method is {name!r}: validated are {', '.join(METHODS)}")
+        for row in _rows(name):
+            rows.append(row)
+            if on_row is not None:
+                on_row(row)
+    return rows
+
+
+def _rows(name: MethodName) -> Iterator[Row]:
+    judge = Judge(name)
+    nan = float("nan")
+    for claim in CLAIMS:
+        try:
+            yield from claim(judge)
+        except RuntimeError as error:
+            # A method that gives up is a failed claim, not the end of the validation.
+            about = (claim.__doc__ or "").rstrip(".")
+            yield judge.row(about, nan, nan, f"did not finish: {error}")
+
+
+def losses(judge: Judge) -> Iterator[Row]:
+    """Loss of the single wave."""
+    for alpha in ALPHAS:
+        wave, result = judge.wave_loop(alpha)
+        exact = wave.loop.loss
+        for what, value, bound in (
+            ("sum of drops", result.loss_from_drops, judge.standard.loss),
+            ("loop integral", result.loss, judge.standard.loop_integral),
+        ):
+            claim = f"loss of the single wave, α = {alpha:g}, {what}"
+            yield judge.row(claim, value / exact - 1, bound)
+
+
+def order(judge: Judge) -> Iterator[Row]:
+    """Order of convergence of the loss."""
+    if judge.standard.nodes is None:
+        return  # a method without a grid
+    errors = []
+    for n in GRIDS:
+        squares = []
+        for alpha in ALPHAS:
+            wave = wave_of(alpha)
+            if n == judge.standard.nodes:
+                _, result = judge.wave_loop(alpha)
+            else:
+                method = judge.method(problem_of(wave), n)
+                result = run_loop(method, max_penetration=0.05, load_steps=1)
+            squares.append((result.loss_from_drops / wave.loop.loss - 1) ** 2)
+        errors.append(float(np.sqrt(np.mean(squares))))
+    order = -float(np.polyfit(np.log(GRIDS), np.log(errors), 1)[0])
+    yield judge.row(
+        "order of convergence of the loss is 1: shortfall",
+        max(0.0, 1 - order),
+        0.2,
+        f"order {order:.2f}, rms error over α {errors[0]:.1e} to {errors[-1]:.1e}",
+        f"{GRIDS[0]} to {GRIDS[-1]} nodes",
+    )
+
+
+def branch(judge: Judge) -> Iterator[Row]:
+    """States of the branch against Johnson."""
+    widths, stresses, energies = [], [], []
+    for alpha in ALPHAS:
+        wave, result = judge.wave_loop(alpha)
+        on_axis = np.flatnonzero(result.load_step & (result.patches > 0))
+        s = result.separation[on_axis]
+        keep = s < wave.loop.fold_separation  # a state can outlive the fold by rounding
+        on_axis, s = on_axis[keep], s[keep]
+        a = np.array([wave.half_width(float(value)) for value in s])
+        p_star = wave.full_contact_stress
+        widths.append(result.contact_fraction[on_axis] / 2 - a / PERIOD)
+        off = (result.mean_stress[on_axis] - wave.mean_stress(a)) / p_star
+        stresses.append((off, judge.slack(wave.mean_stress_at, a, s) / p_star))
+        off = (result.energy[on_axis] - wave.energy(a)) / wave.energy_scale
+        one_node = 2 * wave.work_of_adhesion * PERIOD * judge.standard.edge
+        energies.append((off, np.full(a.size, one_node / wave.energy_scale)))
+    johnson = "branch against Johnson, all α:"
+    edge = np.array(judge.standard.edge)
+    yield judge.worst(f"{johnson} half-width / λ", np.concatenate(widths), edge)
+    yield judge.worst(f"{johnson} mean stress / p*", *joined(stresses))
+    yield judge.worst(f"{johnson} energy / (λ A p*)", *joined(energies))
+
+
+def fold(judge: Judge) -> Iterator[Row]:
+    """Pull-off of the single wave."""
+    places, stresses = [], []
+    for alpha in ALPHAS:
+        wave, result = judge.wave_loop(alpha)
+        loop = wave.loop
+        reach = loop.fold_separation - wave.amplitude
+        places.append((result.jumps[-1].separation - loop.fold_separation) / reach)
+        stress = result.mean_stress[np.flatnonzero(result.patches)[-1]]
+        a, s = np.array([loop.fold_half_width]), np.array([loop.fold_separation])
+        # The last state rests within e of an edge that itself is within e of the fold.
+        bound = judge.slack(wave.mean_stress_at, a, s) / wave.full_contact_stress
+        off = np.array([(stress - loop.fold_mean_stress) / wave.full_contact_stress])
+        stresses.append((off, 2 * bound))
+    yield judge.worst(
+        "pull-off of the single wave, all α: (s_out - s) / (s_out - A)",
+        np.array(places),
+        np.array(judge.standard.loss),
+    )
+    yield judge.worst("pull-off of the single wave, all α: p̄_out / p*", *joined(stresses))
+
+
+def westergaard(judge: Judge) -> Iterator[Row]:
+    """Contact without adhesion against Westergaard."""
+    wave = wave_of(0.0)
+    problem = problem_of(wave)
+    method = judge.method(problem)
+    found: list[ContactState] = []
+    result = run_loop(
+        method,
+        max_penetration=0.9,
+        load_steps=10,
+        on_state=lambda _, state: found.append(state),
+    )
+    below = result.separation < problem.profile.h_max  # at first touch the width is zero
+    pressed = [found[i] for i in np.flatnonzero(result.load_step & below)]
+    s = np.array([state.separation for state in pressed])
+    a = np.array([wave.half_width(float(value)) for value in s])
+    p_star = wave.full_contact_stress
+    width = np.array([state.contact_fraction / 2 for state in pressed]) - a / PERIOD
+    off = (np.array([state.mean_stress for state in pressed]) - wave.mean_stress(a)) / p_star
+    nodes = judge.standard.nodes or GRIDS[-1]
+    peak = np.array([method.fields(state, nodes).stress[0] for state in pressed]) / p_star
+
+    def highest(a: Array, s: Array) -> Array:
+        """σ(0) of the half-width a held at s."""
+        y = np.sin(np.pi * a / PERIOD) ** 2
+        tension = p_star * y - wave.mean_stress_at(a, s)
+        return np.asarray(2 * p_star * np.sqrt(y) - tension / np.sqrt(y))
+
+    gamma0 = "γ = 0 against Westergaard:"
+    edge = np.array(judge.standard.edge)
+    yield judge.worst(f"{gamma0} half-width / λ", width, edge)
+    mean = judge.slack(wave.mean_stress_at, a, s) / p_star
+    yield judge.worst(f"{gamma0} mean stress / p*", off, mean)
+    top = judge.slack(highest, a, s) / p_star
+    yield judge.worst(f"{gamma0} highest stress / p*", peak - highest(a, s) / p_star, top)
+    drops = abs(result.loss_from_drops) / wave.energy_scale * PERIOD
+    yield judge.row(f"{gamma0} no energy drops / (A p*)", drops, 1e-9)
+    work = result.energy.max() / wave.energy_scale
+    loss = abs(result.loss) / wave.energy_scale * PERIOD
+    bound = judge.standard.loop_integral * work
+    yield judge.row(f"{gamma0} no loop integral / (A p*)", loss, bound)
+
+
+def full_contact(judge: Judge) -> Iterator[Row]:
+    """Almost full contact of three waves."""
+    waves = np.array([0, 0.5, 0.2 * np.exp(1j), 0.1 * np.exp(2j)], dtype=np.complex128)
+    profile = Profile(PERIOD, waves).scaled(AMPLITUDE)
+    gamma = 10 * MODULUS * AMPLITUDE**2 / PERIOD  # strong: only one gap stays open
+    problem = Problem(profile, HALF_SPACE, gamma)
+    method = judge.method(problem)
+    state = method.detached(profile.h_max)
+    for penetration in (0.0, 0.5, 0.9, 0.99):
+        state = method.follow(state, problem.separation(penetration)).states[-1]
+    n = judge.standard.nodes or GRIDS[-1]
+    f = method.fields(state, n)
+    full = full_contact_stress(profile, MODULUS, f.x)
+    energy = full_contact_energy(profile, MODULUS)
+    # ½⟨σh⟩ from the state: its elastic energy is ½⟨σ(h - s)⟩ per area.
+    work = state.elastic_energy / PERIOD + 0.5 * state.separation * state.mean_stress
+    bound = 0.5 * state.separation * float(np.abs(full[f.gap > 0]).max()) / energy
+    note = f"Δ/h_max = 0.99, A/A0 = {state.contact_fraction:.3f}"
+    yield judge.row("full contact, three waves: energy", work / energy - 1, bound, note)
+    reciprocal = energy + 0.5 * float(np.mean(full * f.gap))
+    # The mean over n nodes misses what one node at either end of the gap holds.
+    ends = 2 / n * bound / (1 - state.contact_fraction)
+    claim = "full contact, three waves: ½⟨σh⟩ = U_full + ½⟨σ_full t⟩"
+    yield judge.row(claim, work / reciprocal - 1, ends, note)
+
+
+def punch(judge: Judge) -> Iterator[Row]:
+    """Koiter's punch: the strongly adhesive wave."""
+    wave = wave_of(3.0)
+    result = run_loop(judge.method(problem_of(wave)), max_penetration=0.5, load_steps=5)
+    on = np.flatnonzero((result.branch == "unloading") & (result.patches > 0))
+    width = result.contact_fraction[on] / 2 * PERIOD
+    hertzian = wave.full_contact_stress * np.sin(np.pi * width / PERIOD) ** 2
+    punch = pull_off_stress(width, PERIOD, MODULUS, wave.work_of_adhesion)
+    bounds = judge.unknown_width(wave, width, result.separation[on]) / np.abs(punch)
+    errors = (result.mean_stress[on] - hertzian) / punch - 1
+    yield judge.worst("Koiter's punch: tension of the wave at α = 3", errors, bounds)
+
+
+def parabola(judge: Judge) -> Iterator[Row]:
+    """Small contacts against the parabola."""
+    wave = wave_of(0.02)
+    radius = PERIOD**2 / (4 * np.pi**2 * AMPLITUDE)
+    method = judge.method(problem_of(wave))
+    result = run_loop(method, max_penetration=0.003, load_steps=1)
+    on = np.flatnonzero((result.branch == "unloading") & (result.patches > 0))
+    gamma, p_star = wave.work_of_adhesion, wave.full_contact_stress
+    a = result.contact_fraction[on] / 2 * PERIOD
+
+    def curved(a: Array) -> Array:
+        """Mean stress by which the wave's contact differs from the parabola's."""
+        psi2 = (np.pi * a / PERIOD) ** 2
+        repulsion = parabola_load(a, radius, MODULUS, 0.0) / PERIOD
+        tension = repulsion - parabola_load(a, radius, MODULUS, gamma) / PERIOD
+        return np.asarray(repulsion * psi2 / 3 + tension * psi2 / 6 * (1 + psi2))
+
+    errors = result.mean_stress[on] - parabola_load(a, radius, MODULUS, gamma) / PERIOD
+    bounds = curved(a) + judge.unknown_width(wave, a, result.separation[on])
+    yield judge.worst(
+        "parabola: mean stress / p* at a half-width", errors / p_star, bounds / p_star
+    )
+    a_least, load = parabola_pull_off(radius, MODULUS, gamma)
+    least = np.array([a_least])
+    s = np.asarray(wave.separation(least))
+    bound = float((curved(least) + judge.slack(wave.mean_stress_at, least, s))[0])
+    error = result.pull_off_stress * PERIOD / load + 1
+    yield judge.row("parabola: pull-off load", error, -bound * PERIOD / load)
+
+
+def audit(judge: Judge) -> Iterator[Row]:
+    """Energy audit: loop integral = sum of drops."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=2, ratio=16, seed=1, h_rms=1e-6)
+    problem = Problem(profile, HALF_SPACE, 0.01)
+    accuracy = max(judge.standard.accuracy, 1e-3)
+    method = make_method(judge.name, problem, accuracy=accuracy)
+    result = run_loop(method, max_penetration=0.9, load_steps=40)
+    kinds = sorted({jump.kind for jump in result.jumps})
+    yield judge.row(
+        "energy audit of a rough loop: loop integral against sum of drops",
+        result.audit_residual,
+        0.01,
+        f"H = 0.8, harmonics 2 to 32; {len(result.jumps)} jumps: {', '.join(kinds)}",
+        f"{method.describe().get('nodes', '')} nodes" if judge.standard.nodes else "",
+    )
+
+
+CLAIMS = (losses, order, branch, fold, westergaard, full_contact, punch, parabola, audit)

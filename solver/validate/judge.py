@@ -1,0 +1,186 @@
+"""How the methods are judged: rows of (claim, error, bound), and how each method is run.
+
+The bounds are physics. An edge has a resolution e: dx for ``grid``, whose edges rest on nodes,
+1e-6 λ for ``sharp`` (energies are stationary in the edges, so its losses are far better). A
+half-width may be off by e, and the mean stress by what the closed form changes when its half-width
+is off by e at the same s. Where a stress is compared at a *given* width, that width is known to e
+and Griffith's balance holds within e.
+
+The waves are so shallow (A q0 = 6e-6) that the flat and the arc measure of the adhesive area
+(:mod:`solver.references.single_wave`) agree to 3e-11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.loop import LoopResult, run_loop
+from solver.material import HalfSpace
+from solver.method import Method
+from solver.problem import Problem
+from solver.profile import Array, single_wave
+from solver.references.single_wave import SingleWave
+from solver.registry import MethodName, make_method
+
+ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+GRIDS = (256, 512, 1024, 2048, 4096)
+AMPLITUDE, PERIOD = 1e-9, 1e-3
+HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)
+MODULUS = HALF_SPACE.modulus
+
+
+@dataclass(frozen=True)
+class Row:
+    """One claim, judged.
+
+    Attributes
+    ----------
+    claim, method, resolution : str
+    error, bound : float
+        Not negative; in the units that the claim names, else relative. NaN if the method did not
+        get there.
+    note : str
+        What was measured beside the error, or why there is none.
+    """
+
+    claim: str
+    method: str
+    resolution: str
+    error: float
+    bound: float
+    note: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error keeps the bound."""
+        return self.error <= self.bound
+
+
+@dataclass(frozen=True)
+class Standard:
+    """How a method is run here, and what it promises.
+
+    Attributes
+    ----------
+    accuracy : float
+    nodes : int or None
+        What it is made with; None for a method without a grid.
+    edge : float
+        Resolution e of an edge as a part of λ.
+    stress : float
+        Relative error of the elastic solution between given edges.
+    loss, loop_integral : float
+        Relative error of the loss from the sum of drops, and from the trapezoidal rule.
+    """
+
+    accuracy: float
+    nodes: int | None
+    edge: float
+    stress: float
+    loss: float
+    loop_integral: float
+
+    @property
+    def resolution(self) -> str:
+        """For the table."""
+        return f"{self.nodes} nodes" if self.nodes else f"accuracy {self.accuracy:g}"
+
+
+STANDARDS: dict[MethodName, Standard] = {
+    "grid": Standard(1e-4, GRIDS[-1], 1 / GRIDS[-1], 1e-6, loss=5e-3, loop_integral=5e-3),
+    "sharp": Standard(1e-8, None, 1e-6, 1e-9, loss=1e-8, loop_integral=1e-3),
+}
+METHODS: tuple[MethodName, ...] = tuple(STANDARDS)
+
+
+class Judge:
+    """Runs one method on the scenes of the closed forms.
+
+    Parameters
+    ----------
+    name : str
+        Of :data:`METHODS`.
+    """
+
+    def __init__(self, name: MethodName) -> None:
+        self.name = name
+        self.standard = STANDARDS[name]
+        self._loops: dict[float, tuple[SingleWave, LoopResult]] = {}
+
+    def method(self, problem: Problem, nodes: int | None = None) -> Method:
+        """Return the method for ``problem``, by default at the standard's number of nodes."""
+        nodes = nodes or self.standard.nodes
+        per_wave = nodes // problem.profile.highest_harmonic if nodes else None
+        return make_method(
+            self.name, problem, accuracy=self.standard.accuracy, nodes_per_wave=per_wave
+        )
+
+    def row(
+        self, claim: str, error: float, bound: float, note: str = "", resolution: str = ""
+    ) -> Row:
+        """Return one row; the sign of the error is dropped."""
+        where = resolution or self.standard.resolution
+        return Row(claim, self.name, where, abs(float(error)), float(bound), note)
+
+    def worst(self, claim: str, errors: Array, bounds: Array, note: str = "") -> Row:
+        """Return the row of the state whose error comes nearest to its bound.
+
+        Raises
+        ------
+        RuntimeError
+            If there is no state.
+        """
+        if errors.size == 0:
+            raise RuntimeError("no state in contact was found")
+        bounds = np.broadcast_to(bounds, errors.shape)
+        k = int(np.argmax(np.abs(errors) / bounds))
+        return self.row(claim, errors[k], bounds[k], note)
+
+    def wave_loop(self, alpha: float) -> tuple[SingleWave, LoopResult]:
+        """Return the closed form at α and the method's loop; the loss does not depend on depth."""
+        if alpha not in self._loops:
+            wave = wave_of(alpha)
+            method = self.method(problem_of(wave))
+            self._loops[alpha] = (wave, run_loop(method, max_penetration=0.5, load_steps=8))
+        return self._loops[alpha]
+
+    # ------------------------------------------------------------------ bounds
+
+    def slack(self, function: Callable[[Array, Array], Array], a: Array, s: Array) -> Array:
+        """Change of ``function`` when the half-width is off by the resolution at the same s."""
+        step, here = self.standard.edge * PERIOD, function(a, s)
+        change = [np.abs(function(a + sign * step, s) - here) for sign in (-1, 1)]
+        return np.asarray(np.maximum(*change) + self.standard.stress * np.abs(here))
+
+    def unknown_width(self, wave: SingleWave, a: Array, s: Array) -> Array:
+        """Error of the mean stress at a half-width a that is known, and balanced, within e."""
+
+        def missing(a: Array) -> Array:
+            return wave.mean_stress_at(a, s) - wave.mean_stress(a)
+
+        step = self.standard.edge * PERIOD
+        changes = [
+            [np.abs(function(a + sign * step) - function(a)) for sign in (-1, 1)]
+            for function in (missing, wave.mean_stress)
+        ]
+        width = np.maximum(*changes[0]) + np.maximum(*changes[1])
+        return np.asarray(width + self.standard.stress * wave.full_contact_stress)
+
+
+def wave_of(alpha: float) -> SingleWave:
+    """Return the closed form of the shallow wave at α."""
+    return SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, MODULUS)
+
+
+def problem_of(wave: SingleWave) -> Problem:
+    """Return the problem that ``wave`` (from :func:`wave_of`) solves."""
+    return Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave.work_of_adhesion)
+
+
+def joined(pairs: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Return all errors and all bounds of pairs (errors, bounds)."""
+    errors, bounds = zip(*pairs, strict=True)
+    return np.concatenate(errors), np.concatenate(bounds)

@@ -1,0 +1,283 @@
+"""Averages of a results file against the raw rows, with plain numpy; error bars that cover."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from ensemble.aggregate.average import aggregate
+from ensemble.aggregate.curves import QUANTILES
+from ensemble.aggregate.fields import fitted_slope
+from ensemble.aggregate.jumps import BIN_EDGES
+from ensemble.aggregate.statistics import estimates, interval, interval_method
+from ensemble.campaign.file import parse_campaign
+from ensemble.errors import InputError
+from ensemble.results.store import create
+from ensemble.task.fields import field_plan
+from solver.jumps import JUMP_KINDS
+from tests.support.synthetic_results import campaign, rows, write
+
+E_STAR, Q0 = 1e6 / 0.75, 1000.0
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> Path:
+    """A campaign of 24 tasks: 19 done, 2 failed, 3 pending, one cell with a single result."""
+    plan = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6)
+    values = rows(plan)
+    values["status"][[2, 3]] = 2
+    values["status"][[7, 8, 9]] = 0
+    values["error"] = np.zeros(24, dtype="S512")
+    values["error"][2] = "γ diverged".encode()
+    return write(tmp_path_factory.mktemp("aggregate") / "r.h5", plan, values)
+
+
+def raw(file: Path, hurst: float, gamma: float) -> tuple[h5py.File, np.ndarray]:
+    data = h5py.File(file, "r")
+    mine = (data["hurst"][:] == hurst) & (data["work_of_adhesion"][:] == gamma)
+    return data, np.flatnonzero(mine & (data["status"][:] == 1))
+
+
+CELLS = [(0.7, 0.01, 4, 2, 0), (0.7, 0.04, 3, 0, 3), (0.8, 0.01, 6, 0, 0), (0.8, 0.04, 6, 0, 0)]
+
+
+@pytest.mark.parametrize(("hurst", "gamma", "done", "failed", "pending"), CELLS)
+def test_scalars_are_the_means_of_the_raw_rows(file, hurst, gamma, done, failed, pending):
+    cell = aggregate(file).cell(hurst, gamma)
+    assert (cell.done, cell.failed, cell.pending) == (done, failed, pending)
+    data, mine = raw(file, hurst, gamma)
+    for name in (
+        "loss",
+        "loss_dimensionless",
+        "loss_small_scale",
+        "pull_off_stress",
+        "m2",
+        "h_max",
+    ):
+        values = data[name][:][mine]
+        found = cell.estimates[name]
+        assert found.n == done
+        assert found.mean == pytest.approx(values.sum() / done, rel=1e-13)
+        std = np.sqrt(((values - values.mean()) ** 2).sum() / (done - 1))
+        assert found.std == pytest.approx(std, rel=1e-9, abs=1e-20)
+        assert found.sem == pytest.approx(std / np.sqrt(done), rel=1e-9, abs=1e-20)
+    loss = cell.estimates["loss"]
+    assert loss.low < loss.mean < loss.high
+    share = data["loss_small_scale"][:][mine] / data["loss_from_drops"][:][mine]
+    assert cell.estimates["small_scale_share"].mean == pytest.approx(share.mean())
+
+
+@pytest.mark.parametrize(("hurst", "gamma"), [cell[:2] for cell in CELLS])
+def test_curves_are_the_means_of_the_raw_rows(file, hurst, gamma):
+    cell = aggregate(file).cell(hurst, gamma)
+    data, mine = raw(file, hurst, gamma)
+    h_max, m2 = data["h_max"][:][mine], data["m2"][:][mine]
+    for branch in ("loading", "unloading"):
+        stress = data[f"{branch}_mean_stress"][:][mine]
+        sigma = 2 * stress / (E_STAR * Q0 * h_max[:, None])
+        area = data[f"{branch}_contact_fraction"][:][mine]
+        for name, values in (
+            ("mean_stress", stress),
+            ("stress", sigma),
+            ("stress_slope", sigma / np.sqrt(m2)[:, None]),
+            ("contact_fraction", area),
+            ("patches", data[f"{branch}_patches"][:][mine]),
+        ):
+            found = cell.curves[f"{branch}_{name}"]
+            np.testing.assert_allclose(found.mean, values.mean(axis=0), rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(found.std, values.std(axis=0, ddof=1), rtol=1e-9, atol=1e-9)
+            ordered = np.sort(values, axis=0)
+            middle = 0.5 * (ordered[(len(mine) - 1) // 2] + ordered[len(mine) // 2])
+            median = found.quantiles[QUANTILES.index(0.5)]
+            np.testing.assert_allclose(median, middle, rtol=1e-12, atol=1e-12)
+
+
+def test_blocks_of_any_size_give_the_same_numbers(file, monkeypatch):
+    whole = aggregate(file)
+    monkeypatch.setattr("ensemble.results.blocks.HELD_AT_ONCE", 60)  # three columns of 19 rows
+    monkeypatch.setattr("ensemble.results.blocks._READ_AT_ONCE", 100)
+    pieces = aggregate(file)
+    for one, two in zip(whole.cells, pieces.cells, strict=True):
+        for name, curve in one.curves.items():
+            np.testing.assert_array_equal(curve.mean, two.curves[name].mean)
+            np.testing.assert_array_equal(curve.quantiles, two.curves[name].quantiles)
+    np.testing.assert_array_equal(whole.jumps.histogram, pieces.jumps.histogram)
+    np.testing.assert_allclose(
+        whole.fields.psd_displacement, pieces.fields.psd_displacement, rtol=1e-12
+    )
+
+
+def test_differences_across_gamma_are_taken_profile_by_profile(file):
+    pairs = {pair.hurst: pair for pair in aggregate(file).paired}
+    assert set(pairs) == {0.7, 0.8}
+    data = h5py.File(file, "r")
+    loss = data["loss"][:]
+    both = [r for r in range(6) if data["status"][r] == 1 and data["status"][6 + r] == 1]
+    expected = [loss[6 + r] - loss[r] for r in both]
+    assert pairs[0.7].loss.n == len(both) == 3 - sum(r in (2, 3) for r in (0, 4, 5))
+    assert pairs[0.7].loss.mean == pytest.approx(np.mean(expected))
+    expected = loss[18:24] - loss[12:18]
+    assert pairs[0.8].loss.mean == pytest.approx(expected.mean())
+    assert pairs[0.8].loss.std == pytest.approx(expected.std(ddof=1))
+    assert (pairs[0.8].lower, pairs[0.8].upper) == (0.01, 0.04)
+
+
+def test_jumps_are_counted_by_kind_and_energy(file):
+    found = aggregate(file).jumps
+    for k, (hurst, gamma, *_) in enumerate(CELLS):
+        data, mine = raw(file, hurst, gamma)
+        kind, drop = data["jump_kind"][:][mine].ravel(), data["jump_energy_drop"][:][mine].ravel()
+        for j, name in enumerate(JUMP_KINDS):
+            assert found.kinds[j] == name
+            assert found.number[k, j] == np.sum(kind == j)
+            assert found.energy[k, j] == pytest.approx(drop[kind == j].sum())
+            inside = (drop[kind == j] >= BIN_EDGES[20]) & (drop[kind == j] < BIN_EDGES[21])
+            assert found.histogram[k, j, 20] == inside.sum()
+        assert found.histogram[k].sum() == found.number[k].sum()
+    assert found.small_scale.tolist() == [kind in ("spreading", "receding") for kind in JUMP_KINDS]
+    assert not found.truncated.any()
+
+
+def test_spectra_leave_out_realisations_without_contact(tmp_path):
+    plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=5)
+    values = rows(plan)
+    psd = np.array(values["psd_displacement"])
+    psd[2, 1, 0] = np.nan
+    values["psd_displacement"] = psd
+    data = aggregate(write(tmp_path / "r.h5", plan, values))
+    assert data.fields.in_contact[0].tolist() == [[5, 5, 5], [4, 5, 5]]
+    expected = psd[[0, 1, 3, 4], 1, 0].astype(np.float32).mean(axis=0)
+    np.testing.assert_allclose(data.fields.psd_displacement[0, 1, 0], expected, rtol=1e-6)
+    slope, _ = fitted_slope(plan, data.fields.wave_number, data.fields.psd_displacement[0, 0, 2])
+    assert slope == pytest.approx(-2.8, abs=1e-3)
+    assert data.fields.shapes[0].row == 0
+
+
+def test_a_fitted_slope_knows_its_error():
+    plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=1)
+    # The paper's spectrum: two decades, so that one of them is fitted.
+    plan = parse_campaign(plan.text.replace("ratio = 10", "ratio = 100"))
+    q = field_plan(plan).wave_number
+    rng = np.random.default_rng(3)
+    pulls = []
+    for _ in range(300):
+        density = q**-2.8 * np.exp(0.3 * rng.standard_normal(q.size))
+        slope, error = fitted_slope(plan, q, density)
+        pulls.append((slope + 2.8) / error)
+    assert abs(np.mean(pulls)) < 0.2
+    assert 0.8 < np.std(pulls) < 1.5
+
+
+@pytest.mark.parametrize(
+    ("draw", "mean", "least"),
+    [
+        (
+            lambda rng, shape: rng.normal(3.0, 0.4, shape),
+            3.0,
+            {3: 0.93, 5: 0.90, 10: 0.93, 30: 0.93},
+        ),
+        (
+            lambda rng, shape: rng.lognormal(0.0, 0.5, shape),
+            np.exp(0.125),
+            {3: 0.90, 5: 0.86, 10: 0.90, 30: 0.92},
+        ),
+    ],
+    ids=["normal", "skewed"],
+)
+def test_intervals_cover_the_true_mean_as_often_as_they_say(draw, mean, least, monkeypatch):
+    """Coverage over 1500 synthetic ensembles of known mean; binomial error 0.006."""
+    monkeypatch.setattr("ensemble.aggregate.statistics.RESAMPLES", 999)
+    rng = np.random.default_rng(11)
+    for n, bound in least.items():
+        low, high = interval(draw(rng, (1500, n)))
+        covered = np.mean((low <= mean) & (mean <= high))
+        assert bound <= covered <= 0.97, (n, covered)
+
+
+def test_the_standard_error_is_the_spread_of_the_mean():
+    rng = np.random.default_rng(5)
+    found = estimates(rng.normal(1.0, 0.2, (2000, 10)), with_interval=False)
+    means = np.array([e.mean for e in found])
+    sem = np.sqrt(np.mean([e.sem**2 for e in found]))
+    assert sem == pytest.approx(means.std(), rel=0.05)
+
+
+def test_intervals_of_few_and_of_equal_values():
+    assert [interval_method(n) for n in (0, 1, 2, 4, 5)] == [
+        *("none", "none"),
+        *("student", "student", "bootstrap"),
+    ]
+    low, high = interval(np.array([[1.0]]))
+    assert np.isnan([low, high]).all()
+    low, high = interval(np.full((1, 8), 2.5))
+    assert (low, high) == (2.5, 2.5)
+    (student,) = estimates(np.array([[1.0, 3.0]]))
+    assert student.high == pytest.approx(2 + 12.7062047)  # t at one degree of freedom, sem = 1
+    one, two = (interval(np.random.default_rng(0).random((2, 7))) for _ in range(2))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_foreign_empty_and_missing_files_are_refused_in_one_sentence(tmp_path):
+    missing = tmp_path / "no.h5"
+    text = tmp_path / "text.h5"
+    text.write_text("nothing")
+    foreign = tmp_path / "foreign.h5"
+    h5py.File(foreign, "w").close()
+    empty = tmp_path / "empty.h5"
+    create(empty, campaign(realisations=2))
+    for path, word in (
+        (missing, "does not exist"),
+        (text, "not a results file"),
+        (foreign, "not a results file"),
+        (empty, "no finished task"),
+    ):
+        with pytest.raises(InputError, match=word) as caught:
+            aggregate(path)
+        assert "\n" not in str(caught.value)
+
+
+MEMORY = """
+import resource, sys
+from ensemble.aggregate import statistics
+from ensemble.results import blocks
+from ensemble.aggregate.average import aggregate
+blocks.HELD_AT_ONCE //= 20
+blocks._READ_AT_ONCE //= 20
+statistics._BATCH //= 20
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+data = aggregate(sys.argv[1])
+after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(data.done, (after - before) / 1024)
+"""
+
+
+def test_memory_does_not_grow_with_the_curves(tmp_path):
+    """Blocks a twentieth of their size, and a file several times larger than the memory taken."""
+    plan = parse_campaign(
+        campaign(hurst=(0.8,), gamma=(0.01, 0.04), realisations=1500, jumps=4)
+        .text.replace("unloading_until = -2.0", "unloading_until = -40.0")
+        .replace("field_nodes", "field_penetrations = []\nfield_nodes")
+    )
+    path = tmp_path / "large.h5"
+    create(path, plan)
+    with h5py.File(path, "r+") as data:
+        done = data["status"].shape[0]
+        for name in ("loss", "loss_dimensionless", "h_max", "m2", "loss_from_drops", "jump_count"):
+            data[name][:] = np.random.default_rng(1).random(done) + 1
+        data["status"][:] = 1
+    size = path.stat().st_size / 2**20
+    out = subprocess.run(
+        [sys.executable, "-c", MEMORY, str(path)],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parent.parent.parent,
+    ).stdout.split()
+    assert int(out[0]) == done
+    assert size > 70
+    assert float(out[1]) < 20, f"{out[1]} MB for a file of {size:.0f} MB"

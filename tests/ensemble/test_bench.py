@@ -1,0 +1,239 @@
+"""The benchmark: ratios at equal error, runs in processes of their own, tables, figure, command."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ensemble.bench.compare as benchmarking
+import ensemble.bench.tamaas as peer
+from ensemble.bench.compare import Line, Reference, benchmark, growth, ratios
+from ensemble.bench.figure import draw
+from ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
+from ensemble.bench.page import page, record
+from ensemble.bench.scenes import FULL, GROWTH, ONE_WAVE, PAPER, QUICK, SMALL_ROUGH, TWO_WAVES
+from ensemble.command import main
+
+REFERENCE = Reference(1.0, "made up")
+
+
+def line(method, setting, seconds, error, scene=ONE_WAVE) -> Line:
+    measured = Measurement(seconds, 200.0, 190.0, 1.0 + error, 2.0, 1e-3, 10, 2, 1)
+    return Line(Run(scene, method, setting, 10, 60.0), REFERENCE, measured)
+
+
+def failed(method, setting, scene=ONE_WAVE) -> Line:
+    run = Run(scene, method, setting, 10, 60.0)
+    return Line(run, REFERENCE, Measurement(note="given up after 60 s"))
+
+
+# A grid of first order whose time grows as 1/error².
+GRID = [line("grid", 2**k, 4.0**k, 2.0**-k) for k in range(1, 5)]
+
+
+def test_ratio_is_interpolated_between_grid_runs():
+    (ratio,) = ratios([*GRID, line("sharp", 1e-2, 0.5, -(2.0**-2.5))])
+    assert ratio.bound == ""
+    assert ratio.value == pytest.approx(4.0**2.5 / 0.5)
+
+
+def test_ratio_is_a_bound_outside_the_grid_runs():
+    better, worse = ratios([*GRID, line("sharp", 1e-6, 0.5, 1e-6), line("sharp", 0.9, 0.5, 0.9)])
+    assert (better.bound, better.value) == (">", pytest.approx(4.0**4 / 0.5))
+    assert (worse.bound, worse.value) == ("<", pytest.approx(4.0 / 0.5))
+
+
+def test_an_exact_loss_is_better_than_any_grid():
+    (ratio,) = ratios([*GRID, line("sharp", 1e-6, 1.0, 0.0)])
+    assert (ratio.bound, ratio.value) == (">", pytest.approx(4.0**4))
+
+
+def test_a_grid_run_that_is_beaten_by_a_cheaper_one_does_not_count():
+    wasted = line("grid", 1024, 1e6, 0.1)
+    lucky = line("grid", 16, 1.0, 2.0**-3)  # cheaper than the runs that are less exact
+    for extra, seconds in (([wasted], 4.0**3), ([lucky], 1.0)):
+        (ratio,) = ratios([*GRID, *extra, line("sharp", 1e-2, 1.0, 2.0**-3)])
+        assert ratio.value == pytest.approx(seconds)
+
+
+def test_ratios_need_both_methods_of_one_scene():
+    other = line("sharp", 1e-3, 1.0, 0.3, scene=TWO_WAVES)
+    assert ratios([*GRID, other, failed("sharp", 1e-4)]) == []
+
+
+@pytest.mark.parametrize("scene", [*QUICK, *FULL], ids=lambda scene: scene.name)
+def test_scenes_are_the_paper_s_material_and_period(scene):
+    problem = scene.problem()
+    assert problem.half_space.modulus == pytest.approx(4e6 / 3)
+    assert problem.profile.period == pytest.approx(2e-3 * np.pi)
+    assert (scene.exact_loss is None) == bool(scene.tightest)
+    # The reference must be more exact than what is measured against it.
+    assert all(scene.tightest[0] < accuracy for accuracy in scene.accuracies if scene.tightest)
+
+
+def test_paper_scale_is_the_paper_s():
+    profile = PAPER.problem().profile
+    assert profile.highest_harmonic == 1000
+    assert profile.h_rms == pytest.approx(1e-6)
+    assert (PAPER.max_penetration, PAPER.load_steps, PAPER.work_of_adhesion) == (0.9, 40, 0.04)
+    assert max(scene.n0 * scene.ratio for scene in GROWTH) == 10_000
+
+
+@pytest.mark.parametrize(
+    ("method", "setting", "error"), [("grid", 256, 5e-3), ("sharp", 1e-3, 1e-3)]
+)
+def test_one_wave_is_measured_against_its_exact_loss(method, setting, error):
+    measured = measure(Run(ONE_WAVE, method, setting, ONE_WAVE.load_steps, 60.0))
+    assert measured.note == ""
+    assert measured.loss == pytest.approx(ONE_WAVE.exact_loss, rel=error)
+    assert abs(measured.audit_residual) < error
+    assert 0 < measured.cpu_seconds < 30
+    assert 20 < measured.megabytes_before <= measured.megabytes < 2000
+    assert (measured.jumps, measured.patches, measured.compiled) == (2, 1, False)
+    assert measured.solutions > 10
+
+
+def test_memory_of_the_parent_does_not_count():
+    ballast = np.ones(80_000_000)  # 610 MB, touched
+    measured = measure(Run(ONE_WAVE, "sharp", 1e-2, 2, 60.0))
+    assert measured.megabytes < 600 < peak_megabytes()
+    assert ballast[0] == 1
+
+
+def test_a_run_that_fails_becomes_a_note():
+    refused = measure(Run(ONE_WAVE, "sharp", 7.0, 10, 60.0))
+    assert refused.note.startswith("failed: ValueError: accuracy is 7.0")
+    assert math.isnan(refused.loss)
+
+
+def test_a_run_that_takes_too_long_is_given_up():
+    assert measure(Run(SMALL_ROUGH, "grid", 4096, 20, 1.0)).note == "given up after 1 s"
+
+
+def fake_measure(run: Run) -> Measurement:
+    """One second and first order for the grid, exact for sharp, far off for tamaas."""
+    error = {"grid": 1 / run.setting, "sharp": 0.0, "tamaas": -0.5}[run.method]
+    loss = run.scene.exact_loss or 3.0
+    return Measurement(1.0, 200.0, 190.0, loss * (1 + error), 2.0, 1e-3, 10, 2, 1)
+
+
+@pytest.fixture
+def no_runs(monkeypatch):
+    monkeypatch.setattr(benchmarking, "measure", fake_measure)
+    monkeypatch.setattr(benchmarking, "has_tamaas", lambda: True)
+
+
+def test_a_grid_that_would_take_too_long_is_left_out_and_so_are_finer_ones(monkeypatch):
+    def slow(run: Run) -> Measurement:
+        return replace(fake_measure(run), cpu_seconds=20.0 if run.setting == 256 else 1.0)
+
+    monkeypatch.setattr(benchmarking, "measure", slow)
+    lines = benchmark([ONE_WAVE], seconds=60.0)
+    notes = [line.measured.note[:8] for line in lines if line.run.method == "grid"]
+    assert notes == ["", "", "left out", "left out"]
+    assert all(line.measured.note == "" for line in lines if line.run.method != "grid")
+
+
+def test_reference_is_the_tightest_run_that_finishes(monkeypatch):
+    asked = []
+
+    def tightest_fails(run: Run) -> Measurement:
+        asked.append((run.setting, run.load_steps))
+        return Measurement(note="failed") if run.setting < 1e-7 else fake_measure(run)
+
+    monkeypatch.setattr(benchmarking, "measure", tightest_fails)
+    lines = benchmark([SMALL_ROUGH], seconds=60.0)
+    assert (1e-7, 40) in asked
+    assert {line.reference for line in lines} == {
+        Reference(3.0, "sharp, accuracy 1e-07, 40 load steps")
+    }
+
+
+def test_without_tamaas_there_is_no_line_for_it(no_runs, monkeypatch):
+    assert "tamaas" in {line.run.method for line in benchmark([ONE_WAVE])}
+    monkeypatch.setattr(benchmarking, "has_tamaas", lambda: False)
+    assert "tamaas" not in {line.run.method for line in benchmark([ONE_WAVE])}
+
+
+def test_nodes_of_tamaas_resolve_zone_and_profile():
+    problem = ONE_WAVE.problem()
+    h_max = problem.profile.h_max
+    coarse, fine = (peer.nodes_for(problem, reach * h_max) for reach in (0.02, 0.01))
+    assert fine == 4 * coarse  # the zone shrinks as the square of the range
+    assert peer.nodes_for(PAPER.problem(), 1e-3) == 8192  # 8 per shortest wave, a power of two
+
+
+@pytest.mark.skipif(not peer.has_tamaas(), reason="tamaas is not installed")
+def test_tamaas_approaches_the_exact_loss_from_below():
+    problem = ONE_WAVE.problem()
+    losses = [
+        peer.tamaas_loop(
+            problem, reach=reach * problem.profile.h_max, max_penetration=0.2, load_steps=10
+        ).loss
+        for reach in (0.1, 0.05, 0.03)
+    ]
+    assert 0 < losses[0] < losses[1] < losses[2] < ONE_WAVE.exact_loss
+
+
+def test_page_has_every_run_and_says_what_did_not_finish():
+    lines = [*GRID, failed("grid", 1024), line("sharp", 1e-3, 0.5, 1e-3)]
+    text = page(lines, [line("sharp", 1e-3, 0.5, 0.0, scene=GROWTH[0])], ratios(lines), "a test")
+    assert "| grid | 1024 nodes | given up after 60 s |" in text
+    assert "Reference: made up." in text
+    assert "| one wave, α = 0.2 | 1e-03 | 1.0e-03 | > 5.1e+02 |" in text
+    assert "| rough, m = 10 … 250, γ = 0.04 | 1e-03 | 0.50 |" in text
+    rows = [row for row in text.splitlines() if row.startswith("| grid")]
+    assert {row.count("|") for row in rows} == {9}
+
+
+def test_record_leaves_out_what_is_not_known():
+    fields = record(failed("sharp", 1e-6))
+    assert fields["note"] == "given up after 60 s"
+    assert fields["cpu_seconds"] == fields["error"] == ""
+
+
+def test_figure_has_a_panel_for_each_scene_even_if_nothing_finished():
+    lines = [*GRID, line("sharp", 1e-6, 1.0, 0.0), failed("sharp", 1e-3, scene=TWO_WAVES)]
+    figure = draw(lines)
+    one, two = (axes for axes in figure.axes if axes.get_visible())
+    assert [drawn.get_label() for drawn in one.lines] == ["grid", "sharp"]
+    assert one.get_xlim() == two.get_xlim()
+    assert not two.lines
+    draw([failed("sharp", 1e-3)])
+
+
+def test_command_writes_table_records_and_figure(no_runs, tmp_path, capsys):
+    assert main(["bench", "--quick", "--to", str(tmp_path / "new")]) == 0
+    written = {path.name for path in (tmp_path / "new").iterdir()}
+    assert written == {"benchmark.csv", "benchmark.md", "benchmark.png", "benchmark.pdf"}
+    with (tmp_path / "new" / "benchmark.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["scene"] for row in rows} == {"one-wave", "two-waves", "rough-32"}
+    assert float(rows[0]["error"]) == pytest.approx(1 / 64)
+    assert "adhesis bench --quick" in (tmp_path / "new" / "benchmark.md").read_text()
+    assert "How the cost of sharp grows" not in capsys.readouterr().out
+
+
+def test_full_benchmark_adds_the_growth(no_runs, tmp_path, capsys):
+    assert main(["bench", "--to", str(tmp_path)]) == 0
+    assert "m = 10 … 10000, γ = 0.01" in capsys.readouterr().out
+    assert "### How the cost of sharp grows" in (tmp_path / "benchmark.md").read_text()
+    assert len(growth()) == len(GROWTH)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--budget", "0"], "--budget is 0.0: it must be positive"),
+        (["--to", "{file}"], "--to is"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_is_measured(arguments, told, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    words = [word.format(file=tmp_path / "file") for word in arguments]
+    assert main(["bench", *words]) == 2
+    assert told in capsys.readouterr().err

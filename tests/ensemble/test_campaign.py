@@ -1,0 +1,249 @@
+"""Campaign files: what is read, what is refused and how, and how two compare."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ensemble.campaign.compare import compare
+from ensemble.campaign.file import load_campaign, parse_campaign
+from ensemble.campaign.tables import TABLES
+from ensemble.errors import InputError
+from ensemble.task.compute import make_problem
+from tests.support.campaign_support import ROOT, campaign_text
+
+
+def refused(text: str) -> str:
+    """Return the sentence with which a campaign is refused."""
+    with pytest.raises(InputError) as caught:
+        parse_campaign(text, "c.toml")
+    sentence = str(caught.value)
+    assert "\n" not in sentence
+    return sentence
+
+
+def test_values_units_and_defaults():
+    campaign = parse_campaign(campaign_text(young="1000000"))
+    assert campaign.material.young == 1e6
+    assert isinstance(campaign.material.young, float)
+    assert campaign.sweep.hurst == (0.7, 0.8)
+    assert campaign.solver.accuracy == 1e-3
+    assert campaign.solver.time_limit is None
+    assert campaign.profile.normalisation == {"h_rms": 1e-6}
+    assert campaign.task_count == 8
+
+
+def test_the_documentation_describes_every_key_and_no_other():
+    text = (ROOT / "docs" / "campaign-file.md").read_text()
+    for name, table in TABLES.items():
+        section = text.split(f"## `[{name}]`")[1].split("\n## ")[0]
+        described = re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)
+        assert described == [f.name for f in dataclasses.fields(table)]
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.toml")), ids=lambda p: p.name)
+def test_the_campaigns_that_come_along_are_sound(path):
+    campaign = load_campaign(path)
+    make_problem(campaign, campaign.tasks()[0])
+
+
+BAD_VALUES = [
+    ("period", "-1e-3"),
+    ("period", "0.0"),
+    ("period", "nan"),
+    ("period", "inf"),
+    ("period", "true"),
+    ("period", '"1e-3"'),
+    ("period", "[1e-3]"),
+    ("n0", "0"),
+    ("n0", "1.0"),
+    ("n0", "true"),
+    ("ratio", "-3"),
+    ("h_rms", "0"),
+    ("h_rms", "-1e-6"),
+    ("young", "0"),
+    ("poisson", "0.6"),
+    ("poisson", "-1"),
+    ("hurst", "0.7"),
+    ("hurst", "[]"),
+    ("hurst", "[0.7, 1.0]"),
+    ("hurst", "[0.0]"),
+    ("hurst", "[0.7, 0.70]"),
+    ("hurst", "[true]"),
+    ("hurst", "[nan]"),
+    ("work_of_adhesion", "[-0.01]"),
+    ("work_of_adhesion", "[0.01, 0.01]"),
+    ("work_of_adhesion", "[0.0, -0.0]"),
+    ("realisations", "0"),
+    ("realisations", "2.5"),
+    ("realisations", "9999999999999"),
+    ("seed", "-1"),
+    ("max_penetration", "1"),
+    ("max_penetration", "0"),
+    ("load_steps", "0"),
+    ("unloading_until", "0"),
+    ("unloading_until", "-1e9"),
+    ("method", '"fast"'),
+    ("method", "3"),
+    ("nodes_per_wave", "1"),
+    ("jumps", "0"),
+]
+
+
+@pytest.mark.parametrize(("key", "value"), BAD_VALUES)
+def test_bad_values_are_named_with_their_rule(key, value):
+    sentence = refused(campaign_text(**{key: value}))
+    assert re.match(rf"c\.toml: \[\w+\] {key} is .+: it must be ", sentence), sentence
+
+
+def test_a_number_of_any_length_is_refused_in_one_short_sentence():
+    assert len(refused(campaign_text(realisations="9" * 400))) < 300
+    assert len(refused(campaign_text(young="1" + "0" * 400))) < 300
+    refused(campaign_text(seed="9" * 5000))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (campaign_text().replace("period =", "periode ="), "periode is unknown"),
+        (campaign_text() + "\n[extra]\nx = 1\n", "'extra' is unknown"),
+        (campaign_text().replace("n0", '"a\\nb"'), "unknown"),
+        ("profile = 3\n", "profile is 3: it must be a table"),
+        (campaign_text().replace("period = 1e-3", ""), "[profile] period is missing"),
+        (campaign_text().replace("h_rms = 1e-6", ""), "none of h_rms, m2 and c0"),
+        (campaign_text().replace("h_rms = 1e-6", "h_rms = 1e-6\nm2 = 0.1"), "h_rms and m2"),
+        ("[profile\n", "is not valid TOML"),
+        ("x = " + "[" * 5000, "is not valid TOML"),
+        (campaign_text(ratio="900000", n0="2"), "n0 · ratio is 1800000"),
+        (campaign_text(realisations="2000000000"), "tasks: at most"),
+        (campaign_text(load_steps="100000", unloading_until="-1000"), "unloading curve has"),
+        ("# " + "x" * 70_000, "bytes"),
+        ("", "[profile] period is missing"),
+    ],
+)
+def test_bad_files_are_refused_in_one_sentence(text, words):
+    assert words in refused(text)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        load_campaign(tmp_path / "none.toml")
+    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+        load_campaign(tmp_path)
+    binary = tmp_path / "b.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not UTF-8"):
+        load_campaign(binary)
+
+
+def test_equal_by_meaning_not_by_text():
+    one = parse_campaign(campaign_text())
+    two = parse_campaign("# a comment\n" + campaign_text(hurst="[0.80, 0.7]", period="0.001"))
+    difference = compare(one, two)
+    assert not difference.grown
+    assert not difference.other
+    assert [str(t) for t in one.tasks()] == [str(t) for t in two.tasks()]
+
+
+def test_the_time_limit_may_change():
+    one = parse_campaign(campaign_text())
+    two = parse_campaign(campaign_text(method='"grid"\ntime_limit = 3'))
+    assert compare(one, two) == compare(one, one)
+
+
+def test_growth_and_other_changes_are_told_apart():
+    old = parse_campaign(campaign_text())
+    grown = parse_campaign(
+        campaign_text(
+            hurst="[0.9, 0.7, 0.8]", work_of_adhesion="[0.01, 0.04, 0.07]", realisations="3"
+        )
+    )
+    difference = compare(old, grown)
+    assert set(difference.grown) == {
+        "sweep.hurst",
+        "sweep.work_of_adhesion",
+        "sweep.realisations",
+    }
+    assert not difference.other
+    # The other way round nothing grew: there is no file without the rows it holds.
+    assert len(compare(grown, old).other) == 3
+    changed = compare(old, parse_campaign(campaign_text(load_steps="5", seed="6")))
+    assert changed.other == (
+        "sweep.seed is 6 here and 5 there",
+        "cycle.load_steps is 5 here and 4 there",
+    )
+
+
+def test_the_same_profile_across_work_of_adhesion_and_phases_across_hurst():
+    tasks = parse_campaign(campaign_text(realisations="3")).tasks()
+    seeds = {
+        t.realisation: {u.seed for u in tasks if u.realisation == t.realisation} for t in tasks
+    }
+    assert all(len(s) == 1 for s in seeds.values())
+    assert len(set.union(*seeds.values())) == 3
+    assert all(0 <= t.seed < 2**53 for t in tasks)
+    # A campaign that grows keeps the seeds it had.
+    more = {t.realisation: t.seed for t in parse_campaign(campaign_text(realisations="9")).tasks()}
+    assert all(more[t.realisation] == t.seed for t in tasks)
+
+
+def test_seeds_are_a_promise():
+    """Written down: a release that changes them would break every campaign that is to grow."""
+    tasks = parse_campaign(campaign_text(seed="0")).tasks()
+    assert [t.seed for t in tasks[:2]] == [4232842298785526, 2383740928328724]
+
+
+def test_penetration_axes():
+    campaign = parse_campaign(campaign_text())
+    np.testing.assert_array_equal(campaign.loading_penetration, 0.6 * np.arange(5) / 4)
+    axis = campaign.unloading_penetration
+    assert axis[0] == 0.6
+    assert axis[-1] == pytest.approx(-3)
+    np.testing.assert_allclose(np.diff(axis), -0.15)
+
+
+def complaint(text: str) -> str:
+    """Return the sentence with which a campaign is refused, or nothing."""
+    try:
+        parse_campaign(text, "c.toml")
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+PLAIN = st.one_of(
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.sampled_from(['""', '"x"', "[]", "[[1]]", "{}", "1979-05-27", "0.5", "3", "[0.5]"]),
+)
+KEYS = [line.split(" = ")[0] for line in campaign_text().splitlines() if " = " in line]
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.dictionaries(st.sampled_from(KEYS), PLAIN, min_size=1, max_size=3))
+def test_any_value_is_read_or_refused_in_one_sentence(changes):
+    def spelt(value: object) -> str:
+        return str(value).lower() if isinstance(value, bool | float) else str(value)
+
+    text = campaign_text(**{key: spelt(value) for key, value in changes.items()})
+    sentence = complaint(text)
+    assert "\n" not in sentence
+    assert len(sentence) < 400
+    if not sentence:
+        assert parse_campaign(text) == parse_campaign(text)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_any_damage_to_the_text_is_read_or_refused_in_one_sentence(data):
+    text = campaign_text()
+    start = data.draw(st.integers(0, len(text)))
+    stop = data.draw(st.integers(start, min(len(text), start + 20)))
+    text = text[:start] + data.draw(st.text(max_size=8)) + text[stop:]
+    assert "\n" not in complaint(text)

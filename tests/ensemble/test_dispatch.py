@@ -1,0 +1,334 @@
+"""Hand-out: order, balance, failures and stops, with workers that are simulated."""
+
+from __future__ import annotations
+
+import heapq
+import random
+import threading
+import time
+
+import numpy as np
+import pytest
+from numba import njit
+
+from ensemble.run.dispatch import (
+    AHEAD,
+    MOST_AHEAD,
+    GivenUp,
+    Limits,
+    Master,
+    Outcome,
+    Overdue,
+    attempt,
+    work_alone,
+)
+from ensemble.run.schedule import Schedule
+
+
+class SimulatedRanks:
+    """A channel whose workers take simulated time; also the clock and the sleep of the master."""
+
+    rank = 0
+
+    def __init__(self, workers, seconds, *, halts=True, signal_at=None, message_time=20e-6):
+        self.size = workers + 1
+        self._seconds = seconds
+        self._halts = halts
+        self._message_time = message_time
+        self.now = 0.0
+        self.busy = 0.0
+        self._queue = {rank: [] for rank in range(1, workers + 1)}
+        self._ends: list[tuple[float, int, tuple]] = []
+        self._halted = False
+        self.looks = 0
+        self.answered: list[int] = []
+        if signal_at is not None:
+            heapq.heappush(self._ends, (signal_at, 1, ("stop", "SIGUSR1 received")))
+
+    def clock(self):
+        """Return the simulated time."""
+        return self.now
+
+    def sleep(self, seconds):
+        """Let simulated time pass."""
+        self.now += seconds
+
+    def send(self, to, message, *, urgent=False):
+        """Let the simulated worker act on a message."""
+        self.now += self._message_time
+        if message[0] == "dismissed":
+            heapq.heappush(self._ends, (self.now, to, ("goodbye",)))
+        elif message[0] == "halt":
+            self._halted = True
+            if self._halts:  # what is in flight is given up at the next load step
+                mine = [e for e in self._ends if e[1] == to and e[2][0] == "outcome"]
+                for entry in mine:
+                    self._ends.remove(entry)
+                    given_up = ("given up", entry[2][1].task)
+                    heapq.heappush(self._ends, (self.now + 0.1, to, given_up))
+                heapq.heapify(self._ends)
+        else:
+            task = message[1]
+            start = max([self.now, *(t for t, r, _ in self._queue[to])])
+            seconds = self._seconds[task]
+            self.busy += seconds
+            end = start + seconds
+            self._queue[to] = [(end, to, task)]
+            heapq.heappush(self._ends, (end, to, ("outcome", Outcome(task, to, seconds))))
+
+    def poll(self, *, urgent=False):
+        """Return what a simulated worker sent, if it is time."""
+        self.looks += 1
+        self.now += 1e-6
+        if self._ends and self._ends[0][0] <= self.now:
+            _, rank, message = heapq.heappop(self._ends)
+            self.now += self._message_time
+            if message[0] in ("outcome", "given up"):
+                task = message[1].task if message[0] == "outcome" else message[1]
+                self.answered.append(task)
+            return rank, message
+        return None
+
+
+def simulate(workers, seconds, groups=None, limits=None, kind=SimulatedRanks, **ranks):
+    tasks = list(range(len(seconds)))
+    group_of = groups or dict.fromkeys(tasks, 0)
+    schedule = Schedule(tasks, group_of, dict.fromkeys(set(group_of.values()), 1.0))
+    channel = kind(workers, seconds, **ranks)
+    collected: list[Outcome] = []
+    master = Master(
+        channel,
+        schedule,
+        group_of,
+        collected.append,
+        limits(channel) if limits else Limits(),
+        clock=channel.clock,
+        sleep=channel.sleep,
+    )
+    reason = master.run()
+    return channel, collected, reason, schedule
+
+
+def test_every_task_is_done_once():
+    channel, collected, reason, _ = simulate(7, [0.3] * 100)
+    assert reason is None
+    assert sorted(o.task for o in collected) == list(range(100))
+    assert channel.now < 1.05 * 0.3 * 15
+
+
+def test_more_workers_than_tasks():
+    _, collected, reason, _ = simulate(50, [1.0, 2.0])
+    assert (len(collected), reason) == (2, None)
+
+
+def test_a_thousand_workers_are_kept_busy():
+    """Times as a paper-scale campaign has them: groups 30 times apart, scattered by half."""
+    random.seed(3)
+    groups = {i: i % 9 for i in range(20_000)}
+    seconds = [(1 + 4 * groups[i]) * random.uniform(0.5, 1.5) for i in range(20_000)]
+    started = time.perf_counter()
+    channel, collected, _, _ = simulate(1000, seconds, groups)
+    assert len(collected) == 20_000
+    assert channel.now <= 1.05 * channel.busy / 1000 + max(seconds)
+    assert time.perf_counter() - started < 20
+
+
+def test_two_workers_end_together():
+    """The paper's campaign on two cores: 90 tasks, 9 groups."""
+    random.seed(1)
+    groups = {i: i // 10 for i in range(90)}
+    seconds = [(20 + 10 * groups[i]) * random.uniform(0.7, 1.3) for i in range(90)]
+    channel, _, _, _ = simulate(2, seconds, groups)
+    assert channel.now <= 1.05 * channel.busy / 2
+
+
+def test_short_tasks_are_queued_ahead():
+    channel, collected, _, _ = simulate(4, [2e-3] * 4000)
+    assert len(collected) == 4000
+    assert channel.now <= 1.15 * channel.busy / 4
+
+
+def test_tasks_of_no_time_do_not_wait_for_the_sleeping_master():
+    channel, collected, _, _ = simulate(2, [0.3e-3] * 4000)
+    assert sorted(o.task for o in collected) == list(range(4000))
+    assert channel.now <= 1.15 * channel.busy / 2
+
+
+def test_what_is_queued_is_short_and_never_behind_a_long_task():
+    """Groups a hundred times apart: a worker holds one long task, or some short ones."""
+    seconds = [1.0 if i % 20 == 0 else 0.01 for i in range(2000)]
+    groups = {i: int(seconds[i] == 1.0) for i in range(2000)}
+    held: dict[int, dict[int, float]] = {rank: {} for rank in (1, 2, 3)}
+    most = 0
+
+    class Watched(SimulatedRanks):
+        def send(self, to, message, *, urgent=False):
+            nonlocal most
+            super().send(to, message, urgent=urgent)
+            if message[0] == "task":
+                assert sum(held[to].values()) < 1.001 * AHEAD
+                held[to][message[1]] = self._seconds[message[1]]
+                most = max(most, len(held[to]))
+
+        def poll(self, *, urgent=False):
+            message = super().poll(urgent=urgent)
+            if message is not None and message[1][0] == "outcome":
+                del held[message[0]][message[1][1].task]
+            return message
+
+    channel = simulate(3, seconds, groups, kind=Watched)[0]
+    assert 1 < most <= MOST_AHEAD + 1
+    assert channel.now <= 1.02 * channel.busy / 3
+
+
+def test_an_idle_master_rarely_looks():
+    channel, _, _, _ = simulate(2, [60.0, 60.0])
+    assert channel.looks / channel.now < 250
+
+
+def test_the_longest_tasks_go_first_once_they_are_known():
+    group_of = {0: "short", 1: "short", 2: "long", 3: "long", 4: "new"}
+    schedule = Schedule(range(5), group_of, {"short": 3.0, "long": 2.0, "new": 1.0})
+    assert schedule.take() == 0  # the priors say so
+    schedule.measured("short", 1.0)
+    schedule.measured("long", 9.0)
+    assert schedule.take() == 2
+    assert schedule.estimate("new") == pytest.approx(10 / 5)
+    assert schedule.take(time_left=5.0) == 4
+    assert schedule.take(time_left=0.5) is None
+    assert schedule.seconds_waiting == pytest.approx(10.0)
+    assert [schedule.take(), schedule.take(), schedule.take()] == [3, 1, None]
+
+
+def test_a_signal_to_one_worker_stops_all():
+    channel, collected, reason, schedule = simulate(5, [10.0] * 50, signal_at=15.0)
+    assert reason == "SIGUSR1 received"
+    assert len(collected) == 5
+    assert channel.now < 15.5
+    assert len(channel.answered) == 10
+    assert schedule.waiting == 40
+
+
+def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
+    with pytest.raises(Overdue, match="5 tasks did not stop in time"):
+        simulate(
+            5,
+            [1000.0] * 50,
+            halts=False,
+            limits=lambda c: Limits(stop=lambda: "walltime" if c.now > 3 else None, grace=30.0),
+        )
+
+
+def test_tasks_that_would_not_end_in_time_stay_behind():
+    _, collected, reason, _ = simulate(
+        1, [10.0] * 20, limits=lambda c: Limits(time_left=lambda: 45 - c.now)
+    )
+    assert len(collected) == 4
+    assert reason == "no time left for another task"
+
+
+# ---------------------------------------------------------------- one process, one task
+
+
+def alone(compute, tasks=3, limits=None):
+    group_of = dict.fromkeys(range(tasks), 0)
+    outcomes: list[Outcome] = []
+    reason = work_alone(
+        Schedule(range(tasks), group_of, {0: 1.0}),
+        group_of,
+        compute,
+        lambda outcome: outcome,
+        outcomes.append,
+        limits or Limits(),
+    )
+    return outcomes, reason
+
+
+def test_a_task_that_raises_is_a_failure_and_the_rest_goes_on():
+    outcomes, reason = alone(lambda task, check: 1 // task)
+    assert reason is None
+    assert [o.error for o in outcomes] == [
+        "ZeroDivisionError: integer division or modulo by zero",
+        None,
+        None,
+    ]
+
+
+def test_a_task_that_hangs_meets_its_time_limit():
+    def compute(task, check):
+        while task == 1:
+            time.sleep(0.01)  # never calls check
+        return task
+
+    outcomes, _ = alone(compute, limits=Limits(task_seconds=0.3))
+    assert [o.error for o in outcomes] == [None, "longer than the time limit of 0.3 s", None]
+    assert outcomes[1].seconds < 2
+
+
+@njit
+def _sines(count):
+    """Compiled work that hands arrays back, and runs Python while it does."""
+    out = np.empty(4)
+    total = 0.0
+    for i in range(count):
+        total += np.sin(i)
+    out[:] = total
+    return out, out.copy()
+
+
+def test_a_task_in_compiled_code_meets_its_time_limit():
+    """The timer goes off in compiled code; its exception must not come where results are made."""
+    _sines(1)
+
+    def compute(task, check):
+        while True:
+            _sines(100_000)
+
+    outcomes, _ = alone(compute, limits=Limits(task_seconds=0.05))
+    assert [o.error for o in outcomes] == ["longer than the time limit of 0.05 s"] * 3
+
+
+def test_a_task_cannot_swallow_the_end_of_its_time():
+    def compute(task, check):
+        end = time.monotonic() + 5
+        while time.monotonic() < end:
+            try:
+                check()
+                time.sleep(0.01)
+            except Exception:
+                pass
+
+    outcomes, _ = alone(compute, tasks=1, limits=Limits(task_seconds=0.2))
+    assert outcomes[0].seconds < 2
+
+
+def test_a_stop_gives_up_the_task_in_progress():
+    stop = threading.Event()
+
+    def compute(task, check):
+        if task == 1:
+            stop.set()
+            while True:
+                time.sleep(0.01)
+        return task
+
+    limits = Limits(stop=lambda: "told to" if stop.is_set() else None)
+    outcomes, reason = alone(compute, limits=limits)
+    assert [o.task for o in outcomes] == [0]
+    assert reason == "told to"
+
+
+def test_attempts_work_in_a_thread_too():
+    """Where no timer can be set, the task's own checks remain."""
+    seen = []
+
+    def run():
+        try:
+            attempt(lambda task, check: check(), 0, 0, lambda: True, None)
+        except GivenUp:
+            seen.append("given up")
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert seen == ["given up"]

@@ -1,0 +1,118 @@
+"""`adhesis doctor`: what it says is what was tried."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ensemble import versions
+from ensemble.doctor import examine as doctor
+from ensemble.run import launch
+
+
+def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
+    code = "import sys; from ensemble.command import main; sys.exit(main())"
+    return subprocess.run(
+        [sys.executable, "-c", code, "doctor", *options],
+        env=launch.launch_environment(2) | env,
+        cwd=Path(__file__).parent.parent.parent,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def findings() -> dict[str, Any]:
+    done = run_doctor("--json")
+    found: dict[str, Any] = json.loads(done.stdout)
+    assert done.returncode == (0 if found["usable"] else 1), done.stderr
+    return found
+
+
+def test_this_installation_is_usable(findings: dict[str, Any]) -> None:
+    failed = [check for check in findings["checks"] if check["needed"] and not check["ok"]]
+    assert findings["usable"], failed
+
+
+def test_parallel_hdf5_means_that_ranks_wrote_a_file(findings: dict[str, Any]) -> None:
+    written = [c["ok"] for c in findings["checks"] if c["name"] == "mpio writing available"]
+    if "parallel" not in findings["versions"]["hdf5"]:
+        assert written == []
+        assert findings["writer"] == "rank 0"
+    else:
+        assert written == [True]
+        assert findings["writer"] == "mpio"
+
+
+def test_text_names_the_writer_and_every_library() -> None:
+    text = run_doctor().stdout
+    for word in ("MPI ", "mpirun ", "HDF5 ", "FFTW ", "numba ", "cores ", "writer "):
+        assert f"\n{word}" in text
+
+
+def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path: Path) -> None:
+    if launch.launcher() is None:
+        pytest.skip("no mpirun here")
+    # As the other MPI's mpirun does to these ranks: two processes, each alone in its world.
+    wrong = tmp_path / "mpirun"
+    wrong.write_text('#!/bin/sh\nshift 2\n"$@" & "$@"\nwait\n')
+    wrong.chmod(0o755)
+    done = run_doctor("--json", MPIRUN=str(wrong))
+    found = json.loads(done.stdout)
+    assert done.returncode == 1
+    (check,) = [check for check in found["checks"] if check["name"] == "ranks"]
+    assert not check["ok"]
+    assert "another MPI" in check["text"]
+    assert found["writer"] == "rank 0"
+
+
+def test_a_launcher_that_hangs_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    hanging = tmp_path / "mpirun"
+    hanging.write_text('#!/bin/sh\n[ "$1" = --version ] || exec sleep 600\n')
+    hanging.chmod(0o755)
+    monkeypatch.setattr(doctor, "_TIME_LIMIT", 5.0)
+    monkeypatch.setenv("MPIRUN", str(hanging))
+    diagnosis = doctor.examine()
+    assert not diagnosis.usable
+    assert any("did not end within" in check.text for check in diagnosis.checks)
+
+
+def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any]) -> None:
+    nested = run_doctor(
+        "--json", OMPI_COMM_WORLD_SIZE="4", OMPI_MCA_ess="pmi", PMIX_RANK="0", PMI_RANK="0"
+    )
+    assert json.loads(nested.stdout)["checks"] == findings["checks"]
+
+
+def test_unwritable_folder_is_one_sentence() -> None:
+    done = run_doctor("--in", "/nowhere")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "/nowhere" in done.stderr
+
+
+def test_versions_are_texts_and_do_not_start_mpi() -> None:
+    code = (
+        "import json, sys; from ensemble.versions import installed; v = installed(); "
+        "print(json.dumps([v, 'mpi4py.MPI' in sys.modules]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    texts, loaded = json.loads(done.stdout)
+    assert {"mpi", "hdf5", "fftw", "python", "numpy"} <= set(texts)
+    assert all(isinstance(text, str) and text for text in texts.values())
+    if not loaded:
+        assert texts["mpi"] == "not loaded"
+
+
+def test_a_results_file_tells_the_versions_that_doctor_tells(findings: dict[str, Any]) -> None:
+    written, told = versions.versions(), findings["versions"]
+    assert written["adhesis_version"] == told["adhesis"]
+    for name in ("python", "numpy", "hdf5", "fftw"):
+        assert written[name] == told[name]

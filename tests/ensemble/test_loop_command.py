@@ -1,0 +1,318 @@
+"""``adhesis loop``: what it writes, and what it refuses before it computes or writes anything."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import ensemble.command.loop as loop_command
+from ensemble.command import main
+from solver.references import ExactWave, SingleWave
+
+PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
+MODULUS = 1e6 / 0.75
+WAVE = SingleWave.with_alpha(ALPHA, AMPLITUDE, PERIOD, MODULUS)
+GAMMA = WAVE.work_of_adhesion
+
+STATE_KEYS = {"branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy"}
+ONCE_KEYS = {"h_max", "h_rms", "m2", "loss", "loss_dimensionless", "loss_from_drops", "seconds"}
+
+
+@pytest.fixture
+def wave_file(tmp_path):
+    """Heights of one wave on 16 nodes, with a mean that must not matter."""
+    path = tmp_path / "wave.npy"
+    np.save(path, 3e-6 + AMPLITUDE * np.cos(2 * np.pi * np.arange(16) / 16))
+    return path
+
+
+@pytest.fixture
+def exact_method(monkeypatch):
+    """Put the exact single wave in the place of the numerical methods."""
+    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
+
+
+def run(*words) -> int:
+    return main(["loop", *(str(word) for word in words)])
+
+
+def wave_words(path, *more):
+    return ("--heights", path, "--period", PERIOD, "--work-of-adhesion", GAMMA, *more)
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, capsys):
+    out = tmp_path / "loop.json"
+    assert run(*wave_words(wave_file, "--max-penetration", 0.8, "--json", out)) == 0
+    data = json.loads(out.read_text())
+    assert data.keys() >= ONCE_KEYS | STATE_KEYS | {"method", "jumps", "states"}
+    assert data["h_max"] == pytest.approx(AMPLITUDE, rel=1e-6)
+    assert data["h_rms"] == pytest.approx(AMPLITUDE / np.sqrt(2), rel=1e-6)
+    assert data["m2"] == pytest.approx((2 * np.pi * AMPLITUDE / PERIOD) ** 2 / 2, rel=1e-6)
+    assert data["loss_from_drops"] == pytest.approx(WAVE.loop.loss, rel=1e-6)
+    assert data["loss"] == pytest.approx(WAVE.loop.loss, rel=1e-4)
+    assert data["loss_dimensionless"] == pytest.approx(1.2018194e-2, rel=1e-4)
+    assert data["method"] == "exact wave"
+    assert [j["kind"] for j in data["jumps"]] == ["snap-in", "pull-off"]
+    assert [j["branch"] for j in data["jumps"]] == ["loading", "unloading"]
+    assert data["jumps"][1]["penetration"] == pytest.approx(1 - 1.25204901072, abs=1e-6)
+    drops = [j["energy_drop"] for j in data["jumps"]]
+    assert drops == pytest.approx([WAVE.loop.touch_drop, WAVE.loop.fold_drop], rel=1e-6)
+    # The same states, as objects and as columns.
+    assert len(data["states"]) == len(data["penetration"]) > 40
+    for key in STATE_KEYS:
+        assert [state[key] for state in data["states"]] == data[key]
+    loss = np.trapezoid(data["mean_stress"], data["penetration"]) * data["h_max"]
+    assert data["loss"] == pytest.approx(loss, rel=1e-12)
+    assert set(data["branch"]) == {"loading", "unloading"}
+    text = capsys.readouterr()
+    assert f"{data['loss']:.6g} J/m²" in text.out
+    assert str(out) in text.out
+    assert "unloading" in text.err
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_fields_are_those_of_the_chosen_penetrations(wave_file, tmp_path):
+    out = tmp_path / "fields.npz"
+    words = ("--max-penetration", 0.8, "--load-steps", 7, "--fields", out, "--field-nodes", 512)
+    assert run(*wave_words(wave_file, *words, "--field-penetrations", 0.33, 0.8, -0.1, -0.9)) == 0
+    data = np.load(out)
+    assert list(data["branch"]) == ["loading"] * 4 + ["unloading"] * 4
+    assert list(data["penetration"]) == [0.33, 0.8, -0.1, -0.9] * 2
+    assert data["stress"].shape == data["gap"].shape == (8, 512)
+    assert data["separation"] == pytest.approx(AMPLITUDE * (1 - data["penetration"]), rel=1e-6)
+    in_contact = ~np.isnan(data["edges"][:, 0, 0])
+    # Loading: nothing before first touch. Unloading: still stuck at -0.1, long off at -0.9.
+    assert list(in_contact) == [True, True, False, False, True, True, True, False]
+    for i in np.flatnonzero(in_contact):
+        width = np.ptp(data["edges"][i, 0])
+        exact = 2 * WAVE.half_width(float(data["separation"][i]))
+        assert width == pytest.approx(exact, rel=1e-5)
+        # The profile's crest is at x = 0: compare σ and t where no edge is near.
+        x = np.array([0, 128, 256])
+        a = exact / 2
+        assert data["stress"][i, x] == pytest.approx(
+            WAVE.stress(data["x"][x], a), rel=1e-4, abs=1e-12
+        )
+        assert data["gap"][i, x] == pytest.approx(WAVE.gap(data["x"][x], a), rel=1e-4, abs=1e-15)
+    assert data["gap"].mean(axis=1) == pytest.approx(data["separation"], rel=2e-3)
+    assert np.all(data["stress"][~in_contact] == 0)
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_a_csv_is_the_same_as_a_npy(wave_file, tmp_path):
+    heights = np.load(wave_file)
+    column, row = tmp_path / "column.csv", tmp_path / "row.csv"
+    with column.open("w", newline="") as stream:
+        stream.write("# heights in m\n")
+        csv.writer(stream).writerows([[repr(float(h))] for h in heights])
+    row.write_text(",".join(repr(float(h)) for h in heights) + "\n")
+    documents = []
+    for i, path in enumerate((wave_file, column, row)):
+        out = tmp_path / f"{i}.json"
+        assert run(*wave_words(path, "--load-steps", 5, "--json", out, "--quiet")) == 0
+        documents.append(json.loads(out.read_text()))
+        del documents[-1]["seconds"]
+    assert documents[0] == documents[1] == documents[2]
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_an_existing_file_is_replaced_whole_and_a_failure_leaves_it(
+    wave_file, tmp_path, monkeypatch
+):
+    out = tmp_path / "loop.json"
+    out.write_text("old")
+
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop_command, "run_loop", stop)
+    with pytest.raises(KeyboardInterrupt):
+        run(*wave_words(wave_file, "--json", out))
+    assert out.read_text() == "old"
+    monkeypatch.undo()
+    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
+    assert run(*wave_words(wave_file, "--json", out)) == 0
+    assert json.loads(out.read_text())["patches"][0] == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["loop.json", "wave.npy"]
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_no_file_appears_if_the_fields_cannot_be_had(wave_file, tmp_path, monkeypatch):
+    def broken(self, state, n):
+        raise FloatingPointError("no fields")
+
+    monkeypatch.setattr(ExactWave, "fields", broken)
+    out, fields = tmp_path / "loop.json", tmp_path / "fields.npz"
+    with pytest.raises(FloatingPointError):
+        run(*wave_words(wave_file, "--load-steps", 2, "--json", out, "--fields", fields))
+    assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
+
+
+@pytest.mark.parametrize("method", ["grid", "sharp"])
+def test_methods_agree_on_the_fields_at_the_turning_point(method, wave_file, tmp_path):
+    """Both branches hold the same state there, and it is the exact one."""
+    out = tmp_path / "fields.npz"
+    words = ("--max-penetration", 0.5, "--load-steps", 2, "--method", method, "--fields", out)
+    assert run(*wave_words(wave_file, *words, "--field-penetrations", 0.5, "--quiet")) == 0
+    data = np.load(out)
+    assert data["stress"][0] == pytest.approx(data["stress"][1])
+    a = WAVE.half_width(0.5 * AMPLITUDE)
+    assert np.ptp(data["edges"][0, 0]) / 2 == pytest.approx(a, abs=PERIOD / 1024)
+    crest = float(WAVE.stress(0.0, a))
+    assert data["stress"][0, 0] == pytest.approx(crest, rel=1e-2)
+    assert data["gap"][0].mean() == pytest.approx(0.5 * AMPLITUDE, rel=1e-2)
+
+
+def test_self_affine_profile_through_a_real_method(tmp_path, capsys):
+    out = tmp_path / "loop.json"
+    words = ("--hurst", 0.8, "--seed", 3, "--n0", 1, "--ratio", 4, "--load-steps", 4)
+    more = ("--max-penetration", 0.4, "--work-of-adhesion", 0.04, "--accuracy", 0.02)
+    assert run(*words, *more, "--nodes-per-wave", 64, "--json", out, "--quiet") == 0
+    data = json.loads(out.read_text())
+    assert data["h_rms"] == pytest.approx(1e-6, rel=1e-12)
+    assert data["period"] == pytest.approx(2e-3 * np.pi)
+    assert data["method"] == "grid"
+    assert data["loss"] > 0
+    assert data["patches"][-1] == 0
+    assert abs(data["audit_residual"]) < 0.05
+    assert capsys.readouterr().err == ""
+
+
+# ---------------------------------------------------------------------- refusals
+
+OK = ("--hurst", 0.8)
+
+
+def refused(capsys, *words) -> str:
+    """One clear sentence on stderr, nothing on stdout, exit code 2."""
+    assert run(*words) == 2
+    text = capsys.readouterr()
+    assert text.out == ""
+    (line,) = text.err.splitlines()
+    return line.removeprefix("adhesis loop: ")
+
+
+@pytest.fixture
+def no_computing(monkeypatch):
+    """Fail the test if a loop is started."""
+
+    def start(*_, **__):
+        raise AssertionError("bad input reached the computation")
+
+    monkeypatch.setattr(loop_command, "run_loop", start)
+
+
+@pytest.mark.usefixtures("no_computing")
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ((), "give either --heights or --hurst: neither is given"),
+        (("--hurst", 1.0), "hurst is 1.0: it must lie between 0 and 1"),
+        (("--hurst", -0.2), "hurst is -0.2: it must lie"),
+        (("--hurst", "nan"), "hurst is nan: it must lie"),
+        ((*OK, "--period", -1e-3), "period is -0.001: it must be positive"),
+        ((*OK, "--period", 0), "period is 0.0: it must be positive"),
+        ((*OK, "--n0", 0), "n0 is 0: it must be a whole number of at least 1"),
+        ((*OK, "--ratio", -2), "ratio is -2: it must be"),
+        ((*OK, "--seed", -1), "seed is -1: it must be"),
+        ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "give exactly one of h_rms, m2 and c0"),
+        ((*OK, "--h-rms=-1e-6"), "h_rms is -1e-06: it must be finite and not negative"),
+        ((*OK, "--h-rms", 0), "the profile is flat"),
+        ((*OK, "--amplitudes", "gauss"), "amplitudes is 'gauss': it must be 'deterministic' or"),
+        ((*OK, "--work-of-adhesion", -0.01), "work_of_adhesion is -0.01: it must be"),
+        ((*OK, "--work-of-adhesion", "inf"), "work_of_adhesion is inf: it must be finite"),
+        ((*OK, "--young", 0), "young is 0.0: it must be positive"),
+        ((*OK, "--poisson", 0.6), "poisson is 0.6: it must lie in"),
+        ((*OK, "--max-penetration", 1), "max_penetration is 1.0: it must lie between 0 and 1"),
+        ((*OK, "--max-penetration", 0), "max_penetration is 0.0: it must lie between"),
+        ((*OK, "--load-steps", 0), "load_steps is 0: it must be a whole number of at least 1"),
+        ((*OK, "--method", "magic"), "method is 'magic': it must be one of grid"),
+        ((*OK, "--accuracy", 0), "accuracy is 0.0: it must lie between 0 and 1"),
+        ((*OK, "--nodes-per-wave", 1), "nodes_per_wave is 1: it must be"),
+        ((*OK, "--field-penetrations", 0.5), "--field-penetrations needs --fields"),
+    ],
+)
+def test_bad_values_are_refused_with_value_and_rule(words, sentence, capsys):
+    assert refused(capsys, *words).startswith(sentence)
+
+
+@pytest.mark.usefixtures("no_computing")
+def test_grid_too_coarse_for_the_shortest_wave_names_it(capsys):
+    line = refused(capsys, *OK, "--nodes-per-wave", 1)
+    assert "too coarse for the shortest wave" in line
+
+
+@pytest.mark.usefixtures("no_computing")
+def test_heights_take_a_period_and_no_spectrum(wave_file, capsys):
+    assert "--heights needs --period" in refused(capsys, "--heights", wave_file)
+    assert "both are given" in refused(capsys, *OK, "--heights", wave_file, "--period", 1)
+    line = refused(capsys, *wave_words(wave_file, "--seed", 4))
+    assert line.startswith("--seed belongs to --hurst")
+    line = refused(capsys, "--heights", wave_file, "--period", -1)
+    assert line.startswith("period is -1.0: it must be positive")
+
+
+@pytest.mark.usefixtures("no_computing")
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("nan.npy", [1.0, np.nan, 2.0, 3.0], "heights[1] is nan: every height must be a finite"),
+        ("inf.npy", [1.0, 2.0, np.inf, 3.0], "heights[2] is inf: every height must be a finite"),
+        ("one.npy", [1.0], "heights hold 1 value(s): at least 3 are needed"),
+        ("none.npy", np.empty(0), "heights hold 0 value(s): at least 3 are needed"),
+        ("scalar.npy", 1.0, "heights hold 1 value(s): at least 3 are needed"),
+        ("flat.npy", [2.0, 2.0, 2.0, 2.0], "the profile is flat"),
+        ("grid.npy", np.ones((4, 4)), "holds 4 × 4 numbers: it must hold one column"),
+        ("text.npy", np.array(["a", "b", "c"]), "heights are real numbers"),
+        ("complex.npy", np.ones(4) * 1j, "heights are real numbers"),
+        ("object.npy", np.array([{}, 1, 2], dtype=object), "is not a table of numbers"),
+        ("nan.csv", "1\nnan\n2\n3\n", "heights[1] is nan: every height must be a finite"),
+        ("one.csv", "1.0\n", "heights hold 1 value(s): at least 3 are needed"),
+        ("empty.csv", "", "heights hold 0 value(s): at least 3 are needed"),
+        ("two.csv", "0,1\n1,2\n2,1\n3,0\n", "holds 4 × 2 numbers: it must hold one column"),
+        ("words.csv", "height\n1\n2\n", "is not a table of numbers"),
+        ("ragged.csv", "1\n1,2\n3\n", "is not a table of numbers: its lines differ"),
+        ("binary.csv", b"\xff\xfe\x00\x01", "is not a table of numbers"),
+        ("junk.npy", b"junk", "is not a table of numbers"),
+        ("heights.txt", "1\n2\n3\n", "it must be a .npy or a .csv file"),
+    ],
+)
+def test_files_that_are_not_one_period_of_heights_are_refused(
+    name, content, sentence, tmp_path, capsys
+):
+    path = tmp_path / name
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif isinstance(content, str):
+        path.write_text(content)
+    else:
+        np.save(path, np.asarray(content), allow_pickle=True)
+    assert sentence in refused(capsys, "--heights", path, "--period", 1e-3)
+
+
+@pytest.mark.usefixtures("no_computing")
+def test_a_missing_file_and_unwritable_places_are_refused(wave_file, tmp_path, capsys):
+    line = refused(capsys, *wave_words(tmp_path / "no.npy"))
+    assert "no.npy: No such file" in line
+    for place in (tmp_path / "no" / "o.json", tmp_path, "/proc/o.json"):
+        line = refused(capsys, *wave_words(wave_file, "--json", place))
+        assert line.startswith(f"cannot write {place}: ")
+    line = refused(capsys, *wave_words(wave_file, "--fields", tmp_path / "no" / "f.npz"))
+    assert "there is no directory" in line
+    line = refused(capsys, *wave_words(wave_file, "--fields", tmp_path / "f.txt"))
+    assert "must end in .npz" in line
+    words = ("--fields", tmp_path / "f.npz", "--max-penetration", 0.5)
+    line = refused(capsys, *wave_words(wave_file, *words, "--field-penetrations", 0.2, 0.6))
+    assert "holds 0.6: the loop goes no deeper than 0.5" in line
+    line = refused(capsys, *wave_words(wave_file, *words, "--field-nodes", 1))
+    assert "1 nodes are too few" in line
+    assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_a_device_is_written_in_place(wave_file):
+    assert run(*wave_words(wave_file, "--load-steps", 2, "--json", "/dev/null")) == 0

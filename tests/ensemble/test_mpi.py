@@ -1,0 +1,279 @@
+"""Campaigns under mpirun: the same bits for any number of ranks, and what happens when some die."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from ensemble.results.schema import DONE
+from ensemble.results.store import Results
+from tests.support.campaign_support import (
+    MPIRUN,
+    ROOT,
+    adhesis,
+    differences,
+    done_rows,
+    environment,
+    kill_all,
+    ranks_of,
+    start,
+    wait_until,
+    write_campaign,
+)
+
+pytestmark = pytest.mark.skipif(shutil.which(MPIRUN) is None, reason="there is no mpirun here")
+
+
+@pytest.fixture
+def whole(tmp_path):
+    """The fake campaign, undisturbed, by one process."""
+    out = tmp_path / "whole.h5"
+    assert adhesis("run", write_campaign(tmp_path), "--out", out, fake="").returncode == 0
+    return out
+
+
+def test_real_loops_have_the_same_bits_for_any_number_of_ranks(tmp_path):
+    path = write_campaign(tmp_path)
+    for ranks in (1, 2, 3, 4):
+        process = adhesis("run", path, "--out", tmp_path / f"{ranks}.h5", ranks=ranks)
+        assert process.returncode == 0, process.stderr
+    for ranks in (2, 3, 4):
+        assert differences(tmp_path / "1.h5", tmp_path / f"{ranks}.h5") == []
+
+
+def test_more_ranks_than_tasks(tmp_path, whole):
+    path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
+    process = adhesis("run", path, "--out", tmp_path / "r.h5", ranks=4, fake="")
+    assert process.returncode == 0
+    assert "2 of 2 tasks done; 2 computed" in process.stderr
+
+
+@pytest.mark.parametrize("victim", ["worker", "master", "all"])
+def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
+    path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
+    process = start("run", path, "--out", out, ranks=3, fake="step=0.05")
+    wait_until(lambda: done_rows(out) >= 3)
+    if victim == "all":
+        kill_all(process)
+    else:
+        ranks = ranks_of(process.pid)
+        os.kill(ranks[-1] if victim == "worker" else ranks[0], signal.SIGKILL)
+        process.wait(timeout=20)
+        assert process.returncode not in (0, 1, 2, 75)
+    process.communicate()
+    kept = done_rows(out)
+    resumed = adhesis("run", path, "--out", out, ranks=3, fake=f"log={log}")
+    assert resumed.returncode == 0, resumed.stderr
+    assert differences(out, whole) == []
+    # Ranks that outlived their launcher by a moment may have finished a row meanwhile.
+    assert 8 - kept - 2 <= len(log.read_text().splitlines()) <= 8 - kept
+
+
+KILLS = int(os.environ.get("ADHESIS_KILLS", "0"))
+
+
+@pytest.mark.skipif(
+    KILLS == 0, reason="long: ADHESIS_KILLS=20 kills each of three victims 20 times"
+)
+@pytest.mark.parametrize("victim", ["worker", "master", "all"])
+def test_kills_at_random_moments(tmp_path, victim):
+    """The file opens after each kill, nothing done is computed again, and all bits are the same."""
+    random.seed(victim)
+    path, out, whole = write_campaign(tmp_path, realisations="4"), tmp_path / "r.h5", tmp_path / "w"
+    assert adhesis("run", path, "--out", whole, fake="").returncode == 0
+    killed = 0
+    while killed < KILLS:
+        done = rows_done(out)
+        log = tmp_path / f"log{killed}"
+        log.touch()
+        process = start("run", path, "--out", out, ranks=3, fake=f"step=0.06 log={log}")
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=random.uniform(0.3, 4.0))
+        ranks = ranks_of(process.pid)
+        if process.poll() is None and len(ranks) == 3:
+            killed += 1
+            if victim == "all":
+                kill_all(process)
+            else:
+                os.kill(ranks[-1] if victim == "worker" else ranks[0], signal.SIGKILL)
+        process.communicate(timeout=30)
+        assert not done & set(log.read_text().split())
+        if process.returncode == 0:
+            assert differences(out, whole) == []
+            out.unlink()
+    assert adhesis("run", path, "--out", out, ranks=3, fake="").returncode == 0
+    assert differences(out, whole) == []
+
+
+def rows_done(path) -> set[str]:
+    """Return the done tasks of a results file as the fake task's log has them."""
+    if not path.exists():
+        return set()
+    with Results(path) as results:
+        return {
+            f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}"
+            for task, status in zip(results.tasks(), results.status(), strict=True)
+            if status == DONE
+        }
+
+
+@pytest.mark.parametrize("to", ["launcher", "one rank"])
+def test_a_signal_stops_every_rank_within_a_load_step(tmp_path, whole, to):
+    path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
+    process = start("run", path, "--out", out, ranks=3, fake="step=0.1 hang=0.8:0.04:1")
+    wait_until(lambda: done_rows(out) >= 2)
+    asked = time.monotonic()
+    os.kill(process.pid if to == "launcher" else ranks_of(process.pid)[-1], signal.SIGUSR1)
+    _, errors = process.communicate(timeout=20)
+    assert time.monotonic() - asked < 5
+    assert process.returncode == 75, errors
+    assert "stopped early: SIGUSR1 received" in errors
+    kept = done_rows(out)
+    resumed = adhesis("run", path, "--out", out, ranks=2, fake=f"log={log}")
+    assert resumed.returncode == 0, resumed.stderr
+    assert len(log.read_text().splitlines()) == 8 - kept
+    assert differences(out, whole) == []
+
+
+def test_an_error_that_is_not_a_tasks_ends_the_job(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = adhesis("run", path, "--out", out, ranks=3, fake="crash=0.8:0.01:0")
+    assert process.returncode == 70
+    assert "TypeError" in process.stderr
+
+
+def test_failures_and_growth_under_mpirun(tmp_path, whole):
+    path, out = write_campaign(tmp_path, realisations="1"), tmp_path / "r.h5"
+    process = adhesis("run", path, "--out", out, ranks=3, fake="fail=0.7:0.01:0")
+    assert process.returncode == 1
+    log = tmp_path / "log"
+    words = ("run", write_campaign(tmp_path), "--out", out, "--redo", "failed")
+    process = adhesis(*words, ranks=3, fake=f"log={log}")
+    assert process.returncode == 0, process.stderr
+    assert len(log.read_text().splitlines()) == 5
+    assert differences(out, whole) == []
+
+
+def test_growing_from_10_to_20_realisations_computes_exactly_the_new_ones(tmp_path):
+    out, log = tmp_path / "r.h5", tmp_path / "log"
+    words = ("run", write_campaign(tmp_path, realisations="10"), "--out", out)
+    assert adhesis(*words, ranks=3, fake="").returncode == 0
+    before = rows_of(out)
+    assert len(before) == 40
+    words = ("run", write_campaign(tmp_path, realisations="20"), "--out", out)
+    process = adhesis(*words, ranks=3, fake=f"log={log}")
+    assert process.returncode == 0, process.stderr
+    assert "80 of 80 tasks done; 40 computed" in process.stderr
+    new = [f"{h}:{g}:{r}" for h in (0.7, 0.8) for g in (0.01, 0.04) for r in range(10, 20)]
+    assert sorted(log.read_text().split()) == new
+    after = rows_of(out)
+    assert {task: after[task] for task in before} == before
+    assert set(after) - set(before) == set(new)
+    whole = tmp_path / "whole.h5"
+    assert adhesis("run", tmp_path / "c.toml", "--out", whole, fake="").returncode == 0
+    assert differences(out, whole) == []
+
+
+def rows_of(path) -> dict[str, tuple]:
+    """Return times, rank and loss of each task, named as the fake task's log has it."""
+    with Results(path) as results:
+        columns = [results.column(n).tolist() for n in ("wall_time", "cpu_time", "rank", "loss")]
+        return {
+            f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}": values
+            for task, *values in zip(results.tasks(), *columns, strict=True)
+        }
+
+
+def test_the_rank_0_writer_writes_the_same_file(tmp_path, whole):
+    """As where HDF5 has no MPI."""
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = adhesis("run", path, "--out", out, ranks=3, fake="serial=1")
+    assert process.returncode == 0, process.stderr
+    assert differences(out, whole) == []
+    process = start("run", path, "--out", tmp_path / "k.h5", ranks=3, fake="serial=1 step=0.05")
+    wait_until(lambda: done_rows(tmp_path / "k.h5") >= 3)
+    kill_all(process)
+    process.communicate()
+    resumed = adhesis("run", path, "--out", tmp_path / "k.h5", ranks=3, fake="serial=1")
+    assert resumed.returncode == 0, resumed.stderr
+    assert differences(tmp_path / "k.h5", whole) == []
+
+
+def test_bad_input_is_told_once_and_every_rank_ends(tmp_path):
+    path, out = write_campaign(tmp_path, hurst="[1.5]"), tmp_path / "r.h5"
+    process = adhesis("run", path, "--out", out, ranks=3)
+    assert process.returncode == 2
+    ours = [line for line in process.stderr.splitlines() if "adhesis run:" in line]
+    assert len(ours) == 1
+    assert "hurst is [1.5]: it must be a list of different values" in ours[0]
+    assert [p.name for p in tmp_path.iterdir()] == ["c.toml"]
+    process = adhesis("run", path, "--speed", "3", ranks=3)
+    assert process.returncode == 2
+    assert process.stderr.count("unrecognized arguments: --speed") == 1
+
+
+def test_the_status_during_a_run_under_mpirun(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, ranks=3, fake="step=0.15")
+    wait_until(lambda: done_rows(out) >= 1)
+    status = json.loads(adhesis("status", out, "--json").stdout)
+    assert 1 <= status["done"] < 8
+    assert status["done"] + status["pending"] == 8
+    process.communicate(timeout=30)
+    assert process.returncode == 0
+
+
+def test_the_endurance_benchmark_runs(tmp_path):
+    """Its figures are for a quiet machine; here only that there are some."""
+
+    def table(*words) -> dict[str, str]:
+        process = subprocess.run(
+            [sys.executable, str(ROOT / "benchmarks" / "endurance.py"), *map(str, words)],
+            env=environment(MPIRUN=MPIRUN),
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=100,
+        )
+        assert process.returncode == 0, process.stderr
+        rows = (line.strip().split("  ", 1) for line in process.stdout.splitlines()[1:])
+        return {row[0]: row[1].strip() for row in rows if len(row) == 2}
+
+    path = write_campaign(tmp_path)
+    words = ("empty", "--campaign", path, "--tasks", 40, "--seconds", 0.05, "--dir", tmp_path)
+    shown = table(*words)
+    assert float(shown["tasks a second"].split()[0]) > 0
+    assert shown["master, of a core"].endswith("under 2 %")
+    shown = table("campaign", path, "--out", "r.h5")
+    assert float(shown["makespan / ideal"].split()[0]) >= 1
+    assert done_rows(tmp_path / "r.h5") == 8
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "r.h5"]
+
+
+def test_waiting_costs_the_master_next_to_nothing(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, ranks=3, fake="step=1")
+    wait_until(lambda: len(ranks_of(process.pid)) == 3 and out.exists())
+    time.sleep(1.0)
+    master = ranks_of(process.pid)[0]
+
+    def cpu() -> float:
+        with open(f"/proc/{master}/stat") as stat:
+            fields = stat.read().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    before = cpu()
+    time.sleep(2.5)
+    share = (cpu() - before) / 2.5
+    process.send_signal(signal.SIGUSR1)
+    process.communicate(timeout=20)
+    assert share < 0.03

@@ -1,0 +1,536 @@
+"""The report: what the tables say, what the figures draw, what the page shows."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray
+from matplotlib.image import imread
+
+from ensemble.aggregate.average import aggregate
+from ensemble.aggregate.companions import differing_keys, kind_of
+from ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
+from ensemble.campaign.file import load_campaign, parse_campaign
+from ensemble.command import main
+from ensemble.report import findings, paper
+from ensemble.report.figures import fields as field_figures
+from ensemble.report.figures import loops, losses
+from ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
+from ensemble.report.figures.style import save, spread_out, style
+from ensemble.report.tables import losses as tables
+from ensemble.report.tables import states as state_tables
+from ensemble.report.write import write_report
+from ensemble.task.compute import make_problem
+from tests.support.synthetic_results import campaign, rows, write
+
+ROOT = Path(__file__).parent.parent.parent
+GAMMAS = (0.01, 0.04, 0.07)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> Path:
+    plan = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5)
+    return write(tmp_path_factory.mktemp("report") / "r.h5", plan, rows(plan))
+
+
+@pytest.fixture(scope="module")
+def data(file):
+    return aggregate(file)
+
+
+@pytest.fixture(scope="module")
+def report(file) -> Path:
+    directory = file.parent / "report"
+    write_report(file, directory, io.StringIO())
+    return directory
+
+
+def lines_of(axes) -> dict[str, np.ndarray]:
+    return {line.get_label(): line.get_xydata() for line in axes.lines}
+
+
+# ---------------------------------------------------------------------- tables
+
+
+def test_losses_csv_holds_the_averages_with_units(report, data):
+    with (report / "losses.csv").open(encoding="utf-8") as stream:
+        table = list(csv.DictReader(stream))
+    assert [(float(r["hurst"]), float(r["work_of_adhesion [J/m^2]"])) for r in table] == [
+        (h, g) for h in (0.7, 0.8) for g in GAMMAS
+    ]
+    for row, cell in zip(table, data.cells, strict=True):
+        loss = cell.values["loss"]
+        assert float(row["loss_mean [J/m^2]"]) == loss.mean()
+        assert float(row["loss_sem [J/m^2]"]) == pytest.approx(loss.std(ddof=1) / np.sqrt(5))
+        assert float(row["loss_dimensionless_ci_low"]) < float(row["loss_dimensionless_mean"])
+        assert float(row["audit_residual_largest"]) == np.abs(cell.values["audit_residual"]).max()
+        assert float(row["m2_mean"]) == pytest.approx(cell.values["m2"][0])
+        tension = 2 * cell.values["pull_off_stress"] / (1e6 / 0.75 * 1000 * cell.values["h_max"])
+        assert float(row["pull_off_stress_dimensionless_mean"]) == pytest.approx(tension.mean())
+        known = (cell.hurst, cell.work_of_adhesion) == (0.8, 0.04)
+        assert row["loss_dimensionless_paper"] == ("19.36" if known else "")
+
+
+def test_only_what_is_known_of_the_paper_is_shown():
+    assert paper.table_1(0.8, 0.04) == 19.36
+    assert paper.table_1(0.7, 0.04) is None
+    assert (paper.m2(0.7), paper.m2(0.9), paper.m2(0.5)) == (5.1e-3, 1.5e-3, None)
+
+
+def test_tables_print_as_plain_lines_without_a_terminal(data):
+    stream = io.StringIO()
+    tables.losses(data).print(stream)
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 2 + 6
+    assert "\x1b" not in stream.getvalue()
+    assert lines[6].split()[:3] == ["0.8", "0.04", "5"]
+    assert "19.36" in lines[6]
+
+
+def test_jumps_by_kind_add_up_to_all_drops(data):
+    table = state_tables.jumps(data)
+    shares = np.zeros(len(data.cells))
+    for row in table.rows:
+        shares[[(c.hurst, c.work_of_adhesion) for c in data.cells].index(row[:2])] += row[-1]
+    np.testing.assert_allclose(shares, 1)
+    glance = state_tables.shares_by_kind(data)
+    place = {(row[0], row[1], row[2]): row[-1] for row in table.rows}
+    for row in glance.rows:
+        assert sum(row[2:]) == pytest.approx(1)
+        for column, share in zip(glance.columns[2:], row[2:], strict=True):
+            assert share == pytest.approx(place.get((*row[:2], column.name), 0))
+
+
+def test_curves_open_in_xarray_with_units(report, data):
+    with xarray.open_dataset(report / "curves.nc") as curves:
+        assert curves.sizes["hurst"] == 2
+        for name, array in curves.variables.items():
+            assert array.attrs["units"], name
+            assert array.attrs["long_name"], name
+        assert curves["loading_mean_stress_mean"].attrs["units"] == "Pa"
+        one = curves["unloading_stress_mean"].sel(hurst=0.8, work_of_adhesion=0.07)
+        expected = data.cell(0.8, 0.07).curves["unloading_stress"].mean
+        np.testing.assert_array_equal(one, expected)
+        assert curves["realisations"].values.tolist() == [[5] * 3] * 2
+        quantiles = curves["loading_contact_fraction_quantiles"]
+        assert (quantiles.diff("quantile") >= 0).all()
+
+
+# ---------------------------------------------------------------------- figures
+
+
+def test_contact_is_drawn_against_stress_over_slope(data):
+    with style():
+        figure = loops.contact_against_stress(data)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["H = 0.7", "H = 0.8"]
+    drawn = lines_of(figure.axes[1])
+    assert len(drawn) == 6
+    cell = data.cell(0.8, 0.04)
+    line = drawn[r"$\gamma$ = 0.04 J/m², unloading"]
+    sigma = (
+        2
+        * h5_values(data, cell, "unloading_mean_stress")
+        / (1e6 / 0.75 * 1000 * cell.values["h_max"][:, None])
+    )
+    expected = (sigma / np.sqrt(cell.values["m2"])[:, None]).mean(axis=0)
+    np.testing.assert_allclose(line[:, 0], expected, rtol=1e-10)
+    area = h5_values(data, cell, "unloading_contact_fraction").mean(axis=0)
+    np.testing.assert_allclose(line[:, 1], area, rtol=1e-10)
+
+
+def h5_values(data, cell, name: str) -> np.ndarray:
+    with h5py.File(data.path) as raw:
+        return raw[name][:][cell.rows]
+
+
+def test_loops_are_drawn_with_one_standard_deviation(data):
+    with style():
+        figure = loops.loop_against_penetration(data)
+    assert len(figure.axes) == 4
+    axes = figure.axes[2]
+    cell = data.cell(0.8, 0.01)
+    line = lines_of(axes)[r"$\gamma$ = 0.01 J/m², loading"]
+    np.testing.assert_array_equal(line[:, 0], data.campaign.loading_penetration)
+    np.testing.assert_array_equal(line[:, 1], cell.curves["loading_stress"].mean)
+    band = axes.collections[0].get_paths()[0].vertices
+    half = cell.curves["loading_stress"].std[-1]
+    top = band[band[:, 0] == data.campaign.loading_penetration[-1], 1]
+    assert np.ptp(top) == pytest.approx(2 * half)
+    assert axes.get_xlabel().startswith("penetration")
+    assert "sigma" in axes.get_ylabel()
+
+
+def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
+    with style():
+        axes = losses.loss_against_adhesion(data).axes[0]
+    for container, hurst in zip(axes.containers, (0.7, 0.8), strict=True):
+        found = [data.cell(hurst, g).estimates["loss_dimensionless"] for g in GAMMAS]
+        line, _, (bars,) = container.lines
+        np.testing.assert_allclose(line.get_ydata(), [e.mean for e in found])
+        ends = np.array(bars.get_segments())[:, :, 1]
+        np.testing.assert_allclose(ends, [[e.low, e.high] for e in found], rtol=1e-12)
+    assert lines_of(axes)["H = 0.8, paper"].tolist() == [[0.04, 19.36]]
+    assert "J/m²" in axes.get_xlabel()
+
+
+def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
+    with style():
+        axes = losses.loss_by_mechanism(data).axes[0]
+    large, small = axes.containers
+    for k, cell in enumerate(data.cells):
+        top = small[k].get_y() + small[k].get_height()
+        assert top == pytest.approx(cell.values["loss_from_drops"].mean())
+        assert large[k].get_height() == pytest.approx(cell.values["loss_large_scale"].mean())
+
+
+def test_jump_densities_integrate_to_the_number_of_jumps(data):
+    with style():
+        figure = losses.jump_energies(data)
+    cell = data.cell(0.7, 0.01)
+    total = 0.0
+    for axes in figure.axes[:2]:
+        patch = next(p for p in axes.patches if p.get_label() == r"$\gamma$ = 0.01 J/m²")
+        values, edges, _ = patch.get_data()
+        total += np.nansum(values * np.diff(np.log10(edges)))
+        assert BIN_EDGES[0] <= edges[0] < edges[-1] <= BIN_EDGES[-1]
+    assert total == pytest.approx(cell.values["jump_count"].mean())
+    assert BINS_PER_DECADE * np.log10(edges[1] / edges[0]) == pytest.approx(1)
+
+
+def test_shapes_show_profile_and_surface_at_the_same_separation(data):
+    with style():
+        figure = field_figures.shapes(data)
+    assert len(figure.axes) == 6
+    cell = findings.typical_cell(data)
+    shape = data.fields.shapes[data.cells.index(cell)]
+    drawn = lines_of(figure.axes[0])
+    separation = shape.h_max * (1 - data.fields.penetration[-1])
+    np.testing.assert_allclose(drawn["rigid"][:, 1], 1e6 * (shape.height - separation))
+    np.testing.assert_allclose(drawn["unloading"][:, 1], 1e6 * shape.displacement[1, -1])
+    detail = lines_of(figure.axes[1])["rigid"]
+    assert detail[:, 1].max() == drawn["rigid"][:, 1].max()
+    assert len(detail) < len(drawn["rigid"]) / 3
+
+
+def test_spectra_carry_both_reference_slopes(data):
+    with style():
+        axes = field_figures.spectra_on_loading(data).axes[1]
+    drawn = lines_of(axes)
+    for label, slope in (("slope -2.6", -2.6), ("slope -2.8", -2.8), ("rigid", -2.6)):
+        x, y = np.log(drawn[label]).T
+        assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(slope, abs=1e-5)
+    x, y = np.log(drawn["0.90"]).T
+    assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(-2.8, abs=1e-3)
+    rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in state_tables.slopes(data).rows}
+    assert rows_of[0.7, 0.01, "unloading", 0.9] == pytest.approx(-2.7, abs=1e-3)
+
+
+def test_densities_are_drawn_as_they_are(data):
+    with style():
+        heights = lines_of(field_figures.height_density(data).axes[0])
+        gaps = lines_of(field_figures.gap_density(data).axes[0])
+    near_zero = heights["H = 0.8"][np.abs(heights["H = 0.8"][:, 0]).argmin()]
+    assert near_zero[1] == pytest.approx(heights["Gaussian"][:, 1].max(), rel=0.02)
+    assert len(gaps) == 6
+    np.testing.assert_allclose(
+        gaps["0.90, loading"][:, 1], 0.7 * np.exp(-gaps["0.90, loading"][:, 0]), rtol=1e-4
+    )
+
+
+def test_every_figure_is_legible_at_column_width_in_colour_and_grey(data):
+    for item in (*LOOPS, *LOSSES, *MECHANISMS, *SHAPES, *HEIGHTS):
+        with style():
+            figure = item.draw(data)
+            figure.canvas.draw()
+        width = figure.get_size_inches()[0] * 25.4
+        assert width == pytest.approx(85) or width == pytest.approx(175)
+        texts = [t for t in figure.findobj(mpl.text.Text) if t.get_text() and t.get_visible()]
+        assert min(t.get_fontsize() for t in texts) >= 4.5, item.name  # indices in formulas
+        bottom = figure.axes[-1] if item.name != "pull_off_stress" else figure.axes[0]
+        assert bottom.get_xlabel(), item.name
+        assert figure.axes[0].get_ylabel(), item.name
+        for axes in figure.axes:
+            solid = {}
+            for line in axes.lines:
+                if line.get_label().startswith("_") or not line.get_xydata().size:
+                    continue
+                looks = (line.get_color(), str(line.get_linestyle()), str(line.get_marker()))
+                assert solid.setdefault(looks, line.get_label()) == line.get_label(), item.name
+
+
+def test_drawing_leaves_the_style_of_the_caller_alone(data):
+    before = dict(mpl.rcParams)
+    with style():
+        LOOPS[0].draw(data)
+    assert dict(mpl.rcParams) == before
+    catalogue = "import sys, ensemble.report.figures.catalogue"
+    code = f"{catalogue}; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+
+
+@pytest.mark.parametrize("stretched", [1.0, 1.7, 30.0])
+def test_nothing_is_cut_off_at_the_edges_of_a_figure(data, stretched):
+    """Whatever the ticks: the room that their labels take is found before they are drawn."""
+    fields = data.fields
+    shapes = tuple(
+        shape and replace(shape, displacement=stretched * shape.displacement)
+        for shape in fields.shapes
+    )
+    data = replace(data, fields=replace(fields, shapes=shapes))
+    for item in (*LOOPS, *LOSSES, *MECHANISMS, *SHAPES, *HEIGHTS):
+        if stretched > 1 and item.name != "fig3_shapes":
+            continue
+        with style():
+            figure = item.draw(data)
+            figure.set_dpi(300)
+            figure.draw_without_rendering()
+            box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0, item.name
+
+
+# ---------------------------------------------------------------------- page and command
+
+
+def test_the_page_embeds_every_figure_that_exists(report):
+    page = (report / "report.md").read_text(encoding="utf-8")
+    shown = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page)
+    assert len(shown) == len(set(shown)) == 12
+    assert set(shown) == {path.name for path in report.glob("*.png")}
+    for name in shown:
+        image = imread(report / name)
+        assert image.shape[1] in (1003, 1004, 2066, 2067)  # 85 or 175 mm at 300 dpi
+        assert image[..., :3].std() > 0.03
+        pdf = (report / name).with_suffix(".pdf")
+        assert pdf.read_bytes().startswith(b"%PDF")
+        assert f"({pdf.name})" in page
+    for table in re.findall(r"(?:^\|.*\n)+", page, re.MULTILINE):
+        assert len({line.count("|") for line in table.splitlines()}) == 1
+    assert "19.36" in page
+    assert "nan" not in page.replace("nano", "")
+
+
+def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, monkeypatch):
+    def only_some(figure, stem):
+        if stem.name in ("fig6_contact_against_stress", "loss_by_mechanism"):
+            save(figure, stem)
+
+    monkeypatch.setattr("ensemble.report.figures.style.save", only_some)
+    write_report(file, tmp_path, io.StringIO())
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"losses.csv", "curves.nc", "report.md", "loss_by_mechanism.pdf"} < names
+    for name in names:
+        assert (tmp_path / name).read_bytes() == (report / name).read_bytes(), name
+
+
+@pytest.fixture
+def drawn(monkeypatch) -> list[str]:
+    """Lay figures out, but do not spend seconds on writing them; the names of those drawn."""
+    names: list[str] = []
+
+    def lay_out(figure, stem):
+        with style():
+            figure.draw_without_rendering()
+        names.append(stem.name)
+
+    monkeypatch.setattr("ensemble.report.figures.style.save", lay_out)
+    return names
+
+
+def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, capsys, drawn):
+    plan = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=3)
+    values = rows(plan)
+    values["status"][:] = [1, 1, 1, 1, 0, 2, 0, 0, 0, 1, 0, 0]
+    values["status"][5] = 2
+    values["error"] = np.zeros(12, dtype="S512")
+    values["error"][5] = b"the sum diverged"
+    path = write(tmp_path / "r.h5", plan, values)
+    assert main(["report", str(path), "--to", str(tmp_path / "out" / "deep")]) == 0
+    page = (tmp_path / "out" / "deep" / "report.md").read_text(encoding="utf-8")
+    for text in (page, capsys.readouterr().out):
+        assert "6 of 12 tasks are pending" in text
+        assert "1 of 12 tasks failed" in text
+        assert "No task is finished yet for H = 0.8, γ = 0.01 J/m²" in text
+        assert "Only one realisation" in text
+    assert "row 5: the sum diverged" in page
+    assert len(drawn) == 12
+
+
+def test_one_finished_task_of_one_cell_is_enough(tmp_path, drawn):
+    plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=1)
+    path = write(tmp_path / "r.h5", plan, rows(plan))
+    data = write_report(path, tmp_path / "out", io.StringIO())
+    assert data.done == 1
+    assert len(drawn) == 12
+
+
+def test_bad_input_is_refused_in_one_sentence(file, tmp_path, capsys):
+    target = tmp_path / "taken"
+    target.write_text("a file")
+    for words in (
+        ["report", str(tmp_path / "no.h5"), "--to", str(tmp_path / "out")],
+        ["report", str(file), "--to", str(target)],
+    ):
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert error.startswith("adhesis report: ")
+        assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+# ---------------------------------------------------------------------- findings
+
+
+def test_findings_compare_with_the_paper(data):
+    text = "\n".join(findings.agreement(data))
+    loss = data.cell(0.8, 0.04).estimates["loss_dimensionless"]
+    assert f"W~ = {loss.mean:.4g} against 19.36" in text
+    assert "outside the 95 % interval" in text
+    assert "only 1 is known" in text
+    assert "0.002 against 0.0027 at H = 0.8" in text
+    assert "grows with γ at every H" in text
+    ratios = [ratio for cell in data.cells if (ratio := findings.area_ratio(cell)) is not None]
+    assert f"at least {min(ratios):.2f}" in text
+
+
+def test_contact_is_compared_at_equal_load():
+    """Unloading has twice the contact of loading at each stress, by construction."""
+
+    class Fake:
+        done = 3
+
+    class Curve:
+        def __init__(self, mean):
+            self.mean = np.asarray(mean, dtype=float)
+
+    stress = np.linspace(-1, 3, 41)
+    fake = Fake()
+    fake.curves = {
+        "loading_stress": Curve(stress),
+        "loading_contact_fraction": Curve(0.1 * (stress + 1.5)),
+        "unloading_stress": Curve(np.concatenate([stress[::-1], [-0.5, 0.0]])),
+        "unloading_contact_fraction": Curve(
+            np.concatenate([0.2 * (stress[::-1] + 1.5), [0.01, 0.0]])
+        ),
+    }
+    assert findings.area_ratio(fake) == pytest.approx(2)
+    fake.curves["unloading_stress"] = Curve(fake.curves["unloading_stress"].mean - 10)
+    assert findings.area_ratio(fake) is None
+
+
+def test_values_are_spread_evenly():
+    assert spread_out([1, 2, 3], 4) == [1, 2, 3]
+    assert spread_out(list(range(10)), 4) == [0, 3, 6, 9]
+
+
+# ---------------------------------------------------------------------- beside other campaigns
+
+
+def companion(tmp_path, name: str, factor: float, **replaced: str) -> Path:
+    """The campaign of ``file`` with some lines replaced, its losses multiplied by a factor."""
+    text = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5).text
+    for old, new in replaced.values():
+        assert old in text
+        text = text.replace(old, new)
+    plan = parse_campaign(text)
+    values = rows(campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5))
+    values |= {n: values[n] * factor for n in ("loss", "loss_dimensionless")}
+    short = {n for n, v in values.items() if "loading_" in n or n.startswith(("psd", "gap_d"))}
+    return write(tmp_path / name, plan, {n: v for n, v in values.items() if n not in short})
+
+
+def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_path):
+    finer = companion(
+        tmp_path, "finer.h5", 1.02, a=("[output]", "[solver]\naccuracy = 1e-4\n[output]")
+    )
+    steps = companion(tmp_path, "steps.h5", 0.99, a=("load_steps = 20", "load_steps = 40"))
+    alone = {row[:2]: row for row in tables.losses(data).rows}
+    both = aggregate(file, [finer, steps])
+    assert [c.kind for c in both.companions] == ["resolution", "load steps"]
+    assert both.companions[1].differs == ("cycle.load_steps = 40",)
+    names = [column.name for column in tables.losses(both).columns]
+    by_steps = names.index("loss_dimensionless_error_load_steps")
+    by_grid = names.index("loss_dimensionless_error_resolution")
+    for row in tables.losses(both).rows:
+        cell = data.cell(*row[:2])
+        loss = cell.values["loss_dimensionless"]
+        assert row[by_grid] == pytest.approx(0.02 * loss.mean())
+        assert row[by_steps] == pytest.approx(0.01 * loss.mean())
+        assert alone[row[:2]][by_grid] is None
+        audit = np.abs(cell.values["loss"] - cell.values["loss_from_drops"]) / cell.values["loss"]
+        assert alone[row[:2]][by_steps] == pytest.approx(np.mean(audit * loss))
+
+
+def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, drawn):
+    lower = companion(
+        tmp_path, "lower.h5", 0.5, a=("max_penetration = 0.9", "max_penetration = 0.6")
+    )
+    data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
+    assert "loss_against_max_penetration" in drawn
+    with style():
+        axes = losses.loss_against_penetration(data).axes[0]
+    assert len(axes.containers) == len(GAMMAS)
+    for curve in axes.containers:
+        x, y = curve.lines[0].get_data()
+        assert x.tolist() == pytest.approx([0.6, 0.9], abs=0.005)  # moved apart a little
+        assert y[0] == pytest.approx(0.5 * y[1])
+    page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "](loss_against_max_penetration.png)" in page
+    assert "cycle.max_penetration = 0.6" in page
+    assert (tmp_path / "out" / "beside.csv").read_text().count("\n") == 7
+
+
+def test_campaigns_with_one_gamma_in_common_are_drawn_for_each_hurst(file, tmp_path):
+    plan = campaign(hurst=(0.7, 0.8), gamma=(0.04,), realisations=3)
+    lower = parse_campaign(plan.text.replace("max_penetration = 0.9", "max_penetration = 0.6"))
+    values = {name: row for name, row in rows(plan).items() if row.ndim == 1}
+    data = aggregate(file, [write(tmp_path / "lower.h5", lower, values)])
+    with style():
+        axes = losses.loss_against_penetration(data).axes[0]
+    assert axes.get_title(loc="left") == r"$\gamma$ = 0.04 J/m²"
+    assert [curve.get_label() for curve in axes.containers] == ["H = 0.7", "H = 0.8"]
+    # Only the realisations that both have.
+    expected = data.cell(0.8, 0.04).values["loss_dimensionless"][:3].mean()
+    assert axes.containers[1].lines[0].get_ydata()[1] == pytest.approx(expected)
+
+
+def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
+    factor = 19 / aggregate(file).cell(0.8, 0.04).estimates["loss_dimensionless"].mean
+    wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 10", "ratio = 20"))
+    data = aggregate(file, [wider])
+    assert data.companions[0].kind == "spectrum"
+    (sentence,) = findings.readings(data)
+    assert sentence.startswith("Nearest to the known values of the paper's Table 1: wider.h5")
+    assert "wider.h5 1.9 %" in sentence
+
+
+def test_campaigns_that_come_along_are_comparable_with_the_paper_campaign():
+    base = load_campaign(ROOT / "jobs" / "paper.toml")
+    kinds = {
+        "ratio-200": "spectrum",
+        "equal-c0": "spectrum",
+        "penetration-0.6": "penetration",
+        "penetration-0.93": "penetration",
+        "steps-80": "load steps",
+        "accuracy-1e-4": "resolution",
+    }
+    files = {path.stem: path for path in (ROOT / "jobs" / "beside").glob("*.toml")}
+    assert set(files) == set(kinds)
+    for name, path in files.items():
+        other = load_campaign(path)
+        assert kind_of(differing_keys(base, other)) == kinds[name]
+        assert other.sweep.seed == base.sweep.seed
+        assert set(other.sweep.work_of_adhesion) <= set(base.sweep.work_of_adhesion)
+        if kinds[name] == "spectrum":
+            for task in other.tasks()[:: other.sweep.realisations]:
+                quoted = paper.m2(task.hurst)
+                assert make_problem(other, task).profile.m2 == pytest.approx(quoted, rel=0.05)

@@ -1,0 +1,370 @@
+"""A campaign in one process, by the command: resume, growth, stops, failures, bad input."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from ensemble.campaign.file import load_campaign
+from ensemble.errors import InputError
+from ensemble.results.store import Writer, create
+from ensemble.run.interrupt import deadline, parse_duration
+from tests.support.campaign_support import (
+    TESTS,
+    adhesis,
+    differences,
+    done_rows,
+    environment,
+    start,
+    wait_until,
+    write_campaign,
+)
+from tests.support.fake_run import fake_result
+
+
+def run(folder, *words, fake="", **changes):
+    """Run the fake campaign of a folder to its end; returns the process and the results file."""
+    path = write_campaign(folder, **changes)
+    out = folder / "r.h5"
+    return adhesis("run", path, "--out", out, *words, fake=fake), out
+
+
+def test_a_run_from_nothing_to_done(tmp_path):
+    process, out = run(tmp_path)
+    assert process.returncode == 0
+    assert process.stdout == ""
+    assert f"{out}: 8 tasks to do" in process.stderr
+    assert f"{out}: 8 of 8 tasks done; 8 computed in" in process.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "r.h5"]
+    with h5py.File(out) as file:
+        for name in ("adhesis_version", "commit", "mpi", "hdf5", "fftw", "numpy", "created"):
+            assert file.attrs[name]
+        assert file.attrs["campaign"] == (tmp_path / "c.toml").read_text()
+        assert file.attrs["seed"] == 5
+
+
+def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path):
+    write_campaign(tmp_path, "mine.toml")
+    assert adhesis("run", "mine.toml", fake="", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "mine.h5").exists()
+
+
+def test_a_finished_campaign_computes_nothing_again(tmp_path):
+    _, out = run(tmp_path)
+    before = out.read_bytes()
+    log = tmp_path / "log"
+    process, _ = run(tmp_path, fake=f"log={log}", hurst="[0.80, 0.70]")
+    assert process.returncode == 0
+    assert not log.exists()
+    assert out.read_bytes() == before
+
+
+def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, fake="step=0.05")
+    wait_until(lambda: done_rows(out) >= 2)
+    asked = time.monotonic()
+    process.send_signal(signal.SIGUSR1)
+    _, errors = process.communicate(timeout=20)
+    assert time.monotonic() - asked < 5
+    assert process.returncode == 75
+    assert "stopped early: SIGUSR1 received" in errors
+    kept = done_rows(out)
+    log = tmp_path / "log"
+    process, _ = run(tmp_path, fake=f"log={log}")
+    assert process.returncode == 0
+    assert len(log.read_text().splitlines()) == 8 - kept
+    (tmp_path / "whole").mkdir()
+    _, whole = run(tmp_path / "whole")
+    assert differences(out, whole) == []
+
+
+def test_a_killed_run_resumes_with_the_same_bits(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, fake="step=0.05")
+    wait_until(lambda: done_rows(out) >= 3)
+    process.kill()
+    process.communicate()
+    kept = done_rows(out)
+    log = tmp_path / "log"
+    process, _ = run(tmp_path, fake=f"log={log}")
+    assert process.returncode == 0
+    assert len(log.read_text().splitlines()) == 8 - kept
+    (tmp_path / "whole").mkdir()
+    _, whole = run(tmp_path / "whole")
+    assert differences(out, whole) == []
+
+
+def test_walltime_ends_the_run_in_time(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    words = ("run", path, "--out", out, "--walltime", "3s")
+    started = time.monotonic()
+    process = adhesis(*words, fake="step=0.2 hang=0.8:0.04:1")
+    assert time.monotonic() - started < 5
+    assert process.returncode == 75
+    assert "stopped early: " in process.stderr
+
+
+def test_growing_computes_exactly_what_is_new(tmp_path):
+    _, out = run(tmp_path, realisations="1", hurst="[0.8]")
+    log = tmp_path / "log"
+    process, _ = run(tmp_path, fake=f"log={log}", realisations="3")
+    assert process.returncode == 0
+    assert "12 of 12 tasks done; 10 computed" in process.stderr
+    assert len(log.read_text().splitlines()) == 10
+    (tmp_path / "whole").mkdir()
+    _, whole = run(tmp_path / "whole", realisations="3")
+    assert differences(out, whole) == []
+
+
+def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path):
+    process, out = run(tmp_path, fake="fail=0.7:*:1")
+    assert process.returncode == 1
+    assert "failed: H = 0.7, γ = 0.01 J/m², realisation 1: FloatingPointError" in process.stderr
+    assert "6 of 8 tasks done, 2 failed; 6 computed" in process.stderr
+    # Failures are results: they are not tried again unasked.
+    process, _ = run(tmp_path)
+    assert process.returncode == 1
+    assert "0 to do, 2 failed before" in process.stderr
+    log = tmp_path / "log"
+    process, _ = run(tmp_path, "--redo", "failed", "--work-of-adhesion", "0.04", fake=f"log={log}")
+    assert process.returncode == 1
+    assert log.read_text() == "0.7:0.04:1\n"
+    process, _ = run(tmp_path, "--redo", "failed")
+    assert process.returncode == 0
+    (tmp_path / "whole").mkdir()
+    _, whole = run(tmp_path / "whole")
+    assert differences(out, whole) == []
+
+
+def test_done_tasks_can_be_computed_again_too(tmp_path):
+    run(tmp_path)
+    log = tmp_path / "log"
+    words = ("--redo", "all", "--hurst", "0.8", "--realisation", "0")
+    process, _ = run(tmp_path, *words, fake=f"log={log}")
+    assert process.returncode == 0
+    assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
+
+
+def test_too_many_failures_stop_the_run(tmp_path):
+    process, out = run(tmp_path, "--max-failures", "3", fake="fail=*:*:*")
+    assert process.returncode == 1
+    assert "stopped early: 3 tasks failed (the limit is --max-failures 3)" in process.stderr
+    status = json.loads(adhesis("status", out, "--json").stdout)
+    assert (status["failed"], status["pending"]) == (3, 5)
+
+
+def test_a_task_that_hangs_meets_the_time_limit_and_the_limit_may_change(tmp_path):
+    process, out = run(tmp_path, fake="hang=0.7:0.01:0", method='"grid"\ntime_limit = 0.6')
+    assert process.returncode == 1
+    failure = json.loads(adhesis("status", out, "--json").stdout)["failures"][0]
+    assert failure["error"] == "longer than the time limit of 0.6 s"
+    assert failure["seconds"] > 0.5
+    process, _ = run(tmp_path, "--redo", "failed", method='"grid"\ntime_limit = 60')
+    assert process.returncode == 0
+
+
+# ---------------------------------------------------------------- bad input
+
+
+def refused(folder, *words, **changes):
+    """Run with bad input: one sentence, exit code 2, nothing written."""
+    path = write_campaign(folder, **changes)
+    before = {p: p.read_bytes() for p in folder.iterdir() if p.is_file()}
+    process = adhesis("run", path, "--out", folder / "r.h5", *words)
+    assert process.returncode == 2, process.stderr
+    assert process.stdout == ""
+    assert len(process.stderr.splitlines()) == 1, process.stderr
+    assert process.stderr.startswith("adhesis run: ")
+    assert {p: p.read_bytes() for p in folder.iterdir() if p.is_file()} == before
+    return process.stderr
+
+
+def test_bad_campaigns_leave_nothing_behind(tmp_path):
+    assert "[profile] period is -1.0: it must be a positive" in refused(tmp_path, period="-1.0")
+    assert "realisations is 0: it must be" in refused(tmp_path, realisations="0")
+    assert "speed is unknown" in refused(tmp_path, jumps="8\nspeed = 3")
+    assert "nodes_per_wave is 4: it must be" in refused(tmp_path, nodes_per_wave="4")
+    assert "cannot be computed" in refused(tmp_path, method='"sharp"')  # it has no nodes
+
+
+def test_bad_options(tmp_path):
+    assert "--redo is 'some'" in refused(tmp_path, "--redo", "some")
+    assert "choose among --redo" in refused(tmp_path, "--hurst", "0.7")
+    assert "walltime is '3 weeks'" in refused(tmp_path, "--walltime", "3 weeks")
+    assert "--max-failures is '-1'" in refused(tmp_path, "--max-failures", "-1")
+    assert "no folder" in refused(tmp_path, "--out", tmp_path / "none" / "r.h5")
+    assert "is a directory" in refused(tmp_path, "--out", tmp_path)
+
+
+def test_a_results_file_of_another_campaign(tmp_path):
+    run(tmp_path)
+    sentence = refused(tmp_path, load_steps="5", young="2e6")
+    assert "material.young is 2000000.0 here and 1000000.0 there" in sentence
+    assert "cycle.load_steps is 5 here and 4 there" in sentence
+    assert "sweep.hurst" in refused(tmp_path, hurst="[0.7]")
+
+
+def test_a_file_that_is_no_results_file(tmp_path):
+    (tmp_path / "r.h5").write_text("my notes")
+    assert "is not a results file of adhesis" in refused(tmp_path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder(tmp_path):
+    folder = tmp_path / "locked"
+    folder.mkdir(mode=0o500)
+    path = write_campaign(tmp_path)
+    process = adhesis("run", path, "--out", folder / "r.h5")
+    assert process.returncode == 2
+    assert "is read-only" in process.stderr
+
+
+def test_two_runs_on_one_file(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    first = start("run", path, "--out", out, fake="step=0.3")
+    wait_until(lambda: done_rows(out) >= 1)
+    second = adhesis("run", path, "--out", out, "--patience", "0.1")
+    assert second.returncode == 2
+    assert len(second.stderr.splitlines()) == 1
+    assert f"is being written by another run (host {os.uname().nodename}" in second.stderr
+    status = json.loads(adhesis("status", out, "--json").stdout)
+    assert status["done"] + status["pending"] == 8
+    first.send_signal(signal.SIGTERM)
+    first.communicate(timeout=20)
+    assert first.returncode == 75
+
+
+def test_processes_of_another_mpi_are_told(tmp_path, monkeypatch):
+    for place, words in (("0", 1), ("1", 0)):
+        monkeypatch.setattr(
+            "campaign_support.environment",
+            lambda place=place: {**environment(), "PMI_SIZE": "2", "PMI_RANK": place},
+        )
+        process = adhesis("run", write_campaign(tmp_path), cwd=tmp_path)
+        assert process.returncode == 2
+        assert len(process.stderr.splitlines()) == words
+        assert words == 0 or "the launcher belongs to another MPI than mpi4py" in process.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["c.toml"]
+
+
+def test_a_disk_that_fills_while_running(tmp_path):
+    """A limit on the size of a file stands for the full disk; the rows before it are kept."""
+    _, out = run(tmp_path, fake="")
+    process, _ = run(tmp_path, "--redo", "all", "--realisation", "1", fake="full=20000")
+    assert process.returncode == 74
+    assert "could not be written: File too large; what was done is kept" in process.stderr
+    assert "Traceback" not in process.stderr
+    assert done_rows(out) == 4
+
+
+# ---------------------------------------------------------------- status and times
+
+
+def test_status_tells_what_failed_and_why(tmp_path):
+    _, out = run(tmp_path, fake="fail=0.7:*:1")
+    text = adhesis("status", out).stdout
+    assert "8 tasks, 6 done, 0 pending, 2 failed" in text
+    assert "failed 2×: FloatingPointError: the sum of γ diverged" in text
+    assert "H = 0.7, γ = 0.04 J/m², realisation 1" in text
+    status = json.loads(adhesis("status", out, "--json").stdout)
+    assert [g["done"] for g in status["groups"]] == [1, 1, 2, 2]
+    process = adhesis("status", tmp_path / "none.h5")
+    assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)
+
+
+def test_status_of_a_large_file_takes_under_a_second_and_no_mpi(tmp_path):
+    path = write_campaign(tmp_path, realisations="25000", jumps="1", load_steps="1")
+    campaign = load_campaign(path)
+    create(tmp_path / "r.h5", campaign)
+    result = fake_result(campaign, campaign.tasks()[0])
+    with Writer(tmp_path / "r.h5") as writer:
+        for row in range(0, 100_000, 1000):
+            writer.write_result(row, result)
+    code = (
+        "import sys; from ensemble.command import main; main(['status', sys.argv[1]]); "
+        "print([m for m in sys.modules if m.startswith('mpi4py')])"
+    )
+    import subprocess
+
+    started = time.monotonic()
+    process = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "r.h5")],
+        capture_output=True,
+        text=True,
+        env=environment(),
+    )
+    took = time.monotonic() - started
+    assert "100000 tasks, 100 done" in process.stdout
+    assert process.stdout.endswith("[]\n")
+    assert took < 1.5  # under 1 s where nothing else runs
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("90", 90),
+        ("90s", 90),
+        ("1.5", 1.5),
+        ("45:00", 2700),
+        ("12:00:00", 43200),
+        ("2-00:00:00", 172800),
+        ("1h30m", 5400),
+        ("1d", 86400),
+    ],
+)
+def test_durations(text, seconds):
+    assert parse_duration(text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "0", "-5", "1:2:3:4", "soon", "nan", "1e99", "m"])
+def test_bad_durations(text):
+    with pytest.raises(InputError, match="walltime is"):
+        parse_duration(text)
+
+
+def test_the_deadline_of_the_batch_system():
+    assert deadline(1000.0, 5.0, {}) == 975.0
+    assert deadline(20.0, 5.0, {}) == 23.0
+    assert deadline(None, 5.0, {}) is None
+    assert deadline(None, 5.0, {"SLURM_JOB_END_TIME": "10005"}) == 9975.0
+    assert deadline(None, 5.0, {"PBS_WALLTIME": "100"}) == 95.0
+
+
+def test_the_fake_tasks_depend_on_nothing_but_the_task(tmp_path):
+    campaign = load_campaign(write_campaign(tmp_path))
+    one, two = (fake_result(campaign, campaign.tasks()[2]) for _ in range(2))
+    np.testing.assert_array_equal(one.loading_energy, two.loading_energy)
+    assert TESTS.is_dir()
+
+
+def test_watching_a_run_until_it_is_done(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    run_ = start("run", path, "--out", out, fake="step=0.05")
+    wait_until(lambda: done_rows(out) >= 1)
+    watch = adhesis("status", out, "--watch", "--interval", "0.2")
+    run_.communicate(timeout=20)
+    assert watch.returncode == 0
+    shown = [line for line in watch.stdout.splitlines() if " tasks, " in line]
+    assert "an hour, about" in shown[-2]
+    assert shown[-1].endswith("8 tasks, 8 done, 0 pending, 0 failed")
+    assert " ± " in watch.stdout.splitlines()[-1]  # the loss table has filled up
+    assert adhesis("status", out, "--watch", "--interval", "x").returncode == 2
+
+
+def test_the_losses_that_status_shows(tmp_path):
+    _, out = run(tmp_path)
+    status = json.loads(adhesis("status", out, "--json").stdout)
+    with h5py.File(out) as file:
+        mine = (file["hurst"][:] == 0.7) & (file["work_of_adhesion"][:] == 0.04)
+        loss = file["loss"][:][mine]
+    group = next(g for g in status["groups"] if (g["hurst"], g["work_of_adhesion"]) == (0.7, 0.04))
+    assert group["loss"] == pytest.approx(loss.mean())
+    assert group["loss_standard_error"] == pytest.approx(loss.std(ddof=1) / np.sqrt(2))

@@ -1,0 +1,350 @@
+"""The results file: its shape, what readers see at any moment, and files that are refused."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ensemble.campaign.file import parse_campaign
+from ensemble.errors import InputError
+from ensemble.results import schema
+from ensemble.results.schema import COLUMNS, DONE, FAILED, KEPT, PENDING, RESULT_COLUMNS, scales
+from ensemble.results.store import Results, Writer, create
+from ensemble.run.lock import RunLock
+from tests.support.campaign_support import ROOT, campaign_text
+from tests.support.fake_run import fake_result
+
+
+@pytest.fixture
+def campaign():
+    return parse_campaign(campaign_text())
+
+
+@pytest.fixture
+def path(tmp_path, campaign):
+    path = tmp_path / "r.h5"
+    create(path, campaign, versions={"mpi": "none"})
+    return path
+
+
+def test_the_documentation_describes_every_dataset_and_no_other():
+    text = (ROOT / "docs" / "results-file.md").read_text()
+    described = set()
+    for line in text.splitlines():
+        if line.startswith("| `"):
+            cell = line.split("|")[1]
+            names = re.findall(r"`([^`]+)`", cell)
+            stem = names[0].split("_", 1)
+            described |= {n.replace("unloading_…", f"unloading_{stem[-1]}") for n in names}
+    known = {c.name for c in COLUMNS} | {s.name for s in scales(parse_campaign(campaign_text()))}
+    assert described == known
+
+
+def test_a_new_file_is_whole_and_pending(path, campaign):
+    with Results(path) as results:
+        assert results.campaign == campaign
+        assert results.tasks() == campaign.tasks()
+        assert not results.status().any()
+        for column in RESULT_COLUMNS:
+            values = results.column(column.name)
+            empty = np.isnan(values) if values.dtype.kind == "f" else values == -1
+            assert empty.all(), column.name
+    assert not list(path.parent.glob("*.part"))
+
+
+def test_every_dataset_has_unit_name_and_scales(path):
+    with h5py.File(path) as file:
+        for name, dataset in file.items():
+            assert dataset.attrs["units"], name
+            assert dataset.attrs["long_name"], name
+            if not dataset.is_scale:
+                assert all(len(dim) == 1 for dim in dataset.dims), name
+
+
+def test_rows_come_back_as_they_were_written(path, campaign):
+    result = fake_result(campaign, campaign.tasks()[3])
+    with Writer(path) as writer:
+        writer.write_result(3, result, rank=7)
+        writer.write_failure(5, "ValueError: " + "γ" * 400, 2.5, rank=1)
+    with Results(path) as results:
+        assert results.status().tolist() == [0, 0, 0, DONE, 0, FAILED, 0, 0]
+        for column in RESULT_COLUMNS:
+            if column.dims[0] == KEPT:  # tests/ensemble/test_fields.py
+                continue
+            value = np.asarray(getattr(result, column.name), column.dtype)
+            assert results.column(column.name, slice(3, 4))[0].tobytes() == value.tobytes()
+        assert results.column("rank")[3] == 7
+        (error,) = results.errors(np.array([5]))
+        assert error.startswith("ValueError: γγγ")
+        assert set(error[12:]) == {"γ"}
+        rows = np.array([1, 3, 4, 5])
+        np.testing.assert_array_equal(results.column("loss", rows), results.column("loss")[rows])
+
+
+def test_reset_rows_are_pending_and_empty(path, campaign):
+    with Writer(path) as writer:
+        writer.write_result(3, fake_result(campaign, campaign.tasks()[3]))
+        writer.write_failure(5, "no", 1.0)
+        writer.reset([3, 5])
+    with Results(path) as results:
+        assert not results.status().any()
+        assert np.isnan(results.column("loss")).all()
+        assert results.errors(np.array([5])) == [""]
+
+
+def test_growing_keeps_every_row_in_its_place(path, campaign):
+    with Writer(path) as writer:
+        for row, task in enumerate(campaign.tasks()):
+            writer.write_result(row, fake_result(campaign, task))
+    larger = parse_campaign(campaign_text(hurst="[0.75, 0.7, 0.8]", realisations="3"))
+    with Results(path) as old:
+        created = old.attributes["created"]
+        before = {c.name: old.column(c.name) for c in COLUMNS}
+        place = {task: row for row, task in enumerate(old.tasks())}
+        create(path, larger, grown_from=old)
+    with Results(path) as results:
+        assert results.campaign == larger
+        assert results.tasks() == larger.tasks()
+        assert results.attributes["created"] == created
+        for row, task in enumerate(results.tasks()):
+            assert results.status()[row] == (DONE if task in place else PENDING)
+        rows = np.array([r for r, t in enumerate(results.tasks()) if t in place])
+        olds = [place[t] for t in results.tasks() if t in place]
+        for column in COLUMNS:
+            if column.dims[0] == KEPT:  # tests/ensemble/test_fields.py
+                continue
+            assert (
+                results.column(column.name, rows).tobytes() == before[column.name][olds].tobytes()
+            )
+
+
+@pytest.mark.filterwarnings("error")
+def test_xarray_opens_it(path, campaign):
+    with Writer(path) as writer:
+        writer.write_result(0, fake_result(campaign, campaign.tasks()[0]))
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        assert data.sizes["task"] == 8
+        assert data["wall_time"].dtype == "f8"
+        assert data["loss"].attrs["units"] == "J m-2"
+        assert data["unloading_mean_stress"].dims == ("task", "unloading_penetration")
+        assert data["jump_kind"].attrs["flag_meanings"].split()[0] == "pull-off"
+        done = data.where(data["status"] == DONE, drop=True)
+        assert done.sizes["task"] == 1
+        assert float(data["unloading_penetration"][0]) == campaign.cycle.max_penetration
+
+
+READ_WHILE_WRITING = """
+import sys, h5py
+path = sys.argv[1]
+for _ in range(40):
+    with h5py.File(path) as f:  # plain h5py, as a user has it
+        done = f["status"][:] == 1
+        assert (f["loss"][:][done] > 0).all()
+        assert (f["unloading_energy"][:][done] > 0).all()
+        assert (f["jump_count"][:][done] >= 0).all()
+print("sound")
+"""
+
+
+def test_a_reader_sees_only_whole_rows_while_a_run_writes(path, campaign):
+    reader = subprocess.Popen(
+        [sys.executable, "-c", READ_WHILE_WRITING, str(path)], stdout=subprocess.PIPE, text=True
+    )
+    tasks = campaign.tasks()
+    with Writer(path) as writer:
+        for turn in itertools.count():
+            if reader.poll() is not None:
+                break
+            row = min(turn // 100, 7)
+            writer.write_result(row, fake_result(campaign, tasks[row]))
+    assert reader.stdout.read() == "sound\n"
+    assert reader.returncode == 0
+
+
+KILLED_WRITER = """
+import sys, os
+sys.path[:0] = sys.argv[2:]
+from ensemble.results.store import Results, Writer
+from tests.support.fake_run import fake_result
+with Results(sys.argv[1]) as results:
+    campaign, tasks = results.campaign, results.tasks()
+writer = Writer(sys.argv[1])
+for row in range(5):
+    writer.write_result(row, fake_result(campaign, tasks[row]))
+os.kill(os.getpid(), 9)
+"""
+
+
+def test_rows_written_before_a_kill_are_whole(path, campaign):
+    folders = [str(ROOT), str(ROOT / "tests")]
+    subprocess.run([sys.executable, "-c", KILLED_WRITER, str(path), *folders])
+    with Results(path) as results:
+        assert results.status().tolist() == [1] * 5 + [0] * 3
+        for row, task in enumerate(results.tasks()[:5]):
+            curve = results.column("unloading_energy", slice(row, row + 1))[0]
+            np.testing.assert_array_equal(curve, fake_result(campaign, task).unloading_energy)
+
+
+# ---------------------------------------------------------------- files that are refused
+
+
+def refused(path) -> str:
+    with pytest.raises(InputError) as caught:
+        Results(path)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_foreign_files_are_refused(tmp_path, path):
+    assert "does not exist" in refused(tmp_path / "none.h5")
+    (tmp_path / "empty.h5").touch()
+    (tmp_path / "text.h5").write_text("no results\n")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    for name in ("empty", "text", "other"):
+        assert "is not a results file" in refused(tmp_path / f"{name}.h5")
+    refused(tmp_path)
+    with h5py.File(path, "r+") as file:
+        file.attrs["file_version"] = np.array([9, 0])
+    assert "has file version 9.0: this adhesis reads version 1" in refused(path)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.5, 0.99])
+def test_truncated_files_are_refused(path, share):
+    os.truncate(path, int(path.stat().st_size * share))
+    assert "is not a results file of adhesis, or it is damaged" in refused(path)
+
+
+def test_a_file_that_lacks_a_dataset_is_refused(path):
+    with h5py.File(path, "r+") as file:
+        del file["loss"]
+    assert "damaged" in refused(path)
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.data())
+def test_damaged_bytes_are_read_or_refused_in_one_sentence(path, tmp_path, data):
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 8))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    copy = tmp_path / "copy.h5"
+    copy.write_bytes(content)
+    try:
+        with Results(copy) as results:
+            results.status()
+            results.column("loss")
+            results.errors(np.arange(len(results)))
+    except InputError as error:
+        sentence = str(error)
+    else:
+        sentence = ""
+    assert "\n" not in sentence
+    assert copy.read_bytes() == content
+
+
+def test_a_disk_that_is_too_small_is_met_before_the_first_task(tmp_path, campaign, monkeypatch):
+    monkeypatch.setattr(schema, "PENDING", 0)
+    full = os.statvfs(tmp_path).f_frsize
+    monkeypatch.setattr(
+        "shutil.disk_usage", lambda _: type("Usage", (), {"free": full, "total": full})
+    )
+    with pytest.raises(InputError, match="and the disk has"):
+        create(tmp_path / "r.h5", campaign)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_leaves_nothing(campaign):
+    """/dev/full cannot hold a file; a limit on file size fails writes in the same place."""
+    code = (
+        "import sys, resource, signal; sys.path[:0] = sys.argv[2:]\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
+        "from campaign_support import campaign_text\n"
+        "from ensemble.campaign.file import parse_campaign\n"
+        "from ensemble.errors import InputError\n"
+        "from ensemble.results.store import create\n"
+        "try:\n    create(sys.argv[1], parse_campaign(campaign_text()))\n"
+        "except InputError as error:\n    print(error)\n"
+    )
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        target = f"{folder}/r.h5"
+        run = subprocess.run(
+            [sys.executable, "-c", code, target, str(ROOT), str(ROOT / "tests")],
+            capture_output=True,
+            text=True,
+        )
+        assert run.stdout.startswith(f"{target} cannot be written: "), run.stderr
+        assert len(run.stdout.splitlines()) == 1
+        assert not os.listdir(folder)
+
+
+# ---------------------------------------------------------------- scale and lock
+
+
+def test_many_tasks_take_little_time_and_memory(tmp_path):
+    text = campaign_text(realisations="5000", load_steps="40", jumps="64")
+    many = parse_campaign(text)
+    started = time.perf_counter()
+    create(tmp_path / "many.h5", many)
+    took = time.perf_counter() - started
+    size = (tmp_path / "many.h5").stat().st_size
+    assert size < 1.02 * schema.file_size(many) + 100_000
+    assert took < 10
+    with Results(tmp_path / "many.h5") as results:
+        assert len(results) == 20_000
+
+
+HOLD_LOCK = """
+import sys, time
+sys.path.insert(0, sys.argv[2])
+from ensemble.run.lock import RunLock
+RunLock(sys.argv[1]).acquire(4, 0.0)
+print("held", flush=True)
+time.sleep(60)
+"""
+
+
+def test_one_run_a_file_and_a_killed_one_holds_nothing(tmp_path):
+    path = tmp_path / "r.h5"
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLD_LOCK, str(path), str(ROOT)], stdout=subprocess.PIPE, text=True
+    )
+    assert holder.stdout.readline() == "held\n"
+    with pytest.raises(InputError, match=rf"another run .*process {holder.pid}, 4 ranks"):
+        RunLock(path).acquire(1, 0.2)
+    holder.kill()
+    holder.wait()
+    lock = RunLock(path)
+    lock.acquire(1, 2.0)
+    lock.release()
+    assert not list(tmp_path.iterdir())
+
+
+def test_ranks_that_outlive_their_launcher_are_waited_for(tmp_path):
+    path = tmp_path / "r.h5"
+    code = HOLD_LOCK.replace(".acquire(4, 0.0)", ".join()")
+    orphan = subprocess.Popen(
+        [sys.executable, "-c", code, str(path), str(ROOT)], stdout=subprocess.PIPE, text=True
+    )
+    assert orphan.stdout.readline() == "held\n"
+    with pytest.raises(InputError, match="ranks of an earlier run"):
+        RunLock(path).acquire(1, 0.2)
+    orphan.kill()
+    orphan.wait()
+    with RunLock(path) as lock:
+        lock.acquire(1, 2.0)

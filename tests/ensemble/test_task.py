@@ -1,0 +1,90 @@
+"""A task is a pure function: its row repeats to the bit and follows from the loop."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ensemble.campaign.file import parse_campaign
+from ensemble.results.schema import RESULT_COLUMNS, scales, shape_of
+from ensemble.task.compute import TaskResult, make_problem, row_of, run_task
+from solver.jumps import JUMP_KINDS, Jump
+from solver.loop import LoopResult
+from tests.support.campaign_support import campaign_text
+
+
+def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
+    """A made-up loop: values that name their place."""
+    problem = make_problem(campaign, campaign.tasks()[0])
+    n, top = campaign.cycle.load_steps, campaign.cycle.max_penetration
+    down = np.arange(n, -steps_below_zero - 1, -1)
+    penetration = np.concatenate([[0], top * np.arange(n + 1) / n, top * down / n])
+    branch = np.array(["loading"] * (n + 2) + ["unloading"] * len(down))
+    on_axis = np.ones(len(branch), bool)
+    on_axis[0] = False
+    value = np.arange(1.0, len(branch) + 1)
+    kinds = [JUMP_KINDS[i % len(JUMP_KINDS)] for i in range(jumps)]
+    catalogue = tuple(
+        Jump("unloading", problem.separation(-0.1 * i), float(i % 5), kind, 2, 1, 0.2, 0.1, 1e-5)
+        for i, kind in enumerate(kinds)
+    )
+    return LoopResult(
+        problem, top, n, branch, on_axis, penetration, problem.separation(0) * (1 - penetration),
+        value, value, value.astype(int), value, value, catalogue, 2.0, 3.0, 1.5, 0.1, {},
+    )  # fmt: skip
+
+
+def test_curves_end_in_zeros_after_detachment():
+    campaign = parse_campaign(campaign_text())
+    row = row_of(campaign, loop_of(campaign, steps_below_zero=2))
+    n = campaign.cycle.load_steps
+    np.testing.assert_array_equal(row["loading_mean_stress"], np.arange(2, n + 3))
+    unloading = row["unloading_mean_stress"]
+    assert unloading.shape == campaign.unloading_penetration.shape
+    np.testing.assert_array_equal(unloading[: n + 3], np.arange(n + 3, 2 * n + 6))
+    assert not unloading[n + 3 :].any()
+    assert row["audit_residual"] == 0.25
+
+
+def test_curves_are_cut_where_the_axis_ends():
+    campaign = parse_campaign(campaign_text(unloading_until="-0.1"))
+    row = row_of(campaign, loop_of(campaign, steps_below_zero=9))
+    assert row["unloading_patches"].shape == campaign.unloading_penetration.shape
+    assert row["unloading_patches"].all()
+
+
+def test_the_catalogue_keeps_the_largest_drops_in_the_order_of_the_path():
+    campaign = parse_campaign(campaign_text())
+    few = row_of(campaign, loop_of(campaign, steps_below_zero=2, jumps=3))
+    assert few["jump_count"] == 3
+    np.testing.assert_array_equal(few["jump_kind"], [0, 1, 2, -1, -1, -1, -1, -1])
+    assert np.isnan(few["jump_energy_drop"][3:]).all()
+    many = row_of(campaign, loop_of(campaign, steps_below_zero=2, jumps=20))
+    assert many["jump_count"] == 20
+    drops = np.arange(20.0) % 5
+    kept = np.sort(np.argsort(-drops, kind="stable")[:8])
+    np.testing.assert_array_equal(many["jump_energy_drop"], drops[kept])
+    np.testing.assert_allclose(many["jump_penetration"], -0.1 * kept, atol=1e-12)
+    total = many["loss_small_scale"] + many["loss_large_scale"]
+    assert total == drops.sum()
+
+
+def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
+    campaign = parse_campaign(campaign_text())
+    task = campaign.tasks()[0]
+    steps = []
+    one = run_task(campaign, task, lambda *step: steps.append(step[:2]))
+    two = run_task(campaign, task)
+    sizes = {s.name: s.values.size for s in scales(campaign)}
+    assert {f.name for f in dataclasses.fields(TaskResult)} == {c.name for c in RESULT_COLUMNS}
+    for column in RESULT_COLUMNS:
+        value = np.asarray(getattr(one, column.name), column.dtype)
+        assert value.shape == shape_of(column, sizes)[1:]
+        if column.name not in ("wall_time", "cpu_time"):
+            again = np.asarray(getattr(two, column.name), column.dtype)
+            assert value.tobytes() == again.tobytes(), column.name
+    assert len(steps) > campaign.cycle.load_steps
+    assert one.loss > 0
+    assert one.loss_small_scale + one.loss_large_scale == pytest.approx(one.loss_from_drops)

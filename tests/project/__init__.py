@@ -1,0 +1,1 @@
+"""Tests of the project as a whole: rooms, documentation, set-up, package."""

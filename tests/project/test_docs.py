@@ -1,0 +1,300 @@
+"""Documentation that runs: every code block, command, link and image of README and docs/.
+
+A block is run, or checked as far as it can be, or it is listed below with the reason why not. A
+reason that fits nothing any more fails the test, too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from matplotlib.image import imread
+
+from ensemble.campaign.file import parse_campaign
+from ensemble.command import COMMANDS, main
+
+ROOT = Path(__file__).parent.parent.parent
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
+
+# Commands that are read by their parser, or whose files are looked for, but that are not run here.
+NOT_RUN = {
+    "make run": "sets a machine up; tests/project/test_setup.py",
+    "make test": "is this",
+    "make setup": "sets a machine up; tests/project/test_setup.py",
+    "jobs/local.sh my.toml": "all cores; tests/project/test_setup.py",
+    "mpirun -n 9 adhesis run my.toml --out my.h5": "nine ranks; tests/ensemble/test_mpi.py",
+    "mpirun -n 8 adhesis run my.toml --out my.h5 --redo failed": "as before",
+    "sbatch --ntasks=64 --time=12:00:00 PATH/jobs/slurm.sh my.toml": "tests/ensemble/test_slurm.py",
+    'sbatch --ntasks=2 --wrap ".venv/bin/adhesis doctor --in ."': "needs a Slurm",
+    "qsub -l select=2:ncpus=32:mpiprocs=32 -v CAMPAIGN=my.toml,SCRIPT=PATH/jobs/pbs.sh "
+    "PATH/jobs/pbs.sh": "needs a PBS",
+    "qsub -l select=2:ncpus=32:mpiprocs=32 -l walltime=12:00:00 -v CAMPAIGN=my.toml,"
+    "ADHESIS=$ADHESIS,SCRIPT=PATH/jobs/pbs.sh PATH/jobs/pbs.sh": "needs a PBS",
+    "export ADHESIS=PATH/.venv/bin/adhesis": "a place of the reader's",
+    "python benchmarks/endurance.py empty": "a quiet machine; test_mpi.py runs it short",
+    "python benchmarks/endurance.py campaign jobs/example.toml": "as before",
+    "python benchmarks/endurance.py campaign jobs/paper.toml --out paper.h5": "takes minutes",
+    "adhesis report paper.h5 --to paper --beside beside/*.h5": "needs their results",
+    "python examples/measured_profile.py --to out/measured": "test_measured_profile.py",
+    "python examples/measured_profile.py trace.csv --to out/measured": "as before",
+}
+# Blocks that are neither code nor commands, by how they begin.
+TEXT = {
+    "v_q = 2 σ_q": "formula",
+    "U(Ω, s) = ": "formula",
+    "h(x) = Σ_m": "formula",
+    "loss = ∮ p̄ dΔ": "formula",
+    "loss = (1/λ) Σ": "formula",
+    "out/measured/trace.csv: 2001 heights": "output; tests/project/test_measured_profile.py",
+    "shortest wave": "as before",
+    "Jumps with waves": "as before",
+    "loss 104": "as before",
+}
+PROGRAMS = (
+    "adhesis",
+    ".venv/bin/adhesis",
+    "make",
+    "mpirun",
+    "sbatch",
+    "qsub",
+    "export",
+    "python",
+)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A code block of a page, fenced or indented."""
+
+    page: Path
+    language: str
+    text: str
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+        return f"{self.page.relative_to(ROOT)}: {self.text.splitlines()[0][:60]}"
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    """Every block, in order; paragraphs of an indented block are blocks of their own."""
+    language: str | None = None
+    kept: list[str] = []
+    before = ""
+    for line in [*page.read_text().splitlines(), ""]:
+        if language is not None:
+            if line == "```":
+                yield Block(page, language, "\n".join(kept) + "\n")
+                language, kept = None, []
+            else:
+                kept.append(line)
+        elif line.startswith("```"):
+            language = line[3:]
+        elif line.startswith("    ") and (kept or before == "" or before.startswith("#")):
+            kept.append(line[4:])
+        elif kept:
+            assert line == "", f"{page}: no empty line before {line!r}"
+            yield Block(page, "", "\n".join(kept) + "\n")
+            kept = []
+        else:
+            assert not line.startswith("    "), f"{page}: neither text nor a block: {line!r}"
+        before = line
+    assert language is None, f"{page}: a fence is not closed"
+
+
+BLOCKS = [block for page in PAGES for block in blocks(page)]
+
+
+def is_text(block: Block) -> bool:
+    return any(block.text.startswith(begin) for begin in TEXT)
+
+
+def is_transcript(block: Block) -> bool:
+    return block.text.startswith("$ ")
+
+
+def commands(block: Block) -> list[str]:
+    """The lines of a block of commands, without their comments."""
+    return [re.sub(r"\s+# .*", "", line) for line in block.text.splitlines()]
+
+
+COMMAND_BLOCKS = [
+    block
+    for block in BLOCKS
+    if block.language in ("", "bash", "sh") and not is_text(block) and not is_transcript(block)
+]
+LINES = [(block, line) for block in COMMAND_BLOCKS for line in commands(block)]
+
+
+def parser_of(name: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=f"adhesis {name}")
+    importlib.import_module(f"ensemble.command.{name}").add_arguments(parser)
+    return parser
+
+
+# ---------------------------------------------------------------------- nothing is left out
+
+
+def test_every_block_is_of_a_kind_that_is_tested() -> None:
+    kinds = {"python", "toml", "", "bash", "sh"}
+    assert [block.name for block in BLOCKS if block.language not in kinds] == []
+    for block, line in LINES:
+        word = line.split()[0]
+        assert word in PROGRAMS or re.fullmatch(r"(PATH/)?jobs/\w+\.sh", word), block.name
+
+
+def test_the_lists_of_what_is_not_run_are_up_to_date() -> None:
+    assert set(NOT_RUN) - {line for _, line in LINES} == set()
+    assert [begin for begin in TEXT if not any(b.text.startswith(begin) for b in BLOCKS)] == []
+
+
+# ---------------------------------------------------------------------- code
+
+
+@pytest.mark.parametrize(
+    "block", [b for b in BLOCKS if b.language == "python"], ids=lambda block: block.name
+)
+def test_python_runs(block: Block, tmp_path: Path) -> None:
+    if block.page.name == "README.md":
+        return  # tests/project/test_readme.py runs it and looks at what it prints
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{block.text}"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+@pytest.mark.parametrize(
+    "block", [b for b in BLOCKS if b.language == "toml"], ids=lambda block: block.name
+)
+def test_campaigns_are_valid(block: Block) -> None:
+    assert parse_campaign(block.text).tasks()
+
+
+# ---------------------------------------------------------------------- commands
+
+
+def example() -> str:
+    """Return the campaign that docs/campaign-file.md gives as an example."""
+    (block,) = (b for b in BLOCKS if b.language == "toml" and b.page.name == "campaign-file.md")
+    return block.text
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the commands run: with the files that they name."""
+    folder = tmp_path_factory.mktemp("docs")
+    (folder / "my.toml").write_text(example())
+    wrong = re.sub(r"hurst = .*", "hurst = [0.8, 1.2]", example())
+    (folder / "wrong.toml").write_text(wrong)
+    heights = "\n".join(f"{1e-6 * (-1) ** k / (1 + k % 7)}" for k in range(31))
+    for name in ("heights.csv", "out/measured/heights.csv"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(heights)
+    assert main(["run", str(folder / "my.toml"), "--out", str(folder / "my.h5")]) == 0
+    return folder
+
+
+def adhesis_words(line: str) -> list[str] | None:
+    """Return what stands after ``adhesis`` in a command, also in one that a launcher starts."""
+    words = shlex.split(line)
+    for place, word in enumerate(words):
+        if " " in word:  # sbatch --wrap "…"
+            return adhesis_words(word)
+        if word in ("adhesis", ".venv/bin/adhesis"):
+            return words[place + 1 :]
+    return None
+
+
+@pytest.mark.parametrize(("block", "line"), LINES, ids=[line for _, line in LINES])
+def test_commands_are_understood(block: Block, line: str) -> None:
+    words = adhesis_words(line)
+    if words is not None:
+        parser_of(words[0]).parse_args(words[1:])  # ends the test with a message if it cannot
+    for path in re.findall(r"\b((?:jobs|examples)/[\w/-]+\.\w+)", line):
+        assert (ROOT / path).exists()
+    if line.startswith("make "):
+        assert re.search(rf"^{line.split()[1]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "line", sorted({line for _, line in LINES if line not in NOT_RUN}), ids=lambda line: line
+)
+def test_commands_run(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    words = adhesis_words(line)
+    assert words is not None, "only commands of adhesis's are run"
+    assert main(words) == 0
+
+
+@pytest.mark.parametrize(
+    "block", [b for b in BLOCKS if is_transcript(b)], ids=lambda block: block.name
+)
+def test_transcripts_are_what_is_printed(
+    block: Block,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(folder)
+    line, _, told = block.text.partition("\n")
+    words = adhesis_words(line.removeprefix("$ "))
+    assert words is not None
+    main(words)
+    printed = capsys.readouterr()
+    assert printed.out + printed.err == told
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_in_the_text_exist(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for snippet in re.findall(r"`([^`]+)`", text):
+        words = snippet.replace("[", " ").replace("]", " ").split()
+        if "adhesis" in words[:-1]:
+            name, *rest = words[words.index("adhesis") + 1 :]
+            assert name in COMMANDS, snippet
+            known = parser_of(name)._option_string_actions
+            for option in (word for word in rest if word.startswith("--")):
+                assert option in known, snippet
+        for path in re.findall(r"^(?:(?:jobs|docs|tests|tools|solver|examples)/[\w/.-]+)", snippet):
+            assert (ROOT / path).exists(), snippet
+
+
+# ---------------------------------------------------------------------- links and images
+
+
+def headings(page: Path) -> set[str]:
+    """Anchors of the headings of a page, as GitHub makes them."""
+    found: set[str] = set()
+    for text in re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE):
+        anchor = re.sub(r"[^\w\- ]", "", text).strip().lower().replace(" ", "-")
+        again = sum(bool(re.fullmatch(rf"{anchor}(-\d+)?", other)) for other in found)
+        found.add(f"{anchor}-{again}" if again else anchor)
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_and_images_are_there(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if re.match(r"https?:", target):
+            continue
+        name, _, anchor = target.partition("#")
+        path = (page.parent / name) if name else page
+        assert path.exists(), target
+        if anchor:
+            assert anchor in headings(path), target
+        if path.suffix == ".png":
+            assert imread(path).shape[0] > 100, target

@@ -1,0 +1,201 @@
+"""Set-up, launch scripts and packaging: what can be checked without installing anything."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent.parent
+SCRIPTS = sorted([*ROOT.glob("jobs/*.sh"), *ROOT.glob("tools/*.sh"), ROOT / ".ci" / "run"])
+# Distribution names that differ from what is imported, and what other packages need to find.
+IMPORTED_AS = {"PyYAML": "yaml"}
+LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
+
+
+def project() -> dict[str, object]:
+    return dict(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"])
+
+
+def names(requirements: list[str]) -> set[str]:
+    return {re.split(r"[^\w.-]", text)[0].lower() for text in requirements}
+
+
+def locked() -> dict[str, str]:
+    lines = (ROOT / "requirements.lock").read_text().splitlines()
+    pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
+    return {name.lower().replace("_", "-"): version for name, version in pairs}
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_script_is_well_formed(script: Path) -> None:
+    subprocess.run(["bash", "-n", script], check=True)
+    text = script.read_text()
+    assert "\r" not in text
+    if script.name != "mpi.sh":  # that one is sourced
+        assert text.startswith("#!/")
+        assert os.access(script, os.X_OK)
+    if shutil.which("shellcheck"):
+        subprocess.run(["shellcheck", "-S", "error", "-x", script], cwd=ROOT, check=True)
+
+
+def test_batch_scripts_force_no_rules_on_a_cluster() -> None:
+    """Running as root or with more ranks than cores is for this machine's owner to allow."""
+    for name in ("slurm.sh", "pbs.sh"):
+        text = (ROOT / "jobs" / name).read_text()
+        assert "ALLOW_RUN_AS_ROOT" not in text
+        assert "oversubscribe" not in text
+        assert "tools/mpi.sh" not in text
+
+
+def test_dependencies_are_what_is_imported() -> None:
+    imported: set[str] = set()
+    for package in ("solver", "ensemble"):
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name.split(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    imported.add(node.module.split(".")[0])
+    imported -= set(sys.stdlib_module_names) | {"solver", "ensemble"}
+    declared = names(list(project()["dependencies"]))  # type: ignore[call-overload]
+    assert imported | LOADED_BY_NAME == {IMPORTED_AS.get(name, name) for name in declared}
+
+
+def test_lock_holds_all_that_is_declared_and_nothing_of_this_machine() -> None:
+    extras = project()["optional-dependencies"]
+    assert isinstance(extras, dict)
+    declared = names(list(project()["dependencies"])) | names(extras["dev"])  # type: ignore[call-overload]
+    assert declared <= set(locked())
+    # What building h5py without isolation needs in the environment.
+    assert {"setuptools", "cython", "pkgconfig", "packaging", "numpy", "mpi4py"} <= set(locked())
+    text = (ROOT / "requirements.lock").read_text()
+    assert "://" not in text
+    assert "@" not in text
+
+
+def test_make_help_lists_every_target() -> None:
+    done = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    for target in ("setup", "run", "test", "lint", "bench", "clean", "help"):
+        assert f"make {target} " in done.stdout
+
+
+def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
+    stamp = Path(sys.prefix, "adhesis-setup")
+    if not stamp.exists() or Path(sys.prefix).parent != ROOT:
+        pytest.skip("these tests do not run in the .venv that tools/setup.sh made")
+    before = stamp.stat().st_mtime_ns
+    env = {k: v for k, v in os.environ.items() if k not in ("VIRTUAL_ENV", "PYTHONHOME")}
+    done = subprocess.run(
+        [ROOT / "tools" / "setup.sh"], env=env, capture_output=True, text=True, check=True
+    )
+    assert "nothing to do" in done.stdout
+    assert stamp.stat().st_mtime_ns == before
+
+
+def test_local_script_asks_for_a_campaign() -> None:
+    done = subprocess.run([ROOT / "jobs" / "local.sh"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "usage: jobs/local.sh CAMPAIGN.toml" in done.stderr
+
+
+def test_local_script_stops_its_run_in_order(tmp_path: Path) -> None:
+    # A checkout in which adhesis is a stand-in that notes how it is stopped.
+    for folder in ("jobs", "tools"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    adhesis = tmp_path / ".venv" / "bin" / "adhesis"
+    adhesis.parent.mkdir(parents=True)
+    adhesis.write_text("#!/bin/bash\ntrap 'exit 75' USR1\ntouch begun\nsleep 60 & wait\n")
+    adhesis.chmod(0o755)
+    script = subprocess.Popen(
+        [tmp_path / "jobs" / "local.sh", "study.toml", "1"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        end = time.monotonic() + 20
+        while not (tmp_path / "begun").exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        script.terminate()
+        assert script.wait(20) == 75
+        assert script.stderr is not None
+        assert "the same command resumes it (out/study.h5)" in script.stderr.readline()
+    finally:
+        os.killpg(script.pid, signal.SIGKILL)  # the stand-in's sleep
+
+
+# ------------------------------------------------------------------ the PBS script, with a stand-in
+
+
+def pbs(tmp_path: Path, code: int, **env: str) -> tuple[str, str]:
+    """Run jobs/pbs.sh where qstat, qsub and adhesis only say how they were called."""
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    calls = tmp_path / "calls"
+    for name, text in {
+        "adhesis": f'echo "adhesis $*" >>{calls}; >study.h5; [ "$1" = report ] || exit {code}',
+        "qsub": f'echo "qsub $*" >>{calls}',
+        "mpirun": f'echo "mpirun $1 $2" >>{calls}; shift 4; exec "$@"',
+        "qstat": "printf '    Resource_List.select = 2:ncpus=2:mpiprocs=2\\n"
+        "    Resource_List.nodect = 2\\n    Resource_List.nodes = 2\\n"
+        "    Resource_List.walltime = 01:30:00\\n    resources_used.walltime = 00:00:30\\n'",
+    }.items():
+        (tools / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tools / name).chmod(0o755)
+    (tmp_path / "nodes").write_text("a\na\nb\nb\n")
+    done = subprocess.run(
+        [ROOT / "jobs" / "pbs.sh"],
+        env={
+            "PATH": f"{tools}:/usr/bin:/bin",
+            "PBS_O_WORKDIR": str(tmp_path),
+            "PBS_NODEFILE": str(tmp_path / "nodes"),
+            "PBS_JOBID": "17.head",
+            "CAMPAIGN": "study.toml",
+        }
+        | env,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == code, done.stdout + done.stderr
+    return calls.read_text(), done.stdout
+
+
+def test_pbs_script_tells_the_run_its_time_and_reports(tmp_path: Path) -> None:
+    calls, _ = pbs(tmp_path, 0)
+    run = re.search(r"adhesis run study.toml --out study.h5 --walltime (\d+)", calls)
+    assert run is not None
+    assert 5240 <= int(run[1]) <= 5250  # an hour and a half, less 30 s and two minutes
+    assert "mpirun -n 4" in calls
+    assert "adhesis report study.h5 --to study" in calls
+    assert "qsub" not in calls
+
+
+def test_pbs_script_submits_its_continuation(tmp_path: Path) -> None:
+    calls, _ = pbs(tmp_path, 75)
+    (line,) = [line for line in calls.splitlines() if line.startswith("qsub")]
+    assert "-l select=2:ncpus=2:mpiprocs=2 -l walltime=01:30:00 -v CAMPAIGN=study.toml," in line
+    assert "nodes=" not in line
+    assert "RESTARTS=1" in line
+    assert line.endswith(" jobs/pbs.sh")
+    assert "report" not in calls
+
+
+def test_pbs_script_does_not_come_back_for_ever(tmp_path: Path) -> None:
+    calls, text = pbs(tmp_path, 75, RESTARTS="3", MAX_RESTARTS="3")
+    assert "qsub" not in calls
+    assert "not submitted again" in text

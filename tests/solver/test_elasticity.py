@@ -1,0 +1,84 @@
+"""The elastic half-space on a grid: single waves, symmetry, inverse, energies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import Profile, single_wave
+from solver.grid.elasticity import ElasticGrid, full_contact_energy, full_contact_stress
+from solver.grid.fourier import RealFourier
+
+PERIOD, MODULUS, N = 2e-3, 1.3e6, 256
+
+
+@pytest.fixture
+def grid() -> ElasticGrid:
+    return ElasticGrid(N, PERIOD, MODULUS)
+
+
+@pytest.mark.parametrize("harmonic", [1, 7, N // 2 - 1])
+def test_a_stress_wave_displaces_by_twice_stress_over_modulus_and_wave_number(grid, harmonic):
+    q = 2 * np.pi * harmonic / PERIOD
+    wave = np.cos(q * np.arange(N) * PERIOD / N + 0.3)
+    expected = 2 / (MODULUS * q) * wave
+    np.testing.assert_allclose(grid.displacement(wave), expected, atol=1e-13 * abs(expected).max())
+
+
+def test_a_uniform_stress_displaces_nothing(grid):
+    assert np.abs(grid.displacement(np.full(N, 3e5))).max() < 1e-20
+
+
+def test_compliance_is_symmetric_and_its_kernel_even(grid):
+    rng = np.random.default_rng(1)
+    a, b = rng.standard_normal((2, N))
+    assert a @ grid.displacement(b) == pytest.approx(b @ grid.displacement(a), rel=1e-12)
+    kernel = grid.kernel()
+    np.testing.assert_allclose(kernel[1:], kernel[:0:-1], rtol=0, atol=1e-14 * kernel[0])
+    unit = np.zeros(N)
+    unit[5] = 1.0
+    shifted = np.roll(kernel, 5)
+    np.testing.assert_allclose(grid.displacement(unit), shifted, rtol=0, atol=1e-14 * kernel[0])
+
+
+def test_stress_undoes_displacement_up_to_the_mean(grid):
+    stress = np.random.default_rng(2).standard_normal(N)
+    back = grid.stress(grid.displacement(stress).copy())
+    np.testing.assert_allclose(back, stress - stress.mean(), atol=1e-12)
+
+
+def test_energy_of_full_contact_with_one_wave():
+    amplitude = 3e-7
+    q = 2 * np.pi / PERIOD
+    profile = single_wave(amplitude, PERIOD)
+    stress = full_contact_stress(profile, MODULUS, N)
+    assert stress.max() == pytest.approx(0.5 * MODULUS * q * amplitude, rel=1e-12)
+    exact = MODULUS * q * amplitude**2 / 8
+    assert full_contact_energy(profile, MODULUS) == pytest.approx(exact, rel=1e-14)
+    grid = ElasticGrid(N, PERIOD, MODULUS)
+    energy = grid.energy(stress, profile.heights(N)) / PERIOD
+    assert energy == pytest.approx(exact, rel=1e-12)
+
+
+def test_full_contact_energies_of_waves_add_up():
+    one = np.array([0, 1e-7, 0, 0], dtype=complex)
+    other = np.array([0, 0, 0, 4e-8j], dtype=complex)
+    energy = [full_contact_energy(Profile(PERIOD, a), MODULUS) for a in (one, other, one + other)]
+    assert energy[2] == pytest.approx(energy[0] + energy[1], rel=1e-14)
+
+
+def test_two_plans_give_the_same_bits():
+    values = np.random.default_rng(3).standard_normal(4096)
+    symbol = np.linspace(0, 1, 2049)
+    first = RealFourier(4096).multiply(symbol, values).copy()
+    np.testing.assert_array_equal(RealFourier(4096).multiply(symbol, values), first)
+
+
+def test_forward_and_inverse_are_a_pair():
+    fourier = RealFourier(64)
+    values = np.random.default_rng(4).standard_normal(64)
+    fourier.values[:] = values
+    fourier.forward()
+    np.testing.assert_allclose(fourier.spectrum, np.fft.rfft(values), atol=1e-13)
+    fourier.inverse()
+    np.testing.assert_allclose(fourier.values, 64 * values, atol=1e-12)

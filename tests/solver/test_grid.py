@@ -1,0 +1,331 @@
+"""Method ``grid`` against closed forms, invariances, the energy audit and hard cases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import (
+    HalfSpace,
+    LoopResult,
+    Problem,
+    Profile,
+    make_method,
+    run_loop,
+    self_affine_profile,
+    single_wave,
+)
+from solver.grid.method import GridMethod
+from solver.method import ContactState
+from solver.references import SingleWave
+
+HALF_SPACE = HalfSpace(1e6, 0.5)
+PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5
+ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+
+
+def wave(alpha: float) -> SingleWave:
+    return SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, HALF_SPACE.modulus)
+
+
+def wave_method(alpha: float, **options) -> GridMethod:
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave(alpha).work_of_adhesion)
+    return GridMethod(problem, **options)
+
+
+def rough_profile(seed: int = 4) -> Profile:
+    return self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, seed=seed, h_rms=1e-7)
+
+
+def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6, **options) -> LoopResult:
+    steps = options.pop("load_steps", 12)
+    method = GridMethod(Problem(profile, HalfSpace(young, 0.5), gamma), **{"nodes": 512, **options})
+    return run_loop(method, max_penetration=0.8, load_steps=steps)
+
+
+# ------------------------------------------------------------------ the single wave
+
+
+@pytest.mark.parametrize("alpha", ALPHAS)
+def test_loss_of_the_single_wave_is_exact_to_half_a_per_cent(alpha):
+    result = run_loop(wave_method(alpha, nodes=4096), max_penetration=0.4, load_steps=30)
+    exact = wave(alpha).loop.loss
+    assert result.loss == pytest.approx(exact, rel=5e-3)
+    assert result.loss_from_drops == pytest.approx(exact, rel=5e-3)
+    large = [j.kind for j in result.jumps if j.energy_drop > 0.01 * exact]
+    assert large == ["snap-in", "pull-off"]
+
+
+@pytest.mark.parametrize("alpha", [0.2, 0.4])
+def test_drops_converge_to_the_exact_loss(alpha):
+    nodes = np.array([64, 128, 256, 512])
+    exact = wave(alpha).loop.loss
+    errors = []
+    for n in nodes.tolist():
+        method = wave_method(alpha, nodes=n, accuracy=1e-4)
+        result = run_loop(method, max_penetration=0.2, load_steps=10)
+        errors.append(abs(result.loss_from_drops / exact - 1))
+    order = -np.polyfit(np.log(nodes), np.log(errors), 1)[0]
+    assert order > 1.2
+    assert errors[-1] < 2e-3
+
+
+def test_branch_states_are_johnsons():
+    exact = wave(0.3)
+    method = wave_method(0.3, nodes=2048)
+    state = method.follow(method.detached(AMPLITUDE), AMPLITUDE).states[-1]
+    for separation in (0.9, 0.7, 0.5, 0.8, 1.2, 1.3):
+        state = method.follow(state, separation * AMPLITUDE).states[-1]
+        a = exact.half_width(separation * AMPLITUDE)
+        assert state.separation == separation * AMPLITUDE
+        assert state.contact_fraction == pytest.approx(2 * a / PERIOD, abs=1.5 / 2048)
+        scale = exact.full_contact_stress
+        assert state.mean_stress / scale == pytest.approx(
+            float(exact.mean_stress(a)) / scale, abs=1e-3
+        )
+        assert state.energy == pytest.approx(
+            float(exact.energy(a)), abs=1e-3 * scale * AMPLITUDE * PERIOD
+        )
+
+
+@pytest.mark.parametrize("penetration", [0.1, 0.5, 0.9, 0.99])
+def test_without_adhesion_the_single_wave_is_westergaards(penetration):
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, 0.0)
+    method = GridMethod(problem, nodes=2048)
+    s = (1 - penetration) * AMPLITUDE
+    state = method.follow(method.detached(AMPLITUDE), s).states[-1]
+    # s = A (1 - y + y ln y), p̄ = p* y, y = sin²(πa/λ)
+    y = np.sin(0.5 * np.pi * state.contact_fraction) ** 2
+    assert AMPLITUDE * (1 - y + y * np.log(y)) == pytest.approx(s, abs=3e-3 * AMPLITUDE)
+    full = np.pi * HALF_SPACE.modulus * AMPLITUDE / PERIOD
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        mid = 0.5 * (low + high)
+        low, high = (mid, high) if 1 - mid + mid * np.log(mid) > 1 - penetration else (low, mid)
+    assert state.mean_stress == pytest.approx(full * low, rel=2e-5)
+    assert method.fields(state, 2048).stress.min() >= 0
+
+
+def test_edge_stress_is_that_of_the_stress_intensity():
+    exact = wave(0.4)
+    for nodes in (2048, 4096):
+        method = wave_method(0.4, nodes=nodes)
+        state = method.follow(method.detached(AMPLITUDE), 0.6 * AMPLITUDE).states[-1]
+        stress = method.fields(state, nodes).stress
+        edge = np.flatnonzero(stress)[[0, -1]]
+        a = 0.5 * float(state.edges[0, 1] - state.edges[0, 0])
+        # K of these very edges: they are up to half a node from equilibrium.
+        k = float(exact.stress_intensity_at(a, state.separation))
+        edge = np.roll(stress, nodes // 2)
+        edge = edge[np.flatnonzero(edge)[[0, -1]]]
+        assert np.abs(edge) * np.sqrt(PERIOD / nodes) == pytest.approx(0.7602 * k, rel=0.02)
+
+
+# ------------------------------------------------------------------ rough profiles
+
+
+@pytest.fixture(scope="module")
+def loop() -> LoopResult:
+    return rough_loop(rough_profile())
+
+
+def test_loop_integral_is_the_sum_of_drops(loop):
+    assert loop.loss > 0
+    assert len(loop.jumps) >= 3
+    assert abs(loop.audit_residual) < 2e-3
+    assert all(j.energy_drop >= 0 for j in loop.jumps)
+
+
+def test_mean_stress_is_the_slope_of_the_energy(loop):
+    # Independent of the drops: dU = -λ p̄ ds between neighbouring states that no jump separates.
+    s, p, u = loop.separation, loop.mean_stress, loop.energy
+    smooth = np.diff(s) != 0
+    work = -1e-3 * 0.5 * (p[1:] + p[:-1]) * np.diff(s)
+    error = np.abs(np.diff(u) - work)[smooth]
+    assert error.sum() < 5e-3 * loop.loss * 1e-3
+
+
+def test_same_input_same_bits(loop):
+    again = rough_loop(rough_profile())
+    np.testing.assert_array_equal(again.mean_stress, loop.mean_stress)
+    np.testing.assert_array_equal(again.separation, loop.separation)
+    assert again.loss == loop.loss
+    assert again.jumps == loop.jumps
+
+
+def test_shift_by_whole_nodes(loop):
+    shifted = rough_loop(rough_profile().shifted(37 * 1e-3 / 512))
+    assert shifted.loss == pytest.approx(loop.loss, rel=1e-5)
+    assert shifted.patches.max() == loop.patches.max()
+
+
+def test_shift_by_a_fraction_of_a_node_is_the_error_of_the_grid(loop):
+    shifted = rough_loop(rough_profile().shifted(0.37 * 1e-3 / 512))
+    assert shifted.loss == pytest.approx(loop.loss, rel=0.01)
+
+
+def test_mirror_image(loop):
+    mirrored = rough_loop(rough_profile().mirrored())
+    assert mirrored.loss == pytest.approx(loop.loss, rel=1e-5)
+
+
+def test_only_dimensionless_groups_matter(loop):
+    # Lengths times 4, heights times 2: γ/(E*λ) (λ/h)² stays with γ times 1 and E* times 1/…
+    # α² ~ γ λ/(E* h²): γ × 8, E × 8·4/4.
+    scaled = rough_loop(rough_profile().scaled(2.0, 4.0), gamma=2e-3 * 8, young=8e6)
+    assert scaled.loss_dimensionless == pytest.approx(loop.loss_dimensionless, rel=1e-5)
+    np.testing.assert_array_equal(scaled.patches, loop.patches)
+
+
+def test_finer_grid_and_finer_path_keep_the_loss(loop):
+    assert rough_loop(rough_profile(), nodes=1024).loss == pytest.approx(loop.loss, rel=0.02)
+    assert rough_loop(rough_profile(), load_steps=24).loss == pytest.approx(loop.loss, rel=3e-3)
+
+
+def test_gap_is_open_outside_and_nothing_overlaps():
+    method = GridMethod(Problem(rough_profile(), HALF_SPACE, 2e-3), nodes=512)
+    h_max = method.problem.profile.h_max
+    state = method.follow(method.detached(h_max), 0.4 * h_max).states[-1]
+    fields = method.fields(state, 512)
+    assert fields.gap.min() > -1e-6 * h_max
+    assert fields.gap.mean() == pytest.approx(state.separation, rel=1e-6)
+    assert fields.stress.mean() == pytest.approx(state.mean_stress, rel=1e-6)
+    assert abs(fields.displacement.mean()) < 1e-12 * h_max
+    coarse = method.fields(state, 128)
+    np.testing.assert_array_equal(coarse.gap, fields.gap[::4])
+    with pytest.raises(ValueError, match="divide"):
+        method.fields(state, 300)
+
+
+# ------------------------------------------------------------------ hard cases
+
+
+def test_nothing_touches_above_the_highest_crest():
+    method = wave_method(0.2, nodes=512)
+    path = method.follow(method.detached(3 * AMPLITUDE), 1.01 * AMPLITUDE)
+    assert [s.patches for s in path.states] == [0]
+    assert path.jumps == ()
+
+
+def test_first_touch_is_a_jump_at_the_highest_crest():
+    profile = single_wave(AMPLITUDE, PERIOD).shifted(0.43 * PERIOD / 512)
+    gamma = wave(0.2).work_of_adhesion
+    method = GridMethod(Problem(profile, HALF_SPACE, gamma), nodes=512)
+    path = method.follow(method.detached(2 * AMPLITUDE), 0.9 * AMPLITUDE)
+    jump = path.jumps[0]
+    assert (jump.kind, jump.patches_before, jump.patches_after) == ("snap-in", 0, 1)
+    assert jump.separation == profile.h_max
+    assert jump.contact_after == pytest.approx(2 * 0.089735, rel=0.02)
+    assert [s.patches for s in path.states[:2]] == [0, 1]
+
+
+def test_strong_adhesion_runs_to_nearly_full_contact_at_first_touch_but_never_closes():
+    result = run_loop(wave_method(10.0, nodes=512), max_penetration=0.5, load_steps=4)
+    assert result.contact_fraction[2] > 0.85  # after the first jump
+    assert result.contact_fraction.max() < 1
+    assert abs(result.audit_residual) < 5e-3
+    assert result.patches[-1] == 0
+
+
+def test_last_gap_stays_open_as_the_separation_goes_to_zero():
+    method = wave_method(0.6, nodes=256)
+    state = method.follow(method.detached(AMPLITUDE), 1e-3 * AMPLITUDE).states[-1]
+    assert 0.9 < state.contact_fraction < 1
+    assert method.fields(state, 256).gap.mean() == pytest.approx(1e-3 * AMPLITUDE, rel=1e-3)
+
+
+def test_two_equal_maxima_touch_and_leave_together():
+    two = Profile(PERIOD, np.array([0, 0, AMPLITUDE / 2], dtype=complex))
+    one = single_wave(AMPLITUDE, PERIOD / 2)
+    gamma = 0.1 * wave(0.2).work_of_adhesion
+    a, b = (
+        run_loop(
+            GridMethod(Problem(p, HALF_SPACE, gamma), nodes=n), max_penetration=0.5, load_steps=10
+        )
+        for p, n in ((two, 1024), (one, 512))
+    )
+    assert set(a.patches.tolist()) == {0, 2}
+    assert a.loss == pytest.approx(b.loss, rel=1e-4)
+
+
+def test_partial_loop_closes_and_reload_returns_to_the_same_state():
+    method = GridMethod(Problem(rough_profile(), HALF_SPACE, 2e-3), nodes=512)
+    h_max = method.problem.profile.h_max
+
+    def go(state: ContactState, s: float) -> ContactState:
+        return method.follow(state, s * h_max).states[-1]
+
+    deep = go(method.detached(h_max), 0.3)
+    half = go(deep, 0.7)
+    again = go(go(half, 0.3), 0.7)
+    # Return-point memory: the second visit closes the partial loop.
+    assert again.mean_stress == pytest.approx(half.mean_stress, rel=1e-2)
+    assert again.patches == half.patches
+    # The state is immutable: following from it once more gives the same bits.
+    assert go(deep, 0.7).mean_stress == half.mean_stress
+
+
+def test_without_adhesion_a_rough_loop_is_reversible():
+    result = rough_loop(rough_profile(), gamma=0.0)
+    assert result.jumps == ()
+    assert abs(result.loss_dimensionless) < 1e-8
+    assert result.patches.max() > 3
+
+
+@pytest.mark.parametrize("hurst", [0.05, 0.5, 0.97])
+def test_any_hurst_exponent_gives_an_audited_loop(hurst):
+    profile = self_affine_profile(hurst, period=1e-3, n0=1, ratio=6, seed=1, h_rms=1e-7)
+    result = rough_loop(profile, nodes=256)
+    assert result.loss > 0
+    assert abs(result.audit_residual) < 5e-3
+
+
+def test_more_than_two_hundred_patches():
+    crests = 256
+    a = np.zeros(crests + 1, dtype=complex)
+    a[crests] = AMPLITUDE / 2
+    a[1] = AMPLITUDE / 50
+    gamma = 0.01 * wave(0.2).work_of_adhesion / crests
+    method = GridMethod(Problem(Profile(PERIOD, a), HALF_SPACE, gamma), nodes_per_wave=16)
+    h_max = method.problem.profile.h_max
+    state = method.follow(method.detached(h_max), 0.7 * h_max).states[-1]
+    assert state.patches > 200
+    assert np.all(np.diff(state.edges.ravel()) > 0)
+
+
+# ------------------------------------------------------------------ input
+
+
+def test_number_of_nodes():
+    problem = Problem(rough_profile(), HALF_SPACE, 1e-3)  # highest harmonic 12
+    assert GridMethod(problem).n == 1024
+    # first order: a tenth of the error takes ten times the nodes, up to 256 per shortest wave
+    assert GridMethod(problem, accuracy=2e-4).n == 2048
+    assert GridMethod(problem, accuracy=1e-6).n == 4096
+    assert GridMethod(problem, nodes_per_wave=32).n == 512
+    assert GridMethod(problem, nodes=200).n == 200
+    method = make_method("grid", problem, nodes_per_wave=100)
+    described = method.describe()
+    assert (described["nodes"], described["nodes_per_wave"]) == (2048, 2048 / 12)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"nodes": 64}, "at least 96"),
+        ({"nodes": 201}, "even"),
+        ({"nodes_per_wave": 7}, "too coarse"),
+        ({"nodes_per_wave": 8.5}, "whole number"),
+        ({"accuracy": 0.0}, "between 0 and 1"),
+    ],
+)
+def test_a_grid_that_cannot_be_is_refused(options, text):
+    with pytest.raises(ValueError, match=text):
+        GridMethod(Problem(rough_profile(), HALF_SPACE, 1e-3), **options)
+
+
+def test_a_state_of_another_method_is_refused():
+    method = wave_method(0.2, nodes=256)
+    foreign = ContactState(0.5 * AMPLITUDE, np.array([[0.1, 0.2]]) * PERIOD, 0.0, 0.0, 0.0, 0.1)
+    with pytest.raises(ValueError, match="not made by"):
+        method.follow(foreign, 0.4 * AMPLITUDE)

@@ -1,0 +1,283 @@
+"""Parts of the method ``grid``: conjugate gradients, edge compliance, relaxation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from solver.grid.compliance import EdgeCompliance
+from solver.grid.contact import Contact, ContactSolver
+from solver.grid.edges import patch_ranges, survey
+from solver.grid.elasticity import ElasticGrid
+from solver.grid.kernels import dot, inverse_form
+from solver.grid.method import GridMethod
+from solver.grid.pairs import pairs
+
+HALF_SPACE = HalfSpace(1e6, 0.5)
+PERIOD = 2e-3 * np.pi
+
+
+def rough(gamma: float = 0.02, seed: int = 5, **options) -> GridMethod:
+    profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=8, seed=seed, h_rms=1e-6)
+    return GridMethod(Problem(profile, HALF_SPACE, gamma), **{"nodes": 512, **options})
+
+
+def random_contact(rng: np.random.Generator, n: int, patches: int) -> np.ndarray:
+    cuts = np.sort(rng.choice(n, 2 * patches, replace=False))
+    mask = np.zeros(n, dtype=bool)
+    for a, b in cuts.reshape(-1, 2):
+        mask[a:b] = True
+    return np.roll(mask, rng.integers(n))
+
+
+def dense(kernel: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    return kernel[np.abs(rows[:, None] - columns[None, :])]
+
+
+def exact_energy(method: GridMethod, mask: np.ndarray, separation: float) -> float:
+    """U in J/m by dense linear algebra."""
+    nodes = np.flatnonzero(mask)
+    target = method.height[nodes] - separation
+    stress = np.linalg.solve(dense(method.elastic.kernel(), nodes, nodes), target)
+    gamma = method.relaxation.adhesion[nodes].sum()
+    return float(method.elastic.dx * (0.5 * stress @ target - gamma))
+
+
+# ------------------------------------------------------------------ conjugate gradients
+
+
+@pytest.mark.parametrize("patches", [1, 3, 8])
+def test_conjugate_gradients_give_the_dense_solution(patches):
+    method = rough()
+    contact = method.solver.empty(0.4e-6)
+    contact.mask = random_contact(np.random.default_rng(patches), method.n, patches)
+    method.solver.solve(contact, 1e-8)
+    nodes = np.flatnonzero(contact.mask)
+    matrix = dense(method.elastic.kernel(), nodes, nodes)
+    exact = np.linalg.solve(matrix, method.height[nodes] - 0.4e-6)
+    assert np.abs(contact.stress[nodes] - exact).max() < 1e-6 * np.abs(exact).max()
+    assert not contact.stress[~contact.mask].any()
+    np.testing.assert_allclose(
+        contact.displacement, method.elastic.displacement(contact.stress), rtol=0, atol=1e-16
+    )
+
+
+def test_energy_error_is_of_second_order_in_the_residual():
+    method = rough()
+    mask = random_contact(np.random.default_rng(0), method.n, 4)
+    errors, residuals = [], []
+    exact = exact_energy(method, mask, 0.3e-6) + method.elastic.dx * float(
+        method.relaxation.adhesion[mask].sum()
+    )
+    for tolerance in (3.0, 0.3, 0.03):
+        contact = method.solver.empty(0.3e-6)
+        contact.mask = mask.copy()
+        method.solver.solve(contact, tolerance)
+        errors.append(exact - contact.elastic_energy)
+        residuals.append(contact.residual)
+        assert 0 <= errors[-1] <= contact.energy_error  # from below, and bounded
+    order = np.polyfit(np.log(residuals), np.log(errors), 1)[0]
+    assert order > 1.6
+
+
+def test_iterations_hardly_grow_with_the_grid():
+    iterations = []
+    for nodes in (512, 2048, 8192):
+        method = rough(nodes=nodes)
+        contact = method.solver.empty(0.5e-6)
+        contact.mask = method.height > 0.5e-6
+        method.solver.solve(contact, 1e-4)
+        iterations.append(method.solver.iterations)
+    assert iterations[-1] <= iterations[0] + 10
+    assert iterations[-1] <= 35
+
+
+def test_stalled_iteration_is_reported():
+    elastic = ElasticGrid(64, 1.0, 1.0)
+    solver = ContactSolver(elastic, np.cos(np.arange(64.0)), 1.0)
+    contact = Contact(0.1, np.ones(64, dtype=bool), np.zeros(64), np.zeros(64))
+    # Full contact at a mean gap: no solution exists.
+    with pytest.raises(RuntimeError, match="full contact has no solution"):
+        solver.solve(contact, 1e-12)
+
+
+def test_kernels():
+    rng = np.random.default_rng(0)
+    a, b = rng.standard_normal((2, 1000))
+    assert dot(a, b) == pytest.approx(np.sum(a * b), rel=1e-12)
+    m = rng.standard_normal((30, 30))
+    m = m @ m.T + np.eye(30)
+    v = rng.standard_normal(30)
+    assert inverse_form(m.copy(), v) == pytest.approx(v @ np.linalg.solve(m, v), rel=1e-12)
+
+
+# ------------------------------------------------------------------ local compliance
+
+
+def schur(kernel: np.ndarray, nodes: np.ndarray, j: int) -> float:
+    row = dense(kernel, np.array([j]), nodes)[0]
+    return float(kernel[0] - row @ np.linalg.solve(dense(kernel, nodes, nodes), row))
+
+
+def test_compliance_at_the_edge_of_a_long_patch():
+    n = 4096
+    compliance = EdgeCompliance(ElasticGrid(n, float(n), 1.0).kernel())
+    assert compliance(n // 2, n // 2, None) == pytest.approx(1.7286, rel=1e-3)
+
+
+def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
+    n = 1024
+    kernel = ElasticGrid(n, 2.5, 1e6).kernel()
+    compliance = EdgeCompliance(kernel)
+    errors = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        patches = int(rng.integers(2, 7))
+        # Half of the sets have short patches and narrow gaps.
+        if seed % 2:
+            cuts = np.cumsum(rng.integers(1, 24, 2 * patches))
+        else:
+            cuts = np.sort(rng.choice(n - 1, 2 * patches, replace=False))
+        mask = np.zeros(n, dtype=bool)
+        for a, b in cuts.reshape(-1, 2):
+            mask[a:b] = True
+        height = np.zeros(n)
+        contact = Contact(1.0, mask, -np.ones(n) * mask, np.zeros(n))
+        # Unit gap, unit tension, no adhesion: the prices are S itself.
+        edges = survey(contact, height, np.zeros(n), 2.0, compliance, -1.0)
+        for k in range(edges.side.size):
+            nodes = np.flatnonzero(mask)
+            exact = schur(kernel, nodes, int(edges.outer[k]))
+            errors.append(1 / edges.growth[k] / exact - 1)
+            rest = nodes[nodes != edges.inner[k]]
+            exact = schur(kernel, rest, int(edges.inner[k]))
+            errors.append(-edges.recession[k] / exact - 1)
+    # The worst are patches of one or two nodes far from all others, which no grid resolves anyway.
+    assert np.abs(errors).max() < 1.5e-2
+    assert np.median(np.abs(errors)) < 1e-3
+
+
+def test_compliance_of_a_single_patch_down_to_the_last_gap():
+    n = 512
+    kernel = ElasticGrid(n, 1.0, 1e6).kernel()
+    compliance = EdgeCompliance(kernel)
+    for width in (1, 2, 5, 100, n - 20, n - 3):
+        exact = schur(kernel, np.arange(width), width)
+        assert compliance(width, n - width, None) == pytest.approx(exact, rel=5e-3)
+    # The last free node cannot be closed at a positive mean gap: its compliance vanishes.
+    assert compliance(n - 1, 1, None) < 1e-6 * kernel[0]
+
+
+def test_moving_an_edge_by_one_node_costs_what_the_survey_says():
+    method = rough()
+    separation = 0.5e-6
+    contact = method.solver.empty(separation)
+    contact.mask = method.height > separation
+    method.solver.solve(contact, 1e-6)
+    edges = method.relaxation._survey(contact)
+    now = exact_energy(method, contact.mask, separation)
+    unit = method.elastic.dx * method.problem.work_of_adhesion
+    for k in range(edges.side.size):
+        grown, shrunk = contact.mask.copy(), contact.mask.copy()
+        grown[edges.outer[k]] = True
+        shrunk[edges.inner[k]] = False
+        cost = exact_energy(method, grown, separation) - now
+        assert edges.growth[k] == pytest.approx(cost, abs=0.005 * (unit + abs(cost + unit)))
+        if np.isfinite(edges.recession[k]):
+            cost = exact_energy(method, shrunk, separation) - now
+            assert edges.recession[k] == pytest.approx(cost, abs=0.005 * (unit + abs(unit - cost)))
+        else:
+            assert contact.stress[edges.inner[k]] >= 0
+
+
+@pytest.mark.parametrize("level", [0.3e-6, 0.8e-6])
+def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level, monkeypatch):
+    monkeypatch.setattr("solver.grid.pairs._COUPLING", np.inf)  # price them all
+    method = rough()
+    contact = method.solver.empty(0.8 * level)
+    contact.mask = method.height > level
+    method.solver.solve(contact, 1e-6)
+    relaxation = method.relaxation
+    edges = relaxation._survey(contact)
+    dx = method.elastic.dx
+    found = pairs(contact, edges, method.height, relaxation.adhesion, dx, relaxation.compliance)
+    assert {p.direction for p in found} == {1, -1}
+    now = exact_energy(method, contact.mask, contact.separation)
+    unit = 2 * dx * method.problem.work_of_adhesion
+    for pair in found:
+        moved = contact.mask.copy()
+        for k in pair.edges:
+            moved[edges.outer[k] if pair.direction > 0 else edges.inner[k]] = pair.direction > 0
+        cost = exact_energy(method, moved, contact.separation) - now
+        # A hundredth of the elastic part, which S prices.
+        elastic = abs(cost + pair.direction * unit)
+        assert -pair.release == pytest.approx(cost, abs=0.01 * elastic)
+
+
+# ------------------------------------------------------------------ relaxation
+
+
+def settle(method: GridMethod, separation: float) -> tuple[Contact, list[float]]:
+    contact = method.solver.empty(separation)
+    contact.mask = method.height > separation
+    method.solver.solve(contact, 1e-4)
+    energies: list[float] = []
+
+    def watch(energy: float, relaxing: Contact) -> bool:
+        energies.append(exact_energy(method, relaxing.mask, separation))
+        return False
+
+    relaxed = method.relaxation.relax(contact, watch)
+    assert relaxed is not None
+    return relaxed, energies
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+@pytest.mark.parametrize("gamma", [0.002, 0.02])
+def test_energy_never_rises_in_a_relaxation_and_ends_in_a_local_minimum(seed, gamma):
+    method = rough(gamma, seed)
+    separation = 0.6e-6
+    relaxed, energies = settle(method, separation)
+    unit = method.elastic.dx * gamma
+    assert len(energies) > 3
+    assert np.diff(energies).max() <= 1e-5 * unit
+    lowest = exact_energy(method, relaxed.mask, separation)
+    assert lowest <= energies[-1] + 1e-9 * unit
+    edges = method.relaxation._survey(relaxed)
+    for node in {*edges.inner.tolist(), *edges.outer.tolist()}:
+        flipped = relaxed.mask.copy()
+        flipped[node] ^= True
+        if flipped[node] or relaxed.stress[node] < 0:
+            # 0.5 %: what S may be wrong by.
+            assert exact_energy(method, flipped, separation) > lowest - 0.005 * unit
+    gap = relaxed.displacement - method.height + separation
+    assert gap[~relaxed.mask].min() > -1e-12
+
+
+def test_relaxation_stops_when_told_to():
+    method = rough()
+    contact = method.solver.empty(0.6e-6)
+    contact.mask = method.height > 0.6e-6
+    method.solver.solve(contact, 1e-4)
+    mask = contact.mask.copy()
+    assert method.relaxation.relax(contact, lambda energy, relaxing: True) is None
+    np.testing.assert_array_equal(contact.mask, mask)
+
+
+def test_patch_ranges_reach_round_the_period():
+    mask = np.array([1, 1, 0, 0, 1, 0, 0, 1], dtype=bool)
+    first, width = patch_ranges(mask)
+    assert (first.tolist(), width.tolist()) == ([4, 7], [1, 3])
+    assert [a.tolist() for a in patch_ranges(np.zeros(4, dtype=bool))] == [[], []]
+    assert [a.tolist() for a in patch_ranges(np.ones(4, dtype=bool))] == [[0], [4]]
+
+
+def test_touching_finds_the_crest_between_nodes():
+    profile = single_wave(1e-6, PERIOD).shifted(0.4 * PERIOD / 256)
+    method = GridMethod(Problem(profile, HALF_SPACE, 0.01), nodes=256)
+    crest = profile.h_max
+    empty = method.solver.empty(crest * (1 - 1e-6))
+    assert method.height.max() < empty.separation
+    assert method.relaxation.touching(empty).tolist() == [0]
+    assert method.relaxation.touching(method.solver.empty(crest * (1 + 1e-6))).size == 0

@@ -1,0 +1,250 @@
+"""The loading path and the energy audit, with a method that is exact (Johnson's single wave)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adhesis import ContactState, HalfSpace, Path, Problem, run_loop, single_wave
+from solver.jumps import classify
+from solver.loop import check_cycle
+from solver.method import Fields, Method
+from solver.profile import Profile
+from solver.references import ExactWave, SingleWave
+
+PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11
+HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)
+ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+
+
+def flat_wave(alpha: float) -> SingleWave:
+    return SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, HALF_SPACE.modulus)
+
+
+def exact(alpha: float, **options) -> ExactWave:
+    gamma = flat_wave(alpha).work_of_adhesion
+    return ExactWave(Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, gamma), **options)
+
+
+@pytest.mark.parametrize("alpha", ALPHAS)
+def test_loop_of_the_single_wave_has_the_exact_loss(alpha):
+    loss = flat_wave(alpha).loop.loss
+    result = run_loop(exact(alpha), max_penetration=0.9, load_steps=40)
+    assert result.loss_from_drops == pytest.approx(loss, rel=1e-9)
+    # The trapezoidal rule over 32 states a step; the bend at the fold is resolved by a, not s.
+    assert result.loss == pytest.approx(loss, rel=1e-5)
+    assert [j.kind for j in result.jumps] == ["snap-in", "pull-off"]
+    assert [j.branch for j in result.jumps] == ["loading", "unloading"]
+
+
+def test_audit_residual_falls_with_the_square_of_the_state_spacing():
+    residuals = [
+        run_loop(exact(0.2, states_per_step=k), max_penetration=0.8, load_steps=10).audit_residual
+        for k in (4, 8, 16, 32)
+    ]
+    assert abs(residuals[0]) < 1e-2
+    orders = np.log2(np.abs(residuals[:-1]) / np.abs(residuals[1:]))
+    assert orders == pytest.approx(2.0, abs=0.3)
+
+
+def test_loss_does_not_depend_on_the_depth():
+    losses = [
+        run_loop(exact(0.3), max_penetration=depth, load_steps=20).loss_from_drops
+        for depth in (0.05, 0.5, 0.99)
+    ]
+    assert losses == pytest.approx([losses[0]] * 3, rel=1e-12)
+
+
+def test_path_starts_and_ends_detached_and_keeps_the_axis():
+    result = run_loop(exact(0.2), max_penetration=0.6, load_steps=12)
+    loading, unloading = result.states("loading"), result.states("unloading")
+    assert loading[-1] + 1 == unloading[0]
+    assert result.patches[0] == 0
+    assert result.patches[-1] == 0
+    assert result.penetration[0] == 0
+    assert np.all(np.diff(result.penetration[loading]) >= 0)
+    assert np.all(np.diff(result.penetration[unloading]) <= 0)
+    axis = result.penetration[result.states("loading", load_steps_only=True)]
+    assert axis == pytest.approx(0.6 * np.arange(13) / 12, abs=1e-15)
+    back = result.penetration[result.states("unloading", load_steps_only=True)]
+    assert back == pytest.approx(0.6 * np.arange(12, 12 - len(back), -1) / 12, abs=1e-14)
+    # The turning point is the same state on both branches.
+    for values in (result.mean_stress, result.energy, result.contact_fraction):
+        assert values[loading[-1]] == values[unloading[0]]
+    # It goes on to below first touch and stops one step after pull-off.
+    assert result.jumps[-1].separation == pytest.approx(1.25204901072 * AMPLITUDE, rel=1e-9)
+    assert -0.252 - 0.05 < result.pull_off_penetration < -0.252
+
+
+def test_work_along_a_stable_stretch_is_the_change_of_energy():
+    """Without a jump in between, dU = -λ p̄ ds."""
+    result = run_loop(exact(0.2, states_per_step=100), max_penetration=0.9, load_steps=20)
+    stretch = result.states("loading")[5:]
+    work = -PERIOD * np.trapezoid(result.mean_stress[stretch], result.separation[stretch])
+    change = result.energy[stretch[-1]] - result.energy[stretch[0]]
+    assert work == pytest.approx(change, rel=1e-6)
+
+
+def test_dimensionless_loss_is_the_papers():
+    """W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max), computed here from the two axes."""
+    result = run_loop(exact(0.2), max_penetration=0.9, load_steps=40)
+    q0 = 2 * np.pi / PERIOD
+    stress = 2 * result.mean_stress / (HALF_SPACE.modulus * q0 * AMPLITUDE)
+    loss = np.trapezoid(stress, result.penetration)
+    assert result.loss_dimensionless == pytest.approx(loss, rel=1e-12)
+    # On one wave E* q0 h_max/2 is p*, so W~ is the loss of the exact table.
+    assert result.loss_dimensionless == pytest.approx(1.2018194e-2, rel=1e-5)
+
+
+def test_only_dimensionless_groups_matter():
+    base = run_loop(exact(0.3), max_penetration=0.7, load_steps=10)
+    other = SingleWave.with_alpha(0.3, 64 * AMPLITUDE, 8 * PERIOD, 4 * HALF_SPACE.modulus)
+    problem = Problem(
+        single_wave(AMPLITUDE, PERIOD).scaled(64, 8), HalfSpace(4e6, 0.5), other.work_of_adhesion
+    )
+    scaled = run_loop(ExactWave(problem), max_penetration=0.7, load_steps=10)
+    # The slope is not the same: the arc measure is felt at (A q0)² = 2.5e-9 at most.
+    assert scaled.loss_dimensionless == pytest.approx(base.loss_dimensionless, rel=1e-8)
+    assert scaled.contact_fraction == pytest.approx(base.contact_fraction, rel=1e-7, abs=1e-12)
+
+
+def test_without_adhesion_there_is_no_loss_and_no_jump():
+    result = run_loop(exact(0.0), max_penetration=0.8, load_steps=20)
+    assert result.jumps == ()
+    assert result.loss_from_drops == 0.0
+    assert abs(result.loss) < 1e-14 * AMPLITUDE * flat_wave(0.0).full_contact_stress
+    assert np.all(result.mean_stress >= 0)
+
+
+def test_a_shifted_crest_changes_nothing():
+    profile = single_wave(AMPLITUDE, PERIOD).shifted(0.4999 * PERIOD)
+    method = ExactWave(Problem(profile, HALF_SPACE, flat_wave(0.2).work_of_adhesion))
+    moved = run_loop(method, max_penetration=0.9, load_steps=10)
+    here = run_loop(exact(0.2), max_penetration=0.9, load_steps=10)
+    assert moved.loss == pytest.approx(here.loss, rel=1e-9)
+
+
+def test_partial_loop_from_an_older_state_closes_without_loss():
+    """Half-way reversal on the stable branch: the same states are met again, no jump."""
+    method = exact(0.3)
+    touch = method.follow(method.detached(AMPLITUDE), AMPLITUDE).states[-1]
+    deep = method.follow(touch, 0.3 * AMPLITUDE)
+    shallow = method.follow(deep.states[-1], 1.2 * AMPLITUDE)
+    again = method.follow(shallow.states[-1], 0.3 * AMPLITUDE)
+    assert shallow.jumps == again.jumps == ()
+    assert again.states[-1].energy == deep.states[-1].energy
+    assert again.states[-1].edges == pytest.approx(deep.states[-1].edges, rel=1e-14)
+
+
+def test_callers_see_every_state_and_every_step():
+    seen, steps = [], []
+    result = run_loop(
+        exact(0.2),
+        max_penetration=0.5,
+        load_steps=5,
+        on_state=lambda branch, state: seen.append((branch, state.separation)),
+        progress=lambda branch, penetration, state: steps.append(penetration),
+    )
+    assert [s for _, s in seen] == list(result.separation)
+    assert [b for b, _ in seen] == list(result.branch)
+    assert len(steps) == np.count_nonzero(result.load_step) - 1  # the turning point counts once
+
+
+class _Untrue(ExactWave):
+    """Claims energy drops 10 % too large."""
+
+    def follow(self, state: ContactState, separation: float) -> Path:
+        path = super().follow(state, separation)
+        return Path(
+            path.states, tuple(replace(j, energy_drop=1.1 * j.energy_drop) for j in path.jumps)
+        )
+
+
+class _Sticking(Method):
+    """One patch that never comes off."""
+
+    name = "sticking"
+
+    def follow(self, state: ContactState, separation: float) -> Path:
+        patch = np.array([[0.0, 1e-4]])
+        return Path((ContactState(separation, patch, -1.0, 0.0, 0.0, 0.1),), ())
+
+    def fields(self, state: ContactState, n: int) -> Fields:
+        raise NotImplementedError
+
+    def describe(self) -> dict[str, object]:
+        return {}
+
+
+def test_audit_catches_energy_drops_that_are_not_the_loss():
+    problem = exact(0.2).problem
+    result = run_loop(_Untrue(problem), max_penetration=0.8, load_steps=20)
+    assert result.audit_residual == pytest.approx(-0.1, abs=1e-3)
+
+
+def test_a_contact_that_never_detaches_is_reported():
+    with pytest.raises(RuntimeError, match="still in contact"):
+        run_loop(_Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)
+
+
+@pytest.mark.parametrize("depth", [0.0, 1.0, 1.5, -0.2, np.nan, np.inf])
+def test_depths_without_a_state_are_refused(depth):
+    with pytest.raises(ValueError, match=r"max_penetration is .* between 0 and 1"):
+        check_cycle(depth, 10)
+
+
+@pytest.mark.parametrize("steps", [0, -3, 2.5])
+def test_impossible_load_steps_are_refused(steps):
+    with pytest.raises(ValueError, match=r"load_steps is .* whole number"):
+        check_cycle(0.5, steps)
+
+
+def test_exact_wave_refuses_other_profiles():
+    rough = Profile(PERIOD, np.array([0, 1e-9, 1e-9], dtype=complex))
+    with pytest.raises(ValueError, match="harmonic 1"):
+        ExactWave(Problem(rough, HALF_SPACE, 0.0))
+
+
+def test_exact_wave_fields_fulfil_the_contact_conditions():
+    method = exact(0.3)
+    path = method.follow(method.detached(AMPLITUDE), 0.5 * AMPLITUDE)
+    state = path.states[-1]
+    f = method.fields(state, 4096)
+    contact = f.gap == 0
+    assert np.mean(contact) == pytest.approx(state.contact_fraction, abs=2 / 4096)
+    assert np.all(f.gap[~contact] > 0)
+    assert np.all(f.stress[~contact] == 0)
+    assert np.mean(f.gap) == pytest.approx(state.separation, rel=1e-4)
+    assert f.displacement == pytest.approx(f.gap + f.height - state.separation, abs=1e-24)
+    detached = method.fields(method.detached(2 * AMPLITUDE), 64)
+    assert np.all(detached.stress == 0)
+    assert detached.gap == pytest.approx(2 * AMPLITUDE - detached.height)
+
+
+# ---------------------------------------------------------------------- kinds of jumps
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind", "length"),
+    [
+        ([[1, 2]], [], "pull-off", 1.0),
+        ([], [[1, 2.5]], "snap-in", 1.5),
+        ([[1, 2]], [[1, 2], [4, 4.5]], "snap-in", 0.5),
+        ([[1, 2], [3, 4]], [[1, 4]], "merging", 3.0),
+        ([[1, 2], [4, 4.5]], [[1, 2]], "vanishing", 0.5),
+        ([[1, 4]], [[1, 2], [3, 4]], "splitting", 3.0),
+        ([[1, 2], [4, 5]], [[1, 2.5], [4, 5]], "spreading", 1.5),
+        ([[1, 2], [4, 5]], [[1, 2], [4, 4.25]], "receding", 1.0),
+        # Across the end of the period (λ = 10): the same patch, written from either side.
+        ([[9.5, 10.5]], [[9.0, 10.5]], "spreading", 1.5),
+        ([[0.0, 0.5], [4, 5]], [[9.5, 10.5], [4, 5]], "spreading", 1.0),
+        # Events in one jump: a new patch outweighs a merger, a merger outweighs a loss.
+        ([[1, 2], [3, 4]], [[1, 4], [6, 7]], "snap-in", 3.0),
+        ([[1, 2], [3, 4], [8, 9]], [[1, 4]], "merging", 3.0),
+    ],
+)
+def test_jumps_are_called_by_what_happens_to_the_patches(before, after, kind, length):
+    edges = (np.array(e, dtype=float).reshape(-1, 2) for e in (before, after))
+    assert classify(*edges, period=10.0) == (kind, pytest.approx(length))

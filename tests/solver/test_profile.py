@@ -1,0 +1,155 @@
+"""Profiles: the spectral method, given heights, statistics and transformations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import HalfSpace, Problem, Profile, profile_from_heights, single_wave
+from adhesis import self_affine_profile as spectral
+
+ROUGH = {"period": 2e-3 * np.pi, "n0": 10, "ratio": 20, "seed": 3}
+
+
+@pytest.fixture(scope="module")
+def rough() -> Profile:
+    return spectral(0.8, h_rms=1e-6, **ROUGH)
+
+
+def test_power_law_and_band(rough):
+    size = np.abs(rough.coefficients)
+    assert not size[:10].any()
+    m = np.arange(10, 201)
+    np.testing.assert_allclose(size[10:] ** 2 / size[10] ** 2, (m / 10.0) ** -2.6, rtol=1e-12)
+    assert rough.highest_harmonic == 200
+    assert rough.shortest_wavelength == pytest.approx(rough.period / 200)
+
+
+def test_statistics_are_those_of_the_nodes(rough):
+    n = 1024
+    assert rough.h_rms == pytest.approx(1e-6, rel=1e-14)
+    assert np.mean(rough.heights(n) ** 2) == pytest.approx(rough.m0, rel=1e-12)
+    assert np.mean(rough.slopes(n) ** 2) == pytest.approx(rough.m2, rel=1e-12)
+    assert np.mean(rough.curvatures(n) ** 2) == pytest.approx(rough.m4, rel=1e-12)
+    assert abs(rough.heights(n).mean()) < 1e-20
+
+
+def test_papers_slopes_come_from_twice_its_ratio():
+    # h_rms = 1 µm, n0 = 10: the sums give these m2; the paper's are those of twice the ratio.
+    for ratio, hurst, m2 in ((100, 0.8, 1.97e-3), (200, 0.8, 2.72e-3), (100, 0.7, 3.24e-3)):
+        profile = spectral(hurst, period=2e-3 * np.pi, n0=10, ratio=ratio, seed=1, h_rms=1e-6)
+        assert profile.m2 == pytest.approx(m2, rel=3e-3)
+
+
+@pytest.mark.parametrize("norm", [{"h_rms": 2e-6}, {"m2": 3e-3}, {"c0": 1e-14}])
+@pytest.mark.parametrize("amplitudes", ["deterministic", "rayleigh"])
+def test_normalisations(norm, amplitudes):
+    profile = spectral(0.7, amplitudes=amplitudes, **norm, **ROUGH)
+    ((name, value),) = norm.items()
+    if name == "c0":
+        if amplitudes == "deterministic":
+            assert abs(profile.coefficients[10]) ** 2 == pytest.approx(value, rel=1e-12)
+    else:
+        assert getattr(profile, name) == pytest.approx(value, rel=1e-12)
+
+
+def test_wider_spectrum_keeps_the_waves_it_had():
+    narrow = spectral(0.8, c0=1e-14, **ROUGH)
+    wide = spectral(0.8, c0=1e-14, **{**ROUGH, "ratio": 40})
+    np.testing.assert_allclose(wide.coefficients[:201], narrow.coefficients, rtol=1e-14)
+    phase = np.angle(wide.coefficients[10:])
+    assert phase.min() < -3
+    assert phase.max() > 3
+    other = spectral(0.8, c0=1e-14, **{**ROUGH, "seed": 4})
+    assert not np.allclose(np.angle(other.coefficients[10:50]), phase[:40])
+
+
+def test_finer_grid_is_the_same_function(rough):
+    np.testing.assert_allclose(rough.heights(4096)[::8], rough.heights(512), atol=1e-20)
+    x = np.arange(512) * rough.period / 512
+    np.testing.assert_allclose(rough.at(x), rough.heights(512), atol=1e-18)
+    np.testing.assert_allclose(rough.at(x, 1), rough.slopes(512), atol=1e-14)
+    np.testing.assert_allclose(rough.at(x, 2), rough.curvatures(512), rtol=1e-9, atol=1e-9)
+    with pytest.raises(ValueError, match="more than 400 nodes"):
+        rough.heights(400)
+
+
+def test_highest_point_is_that_of_the_continuous_function(rough):
+    x, top = rough.highest_point
+    fine = rough.heights(1 << 17)
+    assert top >= fine.max()
+    assert top - fine.max() < 1e-6 * top
+    assert float(rough.at(x)) == pytest.approx(top, rel=1e-14)
+    assert abs(float(rough.at(x, 1))) < 1e-10
+
+
+def test_transformations(rough):
+    d = 3 * rough.period / 1024
+    shifted = rough.shifted(d).heights(1024)
+    np.testing.assert_allclose(shifted, np.roll(rough.heights(1024), 3), atol=1e-18)
+    mirrored = rough.mirrored().heights(1024)
+    np.testing.assert_allclose(mirrored, np.roll(rough.heights(1024)[::-1], 1), atol=1e-18)
+    scaled = rough.scaled(2.0, 3.0)
+    assert (scaled.period, scaled.h_max) == (3 * rough.period, pytest.approx(2 * rough.h_max))
+    assert scaled.m2 == pytest.approx(rough.m2 * 4 / 9, rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [3, 64, 101])
+def test_given_heights_are_passed_through(n):
+    heights = np.random.default_rng(n).standard_normal(n) * 1e-6 + 5e-6
+    profile = profile_from_heights(heights, 1e-3)
+    x = np.arange(n) * 1e-3 / n
+    np.testing.assert_allclose(profile.at(x), heights - heights.mean(), atol=1e-19)
+    assert profile_from_heights(np.full(n, 2e-6), 1e-3).is_flat
+
+
+def test_single_wave():
+    wave = single_wave(3e-6, 1e-3)
+    assert wave.h_max == pytest.approx(3e-6, rel=1e-15)
+    assert wave.heights(4)[0] == pytest.approx(3e-6)
+    assert wave.m0 == pytest.approx(4.5e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"hurst": 0.0}, "between 0 and 1"),
+        ({"hurst": 1.0}, "between 0 and 1"),
+        ({"n0": 0}, "n0 is 0"),
+        ({"ratio": 1.5}, "ratio is 1.5"),
+        ({"seed": -1}, "seed is -1"),
+        ({"h_rms": np.nan}, "h_rms is nan"),
+        ({"m2": 1e-3}, "exactly one"),
+        ({"amplitudes": "gamma"}, "amplitudes is 'gamma'"),
+        ({"period": -1.0}, "period is -1.0"),
+    ],
+)
+def test_impossible_spectra_are_refused(change, text):
+    with pytest.raises(ValueError, match=text):
+        spectral(**{"hurst": 0.8, "h_rms": 1e-6, **ROUGH, **change})
+
+
+@pytest.mark.parametrize(
+    ("heights", "text"),
+    [
+        ([1.0], "at least 3"),
+        ([[1.0, 2.0, 3.0]], "dimensions"),
+        ([1.0, np.nan, 2.0], r"heights\[1\] is nan"),
+    ],
+)
+def test_impossible_heights_are_refused(heights, text):
+    with pytest.raises(ValueError, match=text):
+        profile_from_heights(np.array(heights), 1e-3)
+
+
+def test_coefficients_must_describe_a_profile():
+    for bad, text in (([1.0, 1.0], "zero mean"), ([0.0], "M ≥ 1"), ([0.0, np.inf], "finite")):
+        with pytest.raises(ValueError, match=text):
+            Profile(1e-3, np.array(bad, dtype=complex))
+    with pytest.raises(ValueError, match="flat"):
+        Problem(Profile(1e-3, np.zeros(3, dtype=complex)), HalfSpace(1e6, 0.5), 0.01)
+
+
+def test_an_absurd_spectrum_is_refused_before_it_fills_the_memory():
+    with pytest.raises(ValueError, match="at most 100000 waves"):
+        spectral(0.8, period=1.0, n0=10, ratio=1_000_000, seed=1, h_rms=1e-6)

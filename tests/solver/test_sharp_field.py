@@ -1,0 +1,220 @@
+"""Method sharp, given edges: the field against closed forms, another solution, and differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from solver.grid.method import GridMethod
+from solver.sharp.coordinate import map_gaps, theta_at
+from solver.sharp.field import GapField
+from solver.sharp.opening import fine_opening, work_of_gaps
+from solver.sharp.source import StressSource, gap_moments
+from tests.support.explicit_solution import explicit_solution
+
+GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
+
+
+@pytest.fixture(scope="module")
+def rough():
+    """Paper's spectrum with wave numbers 10 … 1000."""
+    return self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
+
+
+@pytest.fixture(scope="module")
+def source(rough):
+    return StressSource(rough)
+
+
+@pytest.fixture(scope="module")
+def separation(rough):
+    return 0.5 * rough.h_max * rough.q0
+
+
+def energy(source, gaps, separation):
+    """Elastic energy beyond full contact in units of E*/(2 q0²)."""
+    field = GapField(source, gaps, separation, 1e-12)
+    return 0.5 * work_of_gaps(field) - np.pi * separation * field.pressure, field
+
+
+@pytest.mark.parametrize("half_width", [0.01, 0.1, 0.5, 1.5, 3.0])
+@pytest.mark.parametrize("toughness", [0.0, 1e-3])
+def test_single_wave_against_johnson(half_width, toughness):
+    """A cos θ, |θ| < a in contact, any K: mean stress and K to 1e-12 of the wave's p*."""
+    amplitude = 1e-3
+    source = StressSource(single_wave(amplitude, 2 * np.pi))
+    y = np.sin(half_width / 2) ** 2
+    p1 = toughness / np.sqrt(2 * np.pi / np.tan(half_width / 2))
+    separation = amplitude * (1 - y + y * np.log(y)) - p1 * np.log(y)
+    field = GapField(source, np.array([[half_width, 2 * np.pi - half_width]]), separation, 1e-14)
+    mean_stress = amplitude * y - p1  # E*/2 = 1
+    assert abs(field.pressure - mean_stress) < 5e-12 * amplitude
+    k = 0.5 * np.sqrt(2 * np.pi) * field.opening
+    assert np.abs(k - toughness).max() < 1e-11 * max(toughness, amplitude)
+
+
+@pytest.mark.parametrize("patches", [1, 3, 4])
+def test_field_equals_the_explicit_solution(patches):
+    """Cracks in a full contact and the Riemann-Hilbert formula are two ways to the same field."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=5, h_rms=1e-6, seed=2)
+    source = StressSource(profile)
+    separation = 0.6 * profile.h_max * profile.q0
+    gaps = {
+        1: [[1.0, 5.5]],
+        3: [[0.3, 0.8], [1.0, 2.0], [2.3, 5.1]],
+        4: [[0.3, 0.8], [1.0, 2.0], [2.3, 3.1], [3.3, 4.9]],
+    }[patches]
+    field = GapField(source, np.array(gaps), separation, 1e-13)
+    c, opening = explicit_solution(
+        lambda theta: source.sample(theta)[:, 0], np.array(gaps), separation, 60
+    )
+    assert np.abs(field.opening - opening).max() < 1e-11 * np.abs(opening).max()
+    # p̄ = ±c_0 up to the factors 2 of the scaled product T
+    assert abs(abs(c[0]) / 2**patches / abs(field.pressure) - 1) < 1e-10
+
+
+def test_field_converges_with_its_tolerance(source, separation):
+    """The error follows the tolerance over six decades, with patches down to 0.16 λ_min."""
+    gaps = GAPS.copy()
+    gaps[1, 0] = 0.801
+    exact = GapField(source, gaps, separation, 1e-13).opening
+    for tolerance in (1e-3, 1e-5, 1e-7, 1e-9):
+        opening = GapField(source, gaps, separation, tolerance).opening
+        assert np.abs(opening - exact).max() < 20 * tolerance * np.abs(exact).max()
+
+
+def test_energy_by_separation_is_the_mean_stress(source, separation):
+    step = 1e-3 * separation
+    slope = (
+        energy(source, GAPS, separation + step)[0] - energy(source, GAPS, separation - step)[0]
+    ) / (2 * step)
+    pressure = energy(source, GAPS, separation)[1].pressure
+    assert abs(slope / (-2 * np.pi * pressure) - 1) < 1e-10
+
+
+def test_energy_by_edge_is_the_energy_release_rate(source, separation):
+    """∂U/∂θ_e = ∓π C²/8: Irwin's G = K²/(2E*) in these units."""
+    field = energy(source, GAPS, separation)[1]
+    scale = np.pi * np.max(field.opening**2) / 8
+    for k, side in np.ndindex(5, 2):
+        up, down = GAPS.copy(), GAPS.copy()
+        up[k, side] += 1e-5
+        down[k, side] -= 1e-5
+        slope = (energy(source, up, separation)[0] - energy(source, down, separation)[0]) / 2e-5
+        release = np.pi * field.opening[k, side] ** 2 / 8
+        assert abs(slope - (-release if side else release)) < 2e-5 * scale
+
+
+def test_derivatives_against_differences(source, separation):
+    field = GapField(source, GAPS, separation, 1e-13)
+    by_edge, pressure_by_edge = field.derivatives
+    step = 1e-6
+    for f in range(10):
+        up, down = GAPS.ravel().copy(), GAPS.ravel().copy()
+        up[f] += step
+        down[f] -= step
+        high = GapField(source, up.reshape(-1, 2), separation, 1e-13)
+        low = GapField(source, down.reshape(-1, 2), separation, 1e-13)
+        difference = (high.opening - low.opening).ravel() / (2 * step)
+        assert np.abs(difference - by_edge[:, f]).max() < 2e-6 * np.abs(difference).max()
+        slope = (high.pressure - low.pressure) / (2 * step)
+        assert abs(slope - pressure_by_edge[f]) < 2e-6 * np.abs(pressure_by_edge).max()
+
+
+def test_hessian_is_symmetric(source, separation):
+    """C_e ∂C_e/∂n_f is a second derivative of the energy."""
+    field = GapField(source, GAPS, separation, 1e-13)
+    outward = np.tile([1.0, -1.0], 5)
+    hessian = field.opening.ravel()[:, None] * field.derivatives[0] * outward
+    off = hessian - np.diag(np.diag(hessian))
+    assert np.abs(off - off.T).max() < 1e-9 * np.abs(off).max()
+
+
+def test_derivatives_by_separation(source, separation):
+    field = GapField(source, GAPS, separation, 1e-12)
+    other = GapField(source, GAPS, 2 * separation, 1e-12)
+    assert np.allclose(
+        other.opening - field.opening, separation * field.opening_by_separation, rtol=1e-9
+    )
+    assert abs(other.pressure - field.pressure - separation * field.pressure_by_separation) < (
+        1e-9 * abs(field.pressure)
+    )
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_moments_against_brute_force(source, k):
+    """Compressed panels give the Chebyshev moments that 60,000 plain nodes give."""
+    gaps = np.array([[1.0, 1.004], [1.02, 3.0], [3.00001, 4.0]])
+    gap = map_gaps(gaps)[k]
+    s, ends = np.zeros((20, 2)), np.zeros((2, 2))
+    gap_moments(gap, source.panels, s, ends)
+    count = 60_000
+    t = (np.arange(count) + 0.5) * np.pi / count
+    place = np.array([theta_at(gap, x) for x in np.cos(t)])
+    load = source.sample(place[:, 0]) * place[:, 1:]
+    n = np.arange(1, 21)
+    expected = 2 / count * (np.sin(np.outer(n, t)) * np.sin(t)) @ load
+    assert np.abs(s - expected).max() < 1e-9 * np.abs(expected).max()
+    expected = np.stack([(1 - np.cos(t)) @ load, (1 + np.cos(t)) @ load]) / count
+    assert np.abs(ends - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_mean_gap_is_the_separation(source, separation):
+    field = GapField(source, GAPS, separation, 1e-10)
+    total = 0.0
+    for k in range(5):
+        shape = fine_opening(field, k)
+        total += float(shape.weight @ shape.opening)
+    assert abs(total / (2 * np.pi * separation) - 1) < 1e-9
+
+
+def test_edge_opening_against_the_edge_stress_of_the_grid():
+    """K of four patches on the grid: first order in dx, and the constant of its edge node.
+
+    The stress of a patch's last node is 0.7602 K/sqrt(dx), and the edge lies 0.190 dx inside the
+    outer face of that node (docs/methods.md).
+    """
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=2, ratio=8, h_rms=1e-6, seed=2)
+    source, half_space = StressSource(profile), HalfSpace(1e6, 0.5)
+    separation = 0.3 * profile.h_max
+    wanted = np.array([[0.4, 1.5], [2.0, 2.9], [3.3, 4.6], [5.1, 5.9]])  # patches
+    errors = []
+    for n in (4096, 16384):
+        grid = GridMethod(Problem(profile, half_space, 0.02), nodes=n)
+        first, last = np.round(wanted * n / (2 * np.pi)).astype(int).T
+        contact = grid.solver.empty(separation)
+        for a, b in zip(first, last, strict=True):
+            contact.mask[a : b + 1] = True
+        grid.solver.solve(contact, 1e-10)
+        dx = profile.period / n
+        k_grid = -contact.stress[np.stack([first, last])] * np.sqrt(dx) / 0.7602
+        left, right = ((first - 0.31) * 2 * np.pi / n, (last + 0.31) * 2 * np.pi / n)
+        gaps = np.stack([right, np.append(left[1:], left[0] + 2 * np.pi)], axis=1)
+        opening = GapField(source, gaps, separation * profile.q0, 1e-10).opening
+        # of a gap's ends the left one belongs to the patch before it
+        by_patch = np.stack([np.roll(opening[:, 1], 1), opening[:, 0]])
+        k = by_patch * half_space.modulus / 4 * np.sqrt(2 * np.pi / profile.q0)
+        errors.append(float(np.abs(k_grid - k).max() / np.abs(k).max()))
+    assert errors[0] < 0.02
+    # four times the nodes: a quarter of the error, but for the four digits of the constants
+    assert errors[1] < 0.4 * errors[0] + 2e-4
+
+
+def test_hundreds_of_patches_in_one_period():
+    """220 equal waves in one period: the field of one wave, to 1e-10."""
+    amplitude, waves = 1e-5, 220
+    half_width = 1.0
+    y = np.sin(half_width / 2) ** 2
+    separation = amplitude * (1 - y + y * np.log(y))
+    coefficients = np.zeros(waves + 1, dtype=complex)
+    coefficients[waves] = amplitude / 2
+    from adhesis import Profile
+
+    source = StressSource(Profile(2 * np.pi, coefficients))
+    crest = np.arange(waves) * 2 * np.pi / waves
+    gaps = np.stack([crest + half_width / waves, crest + (2 * np.pi - half_width) / waves], axis=1)
+    field = GapField(source, gaps, separation, 1e-10)
+    pressure = waves * amplitude * y
+    assert abs(field.pressure / pressure - 1) < 1e-9
+    assert np.abs(field.opening).max() < 1e-8 * amplitude * waves

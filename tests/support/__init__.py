@@ -1,0 +1,1 @@
+"""What several tests share: campaigns, fake runs, synthetic results, other solutions."""

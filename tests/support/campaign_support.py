@@ -1,0 +1,163 @@
+"""What the tests of campaigns share: campaigns, fake tasks, commands under mpirun."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+TESTS = Path(__file__).resolve().parent
+MPIRUN = os.environ.get("MPIRUN") or "mpirun"
+
+# Time and place may differ between two runs of one campaign; nothing else may.
+TIMING = {"wall_time", "cpu_time", "rank"}
+
+CAMPAIGN = """\
+[profile]
+period = 1e-3
+n0 = 1
+ratio = 4
+h_rms = 1e-6
+
+[material]
+young = 1e6
+poisson = 0.5
+
+[sweep]
+hurst = [0.7, 0.8]
+work_of_adhesion = [0.01, 0.04]
+realisations = 2
+seed = 5
+
+[cycle]
+max_penetration = 0.6
+load_steps = 4
+unloading_until = -3
+
+[solver]
+method = "grid"
+nodes_per_wave = 16
+
+[output]
+jumps = 8
+"""
+
+
+def campaign_text(**changes: str) -> str:
+    """Return the campaign with some values replaced, by key."""
+    lines = CAMPAIGN.splitlines()
+    for key, value in changes.items():
+        place = next(i for i, line in enumerate(lines) if line.startswith(f"{key} = "))
+        lines[place] = f"{key} = {value}"
+    return "\n".join(lines) + "\n"
+
+
+def write_campaign(folder: Path, name: str = "c.toml", **changes: str) -> Path:
+    """Write the campaign with some values replaced."""
+    path = folder / name
+    path.write_text(campaign_text(**changes))
+    return path
+
+
+def environment(**extra: str) -> dict[str, str]:
+    """Return an environment in which mpirun works even from a process that has loaded MPI."""
+    dirty = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "SLURM_", "MPI4PY_RC_")
+    env = {k: v for k, v in os.environ.items() if not k.startswith(dirty)}
+    env.update(
+        OMPI_ALLOW_RUN_AS_ROOT="1",
+        OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
+        OMPI_MCA_rmaps_base_oversubscribe="1",
+        OMPI_MCA_hwloc_base_binding_policy="none",
+        PYTHONPATH=str(ROOT),
+        **extra,
+    )
+    return env
+
+
+def command(words: Iterable[object], ranks: int = 0, fake: str | None = None) -> list[str]:
+    """Return the command line of ``adhesis WORDS``, under mpirun if ranks are given."""
+    entry = [str(TESTS / "fake_run.py"), fake] if fake is not None else ["-m", "ensemble"]
+    start = [MPIRUN, "-n", str(ranks)] if ranks else []
+    module = ["-m", "mpi4py"] if ranks else []
+    return [*start, sys.executable, *module, *entry, *map(str, words)]
+
+
+def adhesis(
+    *words: object, ranks: int = 0, fake: str | None = None, cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    return subprocess.run(
+        command(words, ranks, fake),
+        env=environment(),
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+
+
+def start(*words: object, ranks: int = 0, fake: str | None = None) -> subprocess.Popen[str]:
+    """Start a command in a process group of its own."""
+    return subprocess.Popen(
+        command(words, ranks, fake),
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def ranks_of(launcher: int) -> list[int]:
+    """Return the process ids of the ranks that a launcher has started."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == launcher:
+            found.append(int(stat.parent.name))
+    return sorted(found)
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Wait for a condition; AssertionError if it does not come true."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.02)
+
+
+def done_rows(path: Path) -> int:
+    """Return the number of done rows of a results file that may not exist yet."""
+    if not path.exists():
+        return 0
+    with h5py.File(path, "r", locking=False) as file:
+        return int(np.sum(file["status"][:] == 1))
+
+
+def kill_all(process: subprocess.Popen[str]) -> None:
+    """Kill -9 a launcher and its ranks, as a machine that goes down does."""
+    for pid in [*ranks_of(process.pid), process.pid]:
+        os.kill(pid, signal.SIGKILL)
+    process.wait()
+
+
+def differences(one: Path, two: Path) -> list[str]:
+    """Return the datasets, timing aside, that differ in a bit."""
+    with h5py.File(one) as a, h5py.File(two) as b:
+        assert set(a) == set(b)
+        return [
+            name
+            for name in a
+            if name not in TIMING and a[name][()].tobytes() != b[name][()].tobytes()
+        ]

@@ -1,0 +1,152 @@
+"""Results files with numbers whose averages are known, for the tests of aggregator and report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ensemble.campaign.file import parse_campaign
+from ensemble.campaign.tables import Campaign
+from ensemble.results.schema import kept_rows
+from ensemble.results.store import create
+from ensemble.task.fields import GAP_EDGES, field_plan
+from solver.jumps import JUMP_KINDS
+
+CAMPAIGN = """
+[profile]
+period = 6.283185307179586e-3
+n0 = 10
+ratio = 10
+h_rms = 1e-6
+[material]
+young = 1e6
+poisson = 0.5
+[sweep]
+hurst = {hurst}
+work_of_adhesion = {gamma}
+realisations = {realisations}
+seed = 1
+[cycle]
+max_penetration = 0.9
+load_steps = 20
+unloading_until = -2.0
+[output]
+jumps = {jumps}
+field_nodes = 256
+"""
+
+
+def campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32) -> Campaign:
+    return parse_campaign(
+        CAMPAIGN.format(
+            hurst=list(hurst), gamma=list(gamma), realisations=realisations, jumps=jumps
+        )
+    )
+
+
+def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
+    """Random but plausible values of every dataset along the task axis; all tasks done."""
+    rng = np.random.default_rng(seed)
+    tasks = campaign.tasks()
+    n, slots = len(tasks), campaign.output.jumps
+    hurst = np.array([t.hurst for t in tasks])
+    gamma = np.array([t.work_of_adhesion for t in tasks])
+    h_max = 3e-6 * (1 + 0.1 * rng.standard_normal(n))
+    scale = 0.5 * (1e6 / 0.75) * 1000 * h_max
+    up, down = campaign.loading_penetration, campaign.unloading_penetration
+    size = np.sqrt(gamma / 0.04)[:, None] * (1 + 0.1 * rng.standard_normal(n))[:, None]
+    loading = size * (up - 3 * up * (1 - up)) * 2
+    pull_off = -1.2 * size
+    stuck = down > pull_off
+    unloading = np.where(stuck, (down - 0.9) * 3 + loading[:, -1:], 0.0)
+    share = rng.uniform(0.05, 0.3, n)
+    loss = 0.4 * gamma * (1 + 0.2 * rng.standard_normal(n)) * (1.5 - hurst)
+    audit = 0.01 * rng.standard_normal(n)
+    drops = loss * (1 - audit)
+    out = {
+        "hurst": hurst,
+        "work_of_adhesion": gamma,
+        "realisation": np.array([t.realisation for t in tasks], dtype=np.int32),
+        "seed": np.array([t.seed for t in tasks], dtype=np.int64),
+        "status": np.ones(n, dtype=np.uint8),
+        "wall_time": rng.uniform(1, 2, n),
+        "cpu_time": rng.uniform(1, 2, n),
+        "rank": np.zeros(n, dtype=np.int32),
+        "h_max": h_max,
+        "h_rms": np.full(n, 1e-6),
+        "m0": np.full(n, 1e-12),
+        "m2": 2e-3 * (0.8 / hurst) ** 4,
+        "m4": 1e8 * (0.8 / hurst) ** 6,
+        "loss": loss,
+        "loss_dimensionless": loss / (scale * h_max),
+        "loss_from_drops": drops,
+        "loss_small_scale": share * drops,
+        "loss_large_scale": (1 - share) * drops,
+        "audit_residual": audit,
+        "pull_off_penetration": pull_off[:, 0],
+        "pull_off_stress": -unloading.min(axis=1) * scale,
+        "states": np.full(n, 90, dtype=np.int32),
+        "loading_mean_stress": loading * scale[:, None],
+        "unloading_mean_stress": unloading * scale[:, None],
+        "loading_contact_fraction": np.clip(0.3 * size * up, 0, 1),
+        "unloading_contact_fraction": np.where(stuck, np.clip(0.4 * size, 0, 1), 0.0),
+        "loading_patches": np.broadcast_to(np.arange(up.size) // 3, (n, up.size)).astype(np.int32),
+        "unloading_patches": np.where(stuck, 3, 0).astype(np.int32),
+        "loading_energy": -1e-6 * np.ones((n, up.size)),
+        "unloading_energy": np.where(stuck, -2e-6, 0.0),
+        "jump_count": rng.integers(1, slots + 1, n).astype(np.int32),
+    }
+    used = np.arange(slots) < out["jump_count"][:, None]
+    kinds = rng.integers(0, len(JUMP_KINDS), (n, slots))
+    energy = 10 ** rng.uniform(-8, -3, (n, slots))
+    for name, value, empty, dtype in (
+        ("jump_branch", rng.integers(0, 2, (n, slots)), -1, np.int8),
+        ("jump_kind", kinds, -1, np.int8),
+        ("jump_penetration", rng.uniform(-1, 0.9, (n, slots)), np.nan, float),
+        ("jump_energy_drop", energy, np.nan, float),
+        ("jump_patch_length", rng.uniform(1e-6, 1e-4, (n, slots)), np.nan, float),
+        ("jump_contact_before", rng.uniform(0, 0.5, (n, slots)), np.nan, float),
+        ("jump_contact_after", rng.uniform(0, 0.5, (n, slots)), np.nan, float),
+        ("jump_patches_before", rng.integers(0, 5, (n, slots)), -1, np.int32),
+        ("jump_patches_after", rng.integers(0, 5, (n, slots)), -1, np.int32),
+    ):
+        out[name] = np.where(used, value, empty).astype(dtype)
+    return out | _fields(campaign, hurst, h_max, rng)
+
+
+def _fields(campaign: Campaign, hurst, h_max, rng) -> dict[str, np.ndarray]:
+    """Power-law spectra -(2H+1) and -(2+H), Gaussian heights, exponential gaps, waves as shapes."""
+    plan = field_plan(campaign)
+    n, states = hurst.size, (2, plan.penetration.size)
+    q = plan.wave_number / (10 * 2 * np.pi / plan.period)
+    scatter = 1 + 0.1 * rng.standard_normal((n, *states, 1))
+    rigid = 1e-16 * q ** -(2 * hurst[:, None] + 1)
+    deformed = 0.2e-16 * scatter * (q ** -(2 + hurst[:, None]))[:, None, None, :]
+    height = np.linspace(-5, 5, 81)
+    height = np.exp(-(((height[1:] + height[:-1]) / 2) ** 2) / 2) / np.sqrt(2 * np.pi)
+    gap = np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:])
+    kept = kept_rows(campaign)
+    x = plan.position
+    wave = h_max[kept, None] * np.cos(10 * 2 * np.pi * x / plan.period)
+    surface = np.broadcast_to(0.5 * wave[:, None, None, :], (kept.size, *states, x.size))
+    return {
+        "psd_height": rigid,
+        "height_density": np.broadcast_to(height, (n, height.size)),
+        "psd_displacement": deformed,
+        "gap_density": np.broadcast_to(0.7 * np.exp(-gap), (n, *states, gap.size)),
+        "field_height": wave,
+        "field_displacement": surface,
+        "field_stress": np.zeros(surface.shape),
+        "field_gap": surface - wave[:, None, None, :] + h_max[kept, None, None, None],
+    }
+
+
+def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
+    """Write a results file with these rows."""
+    create(path, campaign, versions={"adhesis_version": "0.1.0"})
+    with h5py.File(path, "r+") as file:
+        for name, value in rows.items():
+            file[name][...] = value
+    return path
