@@ -24,6 +24,13 @@ the half-width a_in with s(a_in) = A; on unloading the branch ends where ds/da =
 the contact is lost. Between them loading and unloading follow the same branch, so the loss does
 not depend on how far the contact was loaded.
 
+Held by a stiffness k (Pa/m of nominal area) the path is one of u = Δ + p̄/k, Δ = A - s, and what is
+minimal is W = U + λ p̄²/(2k). First touch is at u = 0, the branch is stable where du/da > 0, and it
+ends twice: at u_out, where contact is lost, and at u_full, beyond which the wave runs into full
+contact (at fixed separation that end is s = 0). Under load control (k = 0) the same holds of p̄
+instead of u and U - λ p̄ Δ instead of W; contact that is lost leaves U behind: the load's own work
+afterwards is not counted.
+
 Sources: Westergaard, J. Appl. Mech. 6 (1939) 49; Johnson, Int. J. Solids Struct. 32 (1995) 423;
 the loop at fixed separation: Carbone & Mangialardi, J. Mech. Phys. Solids 52 (2004) 1267. The
 energies and the gap follow from the stress by elementary integration.
@@ -55,12 +62,12 @@ def _root(function: Callable[[float], Array], low: float, high: float) -> float:
 
 @dataclass(frozen=True)
 class WaveLoop:
-    """The exact loop at fixed separation.
+    """The exact loop, at fixed separation or under another control.
 
     Attributes
     ----------
     touch_half_width : float
-        a_in in m, reached by the jump at first touch (s = A).
+        a_in in m, reached by the jump at first touch.
     fold_half_width, fold_separation, fold_mean_stress : float
         Where the branch ends on unloading: a_out in m, s_out in m, p̄ in Pa just before the jump.
     touch_drop, fold_drop : float
@@ -294,7 +301,7 @@ class SingleWave:
 
     @cached_property
     def loop(self) -> WaveLoop:
-        """The exact loop; see :class:`WaveLoop`."""
+        """The exact loop at fixed separation; see :class:`WaveLoop`."""
         a_in, a_out = self.touch_half_width, self.fold_half_width
         return WaveLoop(
             touch_half_width=a_in,
@@ -303,4 +310,88 @@ class SingleWave:
             fold_mean_stress=float(self.mean_stress(a_out)),
             touch_drop=-float(self.energy(a_in)) / self.period,
             fold_drop=float(self.energy(a_out)) / self.period,
+        )
+
+    # ------------------------------------------------------------------ other controls
+
+    def mean_stress_slope(self, a: ArrayLike) -> Array:
+        """dp̄/da along the equilibrium branch, in Pa/m; positive where it is stable under load."""
+        psi, _, _ = self._angle(a)
+        rate = 1 / np.sin(2 * psi)  # of ln p1, by ψ
+        if self.measure == "arc":
+            k2, double = self.steepest_slope**2, np.sin(2 * psi)
+            rate = rate + k2 * double * np.cos(2 * psi) / (1 + k2 * double**2)
+        slope = self.full_contact_stress * np.sin(2 * psi) - self.adhesive_tension(a) * rate
+        return np.asarray(np.pi / self.period * slope)
+
+    def displacement(self, a: ArrayLike, stiffness: float) -> Array:
+        """u(a) = Δ + p̄/k in m at equilibrium, k in Pa/m, positive."""
+        return np.asarray(self.amplitude - self.separation(a) + self.mean_stress(a) / stiffness)
+
+    def _drive(self, a: ArrayLike, stiffness: float) -> Array:
+        """What a control prescribes: u in m, or p̄ in Pa where the stiffness is 0."""
+        return self.mean_stress(a) if stiffness == 0 else self.displacement(a, stiffness)
+
+    def _drive_slope(self, a: ArrayLike, stiffness: float) -> Array:
+        if stiffness == 0:
+            return self.mean_stress_slope(a)
+        return np.asarray(self.mean_stress_slope(a) / stiffness - self.separation_slope(a))
+
+    def stable_range(self, stiffness: float) -> tuple[float, float]:
+        """Half-widths (a_out, a_full) in m between which the branch is stable, k in Pa/m, γ > 0.
+
+        Raises
+        ------
+        ValueError
+            If no state is stable: contact runs to full contact from first touch.
+        """
+        # the slope is negative at both ends and has at most one positive stretch between them
+        ends = 1e-9 * self.period, (0.5 - 1e-9) * self.period
+        a = np.linspace(*ends, 20001)
+        slope = self._drive_slope(a, stiffness)
+        top = int(np.argmax(slope))
+        if slope[top] <= 0:
+            raise ValueError(f"no state is stable with a stiffness of {stiffness!r} Pa/m")
+
+        def function(x: float) -> Array:
+            return self._drive_slope(x, stiffness)
+
+        full = _root(function, a[top], ends[1]) if slope[-1] < 0 else ends[1]
+        return _root(function, ends[0], a[top]), full
+
+    def half_width_under(self, stiffness: float, drive: float) -> float:
+        """Half-width a in m of the stable state at u = ``drive`` in m (k = 0: at p̄ in Pa), γ > 0.
+
+        Raises
+        ------
+        ValueError
+            If there is no such state.
+        """
+        low, high = self.stable_range(stiffness)
+        least, most = float(self._drive(low, stiffness)), float(self._drive(high, stiffness))
+        if not least <= drive <= most:
+            raise ValueError(f"drive is {drive!r}: stable contact needs {least!r} to {most!r}")
+        return _root(lambda a: self._drive(a, stiffness) - drive, low, high)
+
+    def loop_under(self, stiffness: float) -> WaveLoop:
+        """Return the exact loop held by a stiffness in Pa/m of nominal area (0: a load), γ > 0.
+
+        Raises
+        ------
+        ValueError
+            If there is none, as contact runs to full contact from first touch.
+        """
+        a_in = self.half_width_under(stiffness, 0.0)
+        a_out, _ = self.stable_range(stiffness)
+
+        def spring(a: float) -> float:
+            return 0.0 if stiffness == 0 else float(self.mean_stress(a)) ** 2 / (2 * stiffness)
+
+        return WaveLoop(
+            touch_half_width=a_in,
+            fold_half_width=a_out,
+            fold_separation=float(self.separation(a_out)),
+            fold_mean_stress=float(self.mean_stress(a_out)),
+            touch_drop=-float(self.energy(a_in)) / self.period - spring(a_in),
+            fold_drop=float(self.energy(a_out)) / self.period + spring(a_out),
         )

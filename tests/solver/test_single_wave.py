@@ -224,3 +224,49 @@ def test_values_that_break_the_rules_are_refused():
         SingleWave(1.0, -1.0, 1.0, 0.0)
     with pytest.raises(ValueError, match="work_of_adhesion is -1"):
         SingleWave(1.0, 1.0, 1.0, -1.0)
+
+
+# ------------------------------------------------------------------ other controls
+
+
+STIFFNESSES = (0.0, 0.1, 1.0, 10.0)  # in p*/A
+
+
+@pytest.mark.parametrize("relative", STIFFNESSES)
+@pytest.mark.parametrize("measure", ["flat", "arc"])
+def test_drops_under_any_control_are_the_integral_along_the_branch(relative, measure):
+    """Between touch and fold the loop encloses ∫ p̄ du (load control: ∫ p̄ dΔ and no more)."""
+    wave = SingleWave.with_alpha(0.3, 2e-5, 1e-3, 1e6, measure)
+    stiffness = relative * wave.full_contact_stress / wave.amplitude
+    loop = wave.loop_under(stiffness)
+    a = np.linspace(loop.fold_half_width, loop.touch_half_width, 20001)
+    way = -wave.separation(a)
+    if stiffness:
+        way = way + wave.mean_stress(a) / stiffness
+    assert loop.loss == pytest.approx(-np.trapezoid(wave.mean_stress(a), way), rel=1e-7)
+
+
+def test_a_stiff_machine_is_fixed_separation_and_a_soft_one_loses_more():
+    wave = SingleWave.with_alpha(0.2, 1e-6, 1e-3, 1e6)
+    unit = wave.full_contact_stress / wave.amplitude
+    losses = [wave.loop_under(k * unit).loss for k in (1e9, 100, 10, 1, 0.1, 0.01)]
+    assert losses[0] == pytest.approx(wave.loop.loss, rel=1e-8)
+    assert np.all(np.diff(losses) > 0)
+
+
+def test_pull_off_under_load_is_the_largest_tension_of_the_branch():
+    wave = SingleWave.with_alpha(0.2, 1e-6, 1e-3, 1e6)
+    loop = wave.loop_under(0.0)
+    a = np.linspace(wave.fold_half_width, 0.4 * wave.period, 100001)
+    assert loop.fold_mean_stress == pytest.approx(float(wave.mean_stress(a).min()), rel=1e-9)
+    # at first touch nothing pulls
+    assert float(wave.mean_stress(loop.touch_half_width)) == pytest.approx(
+        0, abs=1e-12 * wave.full_contact_stress
+    )
+
+
+def test_strong_adhesion_runs_to_full_contact_under_load():
+    """p̄ = 0 has no root where α > max sin^1.5 ψ cos^0.5 ψ = 0.5699 (at ψ = 60°)."""
+    assert SingleWave.with_alpha(0.569, 1e-6, 1e-3, 1e6).loop_under(0.0).loss > 0
+    with pytest.raises(ValueError, match="stable contact needs"):
+        SingleWave.with_alpha(0.5705, 1e-6, 1e-3, 1e6).loop_under(0.0)
