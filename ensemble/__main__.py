@@ -2,6 +2,6 @@
 
 import sys
 
-from ensemble.command import main
+from ensemble.command.main import main
 
 sys.exit(main())

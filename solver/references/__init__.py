@@ -6,10 +6,6 @@
 ``parabola``        JKR in plane strain
 ``wavy_parabola``   small-scale hysteresis inside one patch (after Guduru)
 ``exact_wave``      the single wave behind the contract of a method, as an oracle
+
+Import from its modules.
 """
-
-from solver.references.exact_wave import ExactWave
-from solver.references.single_wave import SingleWave, WaveLoop
-from solver.references.wavy_parabola import WavyParabola
-
-__all__ = ["ExactWave", "SingleWave", "WaveLoop", "WavyParabola"]

@@ -16,7 +16,7 @@ from ensemble.bench.figure import draw
 from ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
 from ensemble.bench.page import page, record
 from ensemble.bench.scenes import FULL, GROWTH, ONE_WAVE, PAPER, QUICK, SMALL_ROUGH, TWO_WAVES
-from ensemble.command import main
+from ensemble.command.main import main
 
 REFERENCE = Reference(1.0, "made up")
 

@@ -16,7 +16,7 @@ from ensemble.run import launch
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from ensemble.command import main; sys.exit(main())"
+    code = "import sys; from ensemble.command.main import main; sys.exit(main())"
     return subprocess.run(
         [sys.executable, "-c", code, "doctor", *options],
         env=launch.launch_environment(2) | env,

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import ensemble.command.loop as loop_command
-from ensemble.command import main
-from solver.references import ExactWave, SingleWave
+from ensemble.command.main import main
+from solver.references.exact_wave import ExactWave
+from solver.references.single_wave import SingleWave
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
 MODULUS = 1e6 / 0.75

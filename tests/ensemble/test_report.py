@@ -21,7 +21,7 @@ from ensemble.aggregate.average import aggregate
 from ensemble.aggregate.companions import differing_keys, kind_of
 from ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
 from ensemble.campaign.file import load_campaign, parse_campaign
-from ensemble.command import main
+from ensemble.command.main import main
 from ensemble.report import findings, paper
 from ensemble.report.figures import fields as field_figures
 from ensemble.report.figures import loops, losses

@@ -289,7 +289,7 @@ def test_status_of_a_large_file_takes_under_a_second_and_no_mpi(tmp_path):
         for row in range(0, 100_000, 1000):
             writer.write_result(row, result)
     code = (
-        "import sys; from ensemble.command import main; main(['status', sys.argv[1]]); "
+        "import sys; from ensemble.command.main import main; main(['status', sys.argv[1]]); "
         "print([m for m in sys.modules if m.startswith('mpi4py')])"
     )
     import subprocess

@@ -20,7 +20,7 @@ import pytest
 from matplotlib.image import imread
 
 from ensemble.campaign.file import parse_campaign
-from ensemble.command import COMMANDS, main
+from ensemble.command.main import COMMANDS, main
 
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]

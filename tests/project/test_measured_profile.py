@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from ensemble.command import main
+from ensemble.command.main import main
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPT = ROOT / "examples" / "measured_profile.py"

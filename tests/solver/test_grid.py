@@ -17,7 +17,7 @@ from adhesis import (
 )
 from solver.grid.method import GridMethod
 from solver.method import ContactState
-from solver.references import SingleWave
+from solver.references.single_wave import SingleWave
 
 HALF_SPACE = HalfSpace(1e6, 0.5)
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5

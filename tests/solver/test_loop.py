@@ -12,7 +12,8 @@ from solver.jumps import classify
 from solver.loop import check_cycle
 from solver.method import Fields, Method
 from solver.profile import Profile
-from solver.references import ExactWave, SingleWave
+from solver.references.exact_wave import ExactWave
+from solver.references.single_wave import SingleWave
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11
 HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import quad
 
 from adhesis import self_affine_profile, single_wave
-from solver.references import SingleWave, WavyParabola
 from solver.references.full_contact import full_contact_energy, full_contact_stress
 from solver.references.parabola import parabola_load, parabola_pull_off, parabola_stress
 from solver.references.periodic_punch import (
@@ -16,6 +15,8 @@ from solver.references.periodic_punch import (
     punch_stress,
     punch_stress_intensity,
 )
+from solver.references.single_wave import SingleWave
+from solver.references.wavy_parabola import WavyParabola
 
 MODULUS = 1.3
 

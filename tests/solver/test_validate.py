@@ -12,8 +12,8 @@ import ensemble.command.validate as validate_command
 import solver.validate.claims as validation
 import solver.validate.judge as judging
 from adhesis import ContactState, HalfSpace, Problem
-from ensemble.command import main
-from solver.references import ExactWave
+from ensemble.command.main import main
+from solver.references.exact_wave import ExactWave
 from solver.validate.claims import METHODS, Row, validate
 
 WAVE_CLAIMS = tuple(

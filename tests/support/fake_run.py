@@ -83,7 +83,7 @@ def install(behaviour: str) -> None:
 
 
 if __name__ == "__main__":
-    from ensemble.command import main
+    from ensemble.command.main import main
 
     install(sys.argv[1])
     sys.exit(main(sys.argv[2:]))

@@ -1,0 +1,64 @@
+"""``adhesis COMMAND …``: what commands there are, and the call of one.
+
+A command's module is imported only when it is called, so that ``status`` and ``report`` never load
+MPI.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+
+from ensemble.errors import InputError
+
+COMMANDS: dict[str, str] = {
+    "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
+    "status": "what of a results file is pending, done and failed",
+    "report": "tables, curves and figures of a results file",
+    "loop": "one loop of one profile",
+    "validate": "the exact references: error against bound",
+    "bench": "speed against error of each method",
+    "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",
+}
+BAD_INPUT = 2
+
+# Small matrices gain nothing from threads, ranks already share the cores, and sums split over a
+# number of threads would tie the last bits to it. Set before numpy is loaded.
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command; returns its exit code (2 for bad input, with one sentence on stderr)."""
+    words = sys.argv[1:] if argv is None else argv
+    name = words[0] if words else ""
+    if name not in COMMANDS:
+        _overview().parse_args(words or ["--help"])
+        return BAD_INPUT
+    for variable in _ONE_THREAD:
+        os.environ.setdefault(variable, "1")
+    module = importlib.import_module(f"ensemble.command.{name}")
+    parser = argparse.ArgumentParser(prog=f"adhesis {name}", description=module.__doc__)
+    module.add_arguments(parser)
+    args = parser.parse_args(words[1:])
+    try:
+        code: int = module.execute(args)
+    except InputError as error:
+        print(f"adhesis {name}: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except BrokenPipeError:
+        return 1
+    return code
+
+
+def _overview() -> argparse.ArgumentParser:
+    listing = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
+    parser = argparse.ArgumentParser(
+        prog="adhesis",
+        description="Hysteresis loops of rough contacts with zero-range (JKR) adhesion.",
+        epilog=f"commands:\n{listing}\n\nadhesis COMMAND --help tells more.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("command", choices=list(COMMANDS), metavar="COMMAND")
+    return parser
