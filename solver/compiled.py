@@ -13,12 +13,14 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from numba import config, njit
 
+F = TypeVar("F", bound=Callable[..., Any])
 
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+
+def compiled(function: F) -> F:
     """Compile ``function`` at its first call (numba, nopython), keeping the result on disk.
 
     Division by zero gives inf or NaN, as in numpy: a test before every division would keep the
@@ -27,14 +29,14 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compile(function)
 
 
-def compiled_sums(function: Callable[..., Any]) -> Callable[..., Any]:
+def compiled_sums(function: F) -> F:
     """Compile ``function`` likewise, and let sums be taken in any order (vector registers)."""
     return _compile(function, fastmath={"reassoc", "contract", "nsz"})
 
 
-def _compile(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+def _compile(function: F, **options: Any) -> F:
     folder = _cache_folder()
-    dispatcher: Callable[..., Any]
+    dispatcher: F
     if folder is None:
         dispatcher = njit(error_model="numpy", **options)(function)
         return dispatcher

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from solver.compiled import compiled
+from solver.profile import Array
 from solver.sharp.linear import factor_rows, solve_column
 
 _SWEEPS = 200
 
 
 @compiled
-def _sweep(matrix, load, bound, y):  # type: ignore[no-untyped-def]  # compiled
+def _sweep(matrix: Array, load: Array, bound: Array, y: Array) -> None:
     """Minimise ½ yᵀMy - loadᵀy in |y| ≤ bound, one edge after the other, in place."""
     for _ in range(_SWEEPS):
         largest = 0.0
@@ -31,7 +32,7 @@ def _sweep(matrix, load, bound, y):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # compiled
+def running_step(matrix: Array, d: Array, pull: Array, limit: Array) -> Array:
     """Step of every edge: a minimum of the energy's quadratic model in the box of the limits.
 
     ``matrix`` is the symmetric tangent, ``d`` its scale factors, ``pull`` C_c - C. The edges at
@@ -119,12 +120,12 @@ def running_step(matrix, d, pull, limit):  # type: ignore[no-untyped-def]  # com
 
 
 @compiled
-def off_saddle(matrix, d, limit):  # type: ignore[no-untyped-def]  # compiled
+def off_saddle(matrix: Array, d: Array, limit: Array) -> Array:
     """Step along the softest mode, its first large edge outwards: the way off a saddle."""
     mode = np.linalg.eigh(matrix)[1][:, 0] / d
     size = np.abs(mode)
     lead = np.flatnonzero(size > 0.99 * size.max())[0]
-    step = mode * (limit.min() / mode[lead])
+    step: Array = mode * (limit.min() / mode[lead])
     for e in range(step.shape[0]):
         step[e] = min(max(step[e], -limit[e]), limit[e])
     return step

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.compiled import compiled
+from solver.profile import Array
 
 # Columns of the table of gaps.
 LEFT, RIGHT, LEFT_PATCH, RIGHT_PATCH, ALPHA = 0, 1, 2, 3, 4
@@ -22,7 +23,7 @@ _COLUMNS = 5
 
 
 @compiled
-def map_gaps(gaps):  # type: ignore[no-untyped-def]  # compiled
+def map_gaps(gaps: Array) -> Array:
     """Table of gaps, shape (L, 5): both ends, widths of the patches beside them, α.
 
     ``gaps`` holds the ends in θ, shape (L, 2), increasing, within one period.
@@ -44,7 +45,7 @@ def map_gaps(gaps):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def one_minus_plus(gap, r, side):  # type: ignore[no-untyped-def]  # compiled
+def one_minus_plus(gap: Array, r: float, side: int) -> tuple[float, float]:
     """(1 - η, 1 + η) at the distance r from the left (side 0) or right end, relatively exact."""
     own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
     other = gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH]
@@ -56,7 +57,7 @@ def one_minus_plus(gap, r, side):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def theta_at(gap, eta):  # type: ignore[no-untyped-def]  # compiled
+def theta_at(gap: Array, eta: float) -> tuple[float, float]:
     """θ and dθ/dη at η."""
     from_left = eta < 0
     own = gap[LEFT_PATCH] if from_left else gap[RIGHT_PATCH]
@@ -69,6 +70,7 @@ def theta_at(gap, eta):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def convergence(gap):  # type: ignore[no-untyped-def]  # compiled
+def convergence(gap: Array) -> float:
     """Rate ln ρ of a gap: the error of M modes falls as ρ^-M."""
-    return np.arcsinh(np.pi / (2 * gap[ALPHA]))
+    rate: float = np.arcsinh(np.pi / (2 * gap[ALPHA]))
+    return rate

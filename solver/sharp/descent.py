@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solver.compiled import compiled
+from solver.profile import Array
 from solver.sharp.box import off_saddle, running_step
 from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, RIGHT_PATCH, map_gaps
-from solver.sharp.field import choose_kinds, derivatives, edge_openings, plain, solve
+from solver.sharp.field import (
+    Kinds,
+    PlainSolution,
+    Rules,
+    Solution,
+    choose_kinds,
+    derivatives,
+    edge_openings,
+    plain,
+    solve,
+)
 from solver.sharp.linear import is_definite
-from solver.sharp.source import measure_at
+from solver.sharp.source import Panels, measure_at
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
 _REUSES = 8  # running steps that share one tangent
@@ -56,7 +67,7 @@ class Law(NamedTuple):
 
 
 @compiled
-def _narrowest(gaps):  # type: ignore[no-untyped-def]  # compiled
+def _narrowest(gaps: Array) -> float:
     """Length of the shortest gap or patch."""
     table = map_gaps(gaps)
     least = 2 * np.pi
@@ -66,7 +77,7 @@ def _narrowest(gaps):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _residual(of, law, panels):  # type: ignore[no-untyped-def]  # compiled
+def _residual(of: Solution, law: Law, panels: Panels) -> tuple[Array, Array]:
     """C_e - C_c at every edge; positive where contact recedes. And the derivative of C_c by θ."""
     edges = of.opening.shape[0]
     residual = np.empty(edges)
@@ -80,7 +91,7 @@ def _residual(of, law, panels):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _tangent(of, drift, rules):  # type: ignore[no-untyped-def]  # compiled
+def _tangent(of: Solution, drift: Array, rules: Rules) -> tuple[Array, Array]:
     """∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂p/∂θ_f."""
     matrix, pressure = derivatives(of, rules)
     for e in range(matrix.shape[0]):
@@ -91,7 +102,7 @@ def _tangent(of, drift, rules):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _symmetric(of, tangent, overlapping):  # type: ignore[no-untyped-def]  # compiled
+def _symmetric(of: Solution, tangent: Array, overlapping: float) -> tuple[Array, Array]:
     """Scale factors d and the symmetric matrix d_e tangent_ef / d_f."""
     n = tangent.shape[0]
     d = np.sqrt(np.maximum(of.opening, overlapping))
@@ -105,7 +116,7 @@ def _symmetric(of, tangent, overlapping):  # type: ignore[no-untyped-def]  # com
 
 
 @compiled
-def _moved(gaps, step):  # type: ignore[no-untyped-def]  # compiled
+def _moved(gaps: Array, step: Array) -> Array:
     """Gaps after an outward motion ``step`` of the contact at every edge."""
     out = np.empty_like(gaps)
     for k in range(gaps.shape[0]):
@@ -115,7 +126,7 @@ def _moved(gaps, step):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _at_least(kinds, least):  # type: ignore[no-untyped-def]  # compiled
+def _at_least(kinds: Kinds, least: Kinds) -> Kinds:
     """``kinds``, none below ``least`` (which is empty for no bound).
 
     While edges move towards one state, a gap must not lose modes again, or the field's error would
@@ -127,7 +138,16 @@ def _at_least(kinds, least):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def equilibrium(gaps, separation, reach, least, patient, law, rules, panels):  # type: ignore[no-untyped-def]
+def equilibrium(
+    gaps: Array,
+    separation: float,
+    reach: float,
+    least: Kinds,
+    patient: bool,
+    law: Law,
+    rules: Rules,
+    panels: Panels,
+) -> tuple[bool, Array, PlainSolution, Array, float, int]:
     """Newton's iteration for C_e = C_c from nearby edges.
 
     Returns whether a stable equilibrium was found with no edge moving further than ``reach``, its
@@ -145,7 +165,7 @@ def equilibrium(gaps, separation, reach, least, patient, law, rules, panels):  #
     travelled = np.zeros(gaps.size)
     last = np.inf
     found = False
-    rate = np.empty(0)
+    rate: Any = np.empty(0)
     slope = np.nan
     steps = 0
     while True:
@@ -153,7 +173,7 @@ def equilibrium(gaps, separation, reach, least, patient, law, rules, panels):  #
         of = solve(at, separation, kinds, 2, rules, panels)
         residual, drift = _residual(of, law, panels)
         tangent, by_edge = _tangent(of, drift, rules)
-        step = np.linalg.solve(tangent, -residual)
+        step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float
         size = np.abs(step).max()
         # The field has steps of the size of its error, where panels or modes change: an iteration
         # to and fro across one of them is at its end.
@@ -189,7 +209,7 @@ def equilibrium(gaps, separation, reach, least, patient, law, rules, panels):  #
 
 
 @compiled
-def _limits(table, longest):  # type: ignore[no-untyped-def]  # compiled
+def _limits(table: Array, longest: float) -> Array:
     """Longest step of each edge: ``longest``, or a quarter of the gap or patch it may close."""
     limit = np.empty(2 * table.shape[0])
     for k in range(table.shape[0]):
@@ -200,7 +220,9 @@ def _limits(table, longest):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def descend(gaps, separation, most, least, law, rules, panels):  # type: ignore[no-untyped-def]
+def descend(
+    gaps: Array, separation: float, most: int, least: Kinds, law: Law, rules: Rules, panels: Panels
+) -> tuple[Array, int, int, int, Kinds]:
     """Descend in energy at fixed separation, for at most ``most`` steps.
 
     Edges out of equilibrium run in the direction in which the energy falls, all at the same speed

@@ -42,7 +42,10 @@ from solver.compiled import compiled, compiled_sums
 from solver.profile import Array
 from solver.sharp.coordinate import ALPHA, LEFT, convergence, map_gaps, theta_at
 from solver.sharp.linear import cholesky, solve_factored
-from solver.sharp.source import StressSource, gap_moments
+from solver.sharp.source import Panels, StressSource, gap_moments
+
+Kinds = NDArray[np.int64]
+"""One whole number a gap: its kind of rule, or its first node."""
 
 
 class Rules(NamedTuple):
@@ -152,6 +155,13 @@ class Solution(NamedTuple):
     opening: Array
 
 
+PlainSolution = tuple[
+    Array, Kinds, Kinds, Array, Array, Array, Array, Array, Array, Array, Array, float, float,
+    Array, Array,
+]  # fmt: skip
+"""The fields of :class:`Solution` in order."""
+
+
 class GapField:
     """Solution of (1) for given gap ends.
 
@@ -223,7 +233,7 @@ class GapField:
 
 
 @compiled
-def choose_kinds(table, digits, counts):  # type: ignore[no-untyped-def]  # compiled
+def choose_kinds(table: Array, digits: float, counts: Kinds) -> Kinds:
     """Kind of each gap whose modes leave an error of exp(-digits), or the largest kind."""
     kinds = np.zeros(table.shape[0], dtype=np.int64)
     for k in range(table.shape[0]):
@@ -234,7 +244,9 @@ def choose_kinds(table, digits, counts):  # type: ignore[no-untyped-def]  # comp
 
 
 @compiled
-def solve(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-untyped-def]
+def solve(
+    gaps: Array, separation: float, kinds: Kinds, fields: int, rules: Rules, panels: Panels
+) -> Solution:
     """Solve (1) with the source S (``fields`` 1), or S and S' (2) for :func:`derivatives`.
 
     An iteration must keep the kinds: where they change, the field jumps by its error. The pressure
@@ -276,7 +288,7 @@ def solve(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-un
 
 
 @compiled
-def plain(of):  # type: ignore[no-untyped-def]  # compiled
+def plain(of: Solution) -> PlainSolution:
     """Give a solution as a plain tuple, for the way back to Python.
 
     To make a named one, compiled code calls Python, where a signal's handler may run and raise: an
@@ -289,13 +301,15 @@ def plain(of):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def solve_plain(gaps, separation, kinds, fields, rules, panels):  # type: ignore[no-untyped-def]
+def solve_plain(
+    gaps: Array, separation: float, kinds: Kinds, fields: int, rules: Rules, panels: Panels
+) -> PlainSolution:
     """As :func:`solve`, for calls from Python."""
     return plain(solve(gaps, separation, kinds, fields, rules, panels))
 
 
 @compiled
-def derivatives(of, rules):  # type: ignore[no-untyped-def]  # compiled
+def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
     """∂C_e/∂θ_f, shape (2L, 2L), and ∂p/∂θ_f, shape (2L,), of a solution with S and S'."""
     edges = 2 * of.slope.shape[0]
     load, area = _singular_loads(
@@ -340,28 +354,31 @@ def derivatives(of, rules):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _periodic(x):  # type: ignore[no-untyped-def]  # compiled
+def _periodic(x: float) -> float:
     """1/sin²(x/2) - 4/x², x = Δθ: what the own gap feels of its periodic images."""
     if abs(x) < 0.2:
         y = x * x
         return 1 / 3 + y * (1 / 60 + y * (1 / 1512 + y * (1 / 43200 + y / 1330560)))
-    half = np.sin(0.5 * x)
+    half: float = np.sin(0.5 * x)
     return 1 / (half * half) - 4 / (x * x)
 
 
 @compiled
-def _mapped(alpha, x):  # type: ignore[no-untyped-def]  # compiled
+def _mapped(alpha: float, x: float) -> float:
     """4 [α²/sinh²(αx) - 1/x²], x = Δη: the own gap's kernel beyond a straight crack in η."""
     y = alpha * x
     if abs(y) < 0.3:
         y *= y
         series = -1 / 3 + y * (1 / 15 + y * (-2 / 189 + y * (1 / 675 - y * 2 / 10395)))
         return 4 * alpha * alpha * series
-    return 4 * ((alpha / np.sinh(y)) ** 2 - 1 / (x * x))
+    images: float = 4 * ((alpha / np.sinh(y)) ** 2 - 1 / (x * x))
+    return images
 
 
 @compiled
-def _assemble(table, kinds, offset, fields, rules, panels):  # type: ignore[no-untyped-def]
+def _assemble(
+    table: Array, kinds: Kinds, offset: Kinds, fields: int, rules: Rules, panels: Panels
+) -> tuple[Array, Array, Array, Array, Array, Array]:
     """Matrix and right-hand sides of (1).
 
     Returns θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~') and what
@@ -404,9 +421,19 @@ def _assemble(table, kinds, offset, fields, rules, panels):  # type: ignore[no-u
 
 
 @compiled
-def _own_gap(  # type: ignore[no-untyped-def]  # compiled
-    gap, eta, w, b, modes, s, theta, weight, slope, rhs, matrix
-):
+def _own_gap(
+    gap: Array,
+    eta: Array,
+    w: Array,
+    b: Array,
+    modes: Array,
+    s: Array,
+    theta: Array,
+    weight: Array,
+    slope: Array,
+    rhs: Array,
+    matrix: Array,
+) -> None:
     """Nodes, loads and diagonal block of one gap."""
     m = eta.shape[0]
     slope[0] = 1 / theta_at(gap, -1.0)[1]
@@ -429,7 +456,7 @@ def _own_gap(  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled_sums
-def _between_gaps(theta, weight, offset, matrix):  # type: ignore[no-untyped-def]  # compiled
+def _between_gaps(theta: Array, weight: Array, offset: Kinds, matrix: Array) -> None:
     """Blocks of different gaps."""
     n = theta.shape[0]
     sine = np.sin(0.5 * theta)
@@ -449,7 +476,9 @@ def _between_gaps(theta, weight, offset, matrix):  # type: ignore[no-untyped-def
 
 
 @compiled
-def edge_openings(f, slope, kinds, offset, start, ends):  # type: ignore[no-untyped-def]  # compiled
+def edge_openings(
+    f: Array, slope: Array, kinds: Kinds, offset: Kinds, start: Kinds, ends: Array
+) -> Array:
     """sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
     out = np.zeros((2 * slope.shape[0], f.shape[1]))
     for k in range(slope.shape[0]):
@@ -463,9 +492,21 @@ def edge_openings(f, slope, kinds, offset, start, ends):  # type: ignore[no-unty
 
 
 @compiled
-def _singular_loads(  # type: ignore[no-untyped-def]  # compiled
-    table, slope, kinds, offset, counts, start, square, eta, b, theta, weight, matrix, w
-):  # fmt: skip
+def _singular_loads(
+    table: Array,
+    slope: Array,
+    kinds: Kinds,
+    offset: Kinds,
+    counts: Kinds,
+    start: Kinds,
+    square: Kinds,
+    eta: Array,
+    b: Array,
+    theta: Array,
+    weight: Array,
+    matrix: Array,
+    w: Array,
+) -> tuple[Array, Array]:
     """Right-hand sides of the regular part of the solution singular at each edge, and its area.
 
     The opening sqrt((1∓η)/(1±η)) of the own gap has the density 1/(1±η) at the nodes and, as the

@@ -6,16 +6,19 @@ copies is what costs. Larger systems are handed to LAPACK and BLAS in blocks.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from solver.compiled import compiled, compiled_sums
+from solver.profile import Array
 
 _SMALL = 32  # up to this order the loops here are faster than LAPACK called from compiled code
 _BLOCK = 48
 
 
 @compiled_sums
-def factor_rows(a, floor):  # type: ignore[no-untyped-def]  # compiled
+def factor_rows(a: Array, floor: float) -> bool:
     """Lower Cholesky factor in place, by rows.
 
     False if a pivot is not positive, or below ``floor`` times the largest diagonal element.
@@ -42,7 +45,7 @@ def factor_rows(a, floor):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def cholesky(a):  # type: ignore[no-untyped-def]  # compiled
+def cholesky(a: Array) -> tuple[Array, bool]:
     """Lower Cholesky factor of ``a`` and whether there is one.
 
     Raises
@@ -51,20 +54,21 @@ def cholesky(a):  # type: ignore[no-untyped-def]  # compiled
         If there is none and the system is a large one.
     """
     if a.shape[0] > _SMALL:
-        return np.linalg.cholesky(a), True
+        lapack: Any = np.linalg.cholesky(a)  # numpy promises some float
+        return lapack, True
     factor = a.copy()
     definite = factor_rows(factor, 0.0)
     return factor, definite
 
 
 @compiled
-def is_definite(a):  # type: ignore[no-untyped-def]  # compiled
+def is_definite(a: Array) -> bool:
     """Whether a symmetric matrix is positive definite to rounding."""
     return factor_rows(a.copy(), 0.0)
 
 
 @compiled
-def solve_factored(factor, x):  # type: ignore[no-untyped-def]  # compiled
+def solve_factored(factor: Array, x: Array) -> None:
     """Solve for the columns of ``x``, shape (n, columns), in place, with a Cholesky factor."""
     n = factor.shape[0]
     if x.shape[1] < 4:
@@ -90,7 +94,7 @@ def solve_factored(factor, x):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled_sums
-def solve_column(factor, x):  # type: ignore[no-untyped-def]  # compiled
+def solve_column(factor: Array, x: Array) -> None:
     """Solve for one right-hand side, in place, with a Cholesky factor."""
     n = factor.shape[0]
     for i in range(n):
@@ -108,7 +112,7 @@ def solve_column(factor, x):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _forward(factor, x):  # type: ignore[no-untyped-def]  # compiled
+def _forward(factor: Array, x: Array) -> None:
     n, columns = x.shape
     for i in range(n):
         for k in range(i):
@@ -121,7 +125,7 @@ def _forward(factor, x):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _backward(factor, x):  # type: ignore[no-untyped-def]  # compiled
+def _backward(factor: Array, x: Array) -> None:
     n, columns = x.shape
     for i in range(n - 1, -1, -1):
         pivot = 1 / factor[i, i]

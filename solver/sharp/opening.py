@@ -42,7 +42,7 @@ class Opening:
 
 
 @compiled
-def _fewest_nodes(gap, top, per_wave):  # type: ignore[no-untyped-def]  # compiled
+def _fewest_nodes(gap: Array, top: int, per_wave: float) -> int:
     """Number of sine nodes so close that the shortest wave holds ``per_wave`` of them."""
     widest = 0.0
     for i in range(1, 24):
@@ -52,7 +52,7 @@ def _fewest_nodes(gap, top, per_wave):  # type: ignore[no-untyped-def]  # compil
 
 
 @compiled
-def _fine_nodes(gap, count):  # type: ignore[no-untyped-def]  # compiled
+def _fine_nodes(gap: Array, count: int) -> tuple[Array, Array, Array]:
     """``count`` sine nodes: θ, dθ/dη, sin t."""
     theta = np.empty(count)
     stretch = np.empty(count)

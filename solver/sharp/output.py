@@ -12,6 +12,7 @@ import numpy as np
 from solver.compiled import compiled
 from solver.method import Fields
 from solver.problem import Problem
+from solver.profile import Array
 from solver.sharp.coordinate import one_minus_plus
 from solver.sharp.field import GapField
 from solver.sharp.opening import fine_opening
@@ -59,7 +60,7 @@ def fields_of(problem: Problem, field: GapField | None, separation: float, n: in
 
 
 @compiled
-def _sum_modes(gap, theta, modes):  # type: ignore[no-untyped-def]  # compiled
+def _sum_modes(gap: Array, theta: Array, modes: Array) -> Array:
     """Σ_n b_n sin((n+1)t), cos t = η(θ), by Clenshaw's recurrence."""
     out = np.empty(theta.shape[0])
     left, right = gap[0], gap[1]
@@ -78,7 +79,7 @@ def _sum_modes(gap, theta, modes):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _pull(theta, phi, strength):  # type: ignore[no-untyped-def]  # compiled
+def _pull(theta: Array, phi: Array, strength: Array) -> Array:
     """Σ_j strength_j / sin²((θ-φ_j)/2)."""
     out = np.zeros(theta.shape[0])
     sine, cosine = np.sin(0.5 * phi), np.cos(0.5 * phi)

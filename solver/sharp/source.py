@@ -181,16 +181,17 @@ def _lagrange(nodes: Array, x: Array) -> Array:
 
 
 @compiled
-def _clenshaw(coefficients, x):  # type: ignore[no-untyped-def]  # compiled
+def _clenshaw(coefficients: Array, x: float) -> float:
     b1 = 0.0
     b2 = 0.0
     for j in range(coefficients.shape[0] - 1, 0, -1):
         b1, b2 = 2 * x * b1 - b2 + coefficients[j], b1
-    return x * b1 - b2 + coefficients[0]
+    total: float = x * b1 - b2 + coefficients[0]
+    return total
 
 
 @compiled
-def _value(coefficients, place):  # type: ignore[no-untyped-def]  # compiled
+def _value(coefficients: Array, place: float) -> float:
     """The piecewise series at θ = place · panel width."""
     k = int(np.floor(place))
     # the number of panels is a power of two
@@ -198,7 +199,7 @@ def _value(coefficients, place):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def interpolate(theta, width, coefficients):  # type: ignore[no-untyped-def]  # compiled
+def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
     """Values of a piecewise series at each angle, shape (len(theta),)."""
     out = np.empty(theta.shape[0])
     for i in range(theta.shape[0]):
@@ -207,7 +208,7 @@ def interpolate(theta, width, coefficients):  # type: ignore[no-untyped-def]  # 
 
 
 @compiled
-def measure_at(theta, panels):  # type: ignore[no-untyped-def]  # compiled
+def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
     """sqrt(1 + h'²) and its θ-derivative at one angle."""
     place = theta / panels.width
     k = int(np.floor(place))
@@ -228,7 +229,7 @@ _MINUS, _PLUS, _STRESS, _SLOPE = 0, 1, 2, 3
 
 
 @compiled
-def _room(nodes, count, more):  # type: ignore[no-untyped-def]  # compiled
+def _room(nodes: Array, count: int, more: int) -> Array:
     """``nodes`` with room for ``more`` columns beyond ``count``."""
     if count + more <= nodes.shape[1]:
         return nodes
@@ -238,7 +239,9 @@ def _room(nodes, count, more):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def _end_piece(gap, side, length, panels, nodes, count):  # type: ignore[no-untyped-def]  # compiled
+def _end_piece(
+    gap: Array, side: int, length: float, panels: Panels, nodes: Array, count: int
+) -> tuple[Array, int]:
     """Nodes from the end of a gap inwards, in cells graded to the patch beyond that end."""
     beyond = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
     at = 0.0
@@ -269,7 +272,16 @@ def _end_piece(gap, side, length, panels, nodes, count):  # type: ignore[no-unty
 
 
 @compiled_sums
-def _panel_nodes(gap, tiles, tiled, width, x, weights, nodes, count):  # type: ignore[no-untyped-def]
+def _panel_nodes(
+    gap: Array,
+    tiles: NDArray[np.int64],
+    tiled: int,
+    width: float,
+    x: Array,
+    weights: Array,
+    nodes: Array,
+    count: int,
+) -> int:
     """Nodes of compressed panels; ``tiles`` holds first finest panel, size and row of each.
 
     A panel is no longer than its distance from either end, so the logarithm of the map differs at
@@ -310,7 +322,7 @@ def _panel_nodes(gap, tiles, tiled, width, x, weights, nodes, count):  # type: i
 
 
 @compiled
-def _short_gap(gap, modes, panels, nodes):  # type: ignore[no-untyped-def]  # compiled
+def _short_gap(gap: Array, modes: int, panels: Panels, nodes: Array) -> tuple[Array, int]:
     """Gauss-Chebyshev nodes of the first kind in η: they serve s_n and s^± alike."""
     count = max(3 * panels.x.shape[0] + 6, 2 * modes)
     nodes = _room(nodes, 0, count)
@@ -327,7 +339,7 @@ def _short_gap(gap, modes, panels, nodes):  # type: ignore[no-untyped-def]  # co
 
 
 @compiled
-def _nodes_of(gap, modes, panels, fields):  # type: ignore[no-untyped-def]  # compiled
+def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Array, int]:
     """Nodes of the moments of one gap and their number."""
     nodes = np.empty((2 + fields, 1024))
     left = gap[LEFT]
@@ -376,7 +388,7 @@ def _nodes_of(gap, modes, panels, fields):  # type: ignore[no-untyped-def]  # co
 
 
 @compiled_sums
-def _add_up(nodes, count, s, ends):  # type: ignore[no-untyped-def]  # compiled
+def _add_up(nodes: Array, count: int, s: Array, ends: Array) -> None:
     """Moments of the nodes, by the recurrence of sin((n+1)t), cos t = η."""
     fields = s.shape[1]
     twice = np.empty(count)
@@ -424,7 +436,7 @@ def _add_up(nodes, count, s, ends):  # type: ignore[no-untyped-def]  # compiled
 
 
 @compiled
-def gap_moments(gap, panels, s, ends):  # type: ignore[no-untyped-def]  # compiled
+def gap_moments(gap: Array, panels: Panels, s: Array, ends: Array) -> None:
     """Moments of (S, S') over a gap: fills ``s``, shape (modes, 2), and ``ends``, (2, 2).
 
     With ``s`` of shape (modes, 1) those of S alone. ``gap`` is a row of
