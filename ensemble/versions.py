@@ -8,8 +8,6 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
-from ensemble.run.ranks import library_version
-
 _PACKAGES = ("adhesis", "numpy", "scipy", "numba", "pyfftw", "h5py", "mpi4py")
 
 
@@ -20,7 +18,7 @@ def versions() -> dict[str, str]:
         "commit": commit(),
         "python": platform.python_version(),
         "numpy": _package("numpy"),
-        "mpi": _short(library_version()),
+        "mpi": _mpi(),
         "hdf5": _hdf5(),
         "fftw": _fftw(),
     }
@@ -77,6 +75,14 @@ def _package(name: str, missing: str = "not installed") -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return missing
+
+
+def _mpi() -> str:
+    """Return the MPI library's name and version; "none" where MPI is not in use."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is None or not mpi.Is_initialized():
+        return "none"
+    return _short(mpi.Get_library_version())
 
 
 def _hdf5() -> str:

@@ -1,7 +1,7 @@
 """What this project asks of MPI: messages, an honest count of ranks, no rank left waiting.
 
-The only module that imports mpi4py, and only inside its functions: ``status`` and ``report`` run
-where there is no MPI.
+The only module of a run that imports mpi4py, and only inside its functions: one process runs where
+there is no MPI (:mod:`ensemble.doctor.probe`, in processes of its own, tries MPI out).
 """
 
 from __future__ import annotations
@@ -78,15 +78,6 @@ def world() -> Any:
             "the launcher belongs to another MPI than mpi4py; use the mpirun of that one"
         )
     return comm if comm.size > 1 else None
-
-
-def library_version() -> str:
-    """Return the MPI library's name and version; "none" where MPI is not in use."""
-    mpi = sys.modules.get("mpi4py.MPI")
-    if mpi is None or not mpi.Is_initialized():
-        return "none"
-    text: str = mpi.Get_library_version()
-    return text.strip("\x00 ").splitlines()[0]
 
 
 def together(comm: Any, function: Callable[[], T]) -> T:

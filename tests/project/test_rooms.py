@@ -1,0 +1,228 @@
+"""The rules of the rooms, read from the import statements and from what a process has loaded.
+
+A room is a folder; in a folder that has rooms inside, each module is a room of its own.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+from tests.support.synthetic_results import campaign, rows, write
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PACKAGES = ("adhesis", "solver", "ensemble")
+FOLDERS = (*PACKAGES, "tests")
+
+# Who may import what weighs: to the door of MPI, of the file format, of compiled code, of figures.
+MPI = {"ensemble.run.ranks", "ensemble.doctor.probe"}
+HDF5 = {
+    "ensemble.results.store",
+    "ensemble.run.session",
+    "ensemble.doctor.probe",
+    "ensemble.versions",
+}
+COMPILED = {"solver.compiled", "solver.grid.kernels", "ensemble.bench.measure"}
+FIGURES = {
+    "ensemble.bench.figure",
+    "ensemble.report.figures.catalogue",
+    "ensemble.report.figures.fields",
+    "ensemble.report.figures.loops",
+    "ensemble.report.figures.losses",
+    "ensemble.report.figures.style",
+}
+DOORS = {"mpi4py": MPI, "h5py": HDF5, "numba": COMPILED, "matplotlib": FIGURES}
+
+# What the mechanics know nothing of.
+NOT_IN_SOLVER = {
+    "adhesis",
+    "ensemble",
+    "h5netcdf",
+    "h5py",
+    "matplotlib",
+    "mpi4py",
+    "multiprocessing",
+    "rich",
+    "subprocess",
+    "threading",
+    "xarray",
+}
+# All that campaigns know of the mechanics.
+SOLVER_FOR_ENSEMBLE = {
+    "solver.jumps",
+    "solver.loop",
+    "solver.material",
+    "solver.method",
+    "solver.problem",
+    "solver.profile",
+    "solver.references.single_wave",
+    "solver.registry",
+    "solver.validate.claims",
+}
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
+
+
+PATHS = dict(modules())
+
+
+def imported(path: Path) -> set[str]:
+    """Every module that a file imports, at its top, inside functions or for types only."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute"
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                found.add(full if full in PATHS else str(node.module))
+    return found
+
+
+IMPORTS = {name: imported(path) for name, path in PATHS.items()}
+
+
+def room(module: str) -> str:
+    folder = PATHS[module].parent
+    if any((other / "__init__.py").exists() for other in folder.iterdir()):
+        return module
+    return ".".join(folder.relative_to(ROOT).parts)
+
+
+def rooms() -> dict[str, set[str]]:
+    """Return what each room imports of others."""
+    arrows: dict[str, set[str]] = {}
+    for module, names in IMPORTS.items():
+        here = arrows.setdefault(room(module), set())
+        here |= {room(name) for name in names if name in PATHS} - {room(module)}
+    return arrows
+
+
+def circle(arrows: Mapping[str, set[str]]) -> list[str]:
+    """Return the members of one circle, or an empty list."""
+    try:
+        TopologicalSorter(arrows).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_the_statements_are_seen_wherever_they_stand(tmp_path: Path) -> None:
+    path = tmp_path / "a.py"
+    path.write_text(
+        "import numpy.linalg\nfrom typing import TYPE_CHECKING\nfrom solver import loop\n"
+        "if TYPE_CHECKING:\n    from h5py import File\ndef f():\n    import mpi4py.MPI as M\n"
+    )
+    expected = {"numpy.linalg", "typing", "solver.loop", "h5py", "mpi4py.MPI"}
+    assert imported(path) == expected
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
+    assert len(PATHS) > 80
+
+
+@pytest.mark.xfail(strict=True, reason="solver.grid: path knows method for its types' sake")
+def test_no_circle_of_modules() -> None:
+    assert circle({m: {n for n in names if n in PATHS} for m, names in IMPORTS.items()}) == []
+
+
+def test_no_circle_of_rooms() -> None:
+    assert circle(rooms()) == []
+
+
+def test_mechanics_know_nothing_of_campaigns_ranks_and_files() -> None:
+    for module, names in IMPORTS.items():
+        if module.split(".")[0] == "solver":
+            assert {name.split(".")[0] for name in names} & NOT_IN_SOLVER == set(), module
+
+
+def test_campaigns_know_the_public_modules_of_mechanics_alone() -> None:
+    used = {
+        name
+        for module, names in IMPORTS.items()
+        if module.split(".")[0] == "ensemble"
+        for name in names
+        if name.split(".")[0] in ("solver", "adhesis")
+    }
+    assert used == SOLVER_FOR_ENSEMBLE
+
+
+@pytest.mark.parametrize("package", DOORS)
+def test_what_weighs_comes_in_by_its_doors(package: str) -> None:
+    importers = {
+        module
+        for module, names in IMPORTS.items()
+        if package in {name.split(".")[0] for name in names}
+    }
+    assert importers == DOORS[package]
+
+
+@pytest.mark.parametrize(
+    "folder",
+    sorted({p.parent for top in FOLDERS for p in (ROOT / top).rglob("*.py")}),
+    ids=lambda folder: str(folder.relative_to(ROOT)),
+)
+def test_every_folder_says_what_lives_there(folder: Path) -> None:
+    """In a sentence, and in the code what may be imported from it; its init holds nothing else."""
+    tree = ast.parse((folder / "__init__.py").read_text())
+    words = ast.get_docstring(tree) or ""
+    assert words.split("\n\n")[0].endswith("."), "no sentence"
+    if folder.name != "adhesis":
+        assert len(tree.body) == 1
+        assert "Import" in words or "tests" in folder.relative_to(ROOT).parts
+
+
+# ---------------------------------------------------------------------- what a process loads
+
+
+def loaded(code: str, *words: str, blocked: str = "") -> set[str]:
+    """Return the packages that a process has loaded after ``code``."""
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{code}\n"
+            "print('\\nloaded', *{m.split('.')[0] for m in sys.modules})",
+            *words,
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.splitlines()[-1].split()[1:])
+
+
+def test_the_public_door_is_light() -> None:
+    assert loaded("import mpi4py") >= {"mpi4py"}
+    assert loaded("import adhesis") & {"mpi4py", "h5py", "matplotlib", "xarray", "rich"} == set()
+
+
+COMMAND = "from ensemble.command.main import main\nassert main(sys.argv[1:]) == 0"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    small = campaign(realisations=2)
+    return write(tmp_path_factory.mktemp("rooms") / "r.h5", small, rows(small))
+
+
+def test_status_loads_no_mpi_and_no_figures(results: Path) -> None:
+    packages = loaded(COMMAND, "status", str(results))
+    assert packages & {"mpi4py", "matplotlib", "numba"} == set()
+
+
+def test_report_loads_no_mpi(results: Path, tmp_path: Path) -> None:
+    packages = loaded(COMMAND, "report", str(results), "--to", str(tmp_path / "r"))
+    assert "matplotlib" in packages
+    assert "mpi4py" not in packages
