@@ -47,6 +47,10 @@ class Jump:
         Contact fractions.
     patch_length : float
         Length in m of the largest patch that the jump changed, on the side where it is larger.
+
+    References
+    ----------
+    docs/theory.md, "4. Jumps and mechanisms"
     """
 
     branch: Literal["loading", "unloading"]

@@ -29,10 +29,15 @@ _MAX_UNLOADING_STROKES = 1000
 
 @dataclass(frozen=True, eq=False)
 class LoopResult:
-    """A complete loop. Arrays hold one value per state, in the order of the path.
+    """A complete loop; arrays have the shape (states,), in the order of the path.
 
     Attributes
     ----------
+    problem : Problem
+    max_penetration : float
+        Δ/h_max at the turning point, as asked for.
+    load_steps : int
+        Equal steps of the loading branch.
     branch : array of str, shape (states,)
         "loading" or "unloading".
     load_step : bool array
@@ -59,6 +64,10 @@ class LoopResult:
         CPU time of this process.
     method : dict
         What the method says of itself (name, resolution, counters).
+
+    References
+    ----------
+    docs/theory.md, "3. The loop"
     """
 
     problem: Problem = field(repr=False)
@@ -166,6 +175,10 @@ def run_loop(
         If the cycle cannot be run (:func:`check_cycle`).
     RuntimeError
         If the contact has not detached after a thousand loading strokes.
+
+    References
+    ----------
+    docs/theory.md, "3. The loop"
     """
     check_cycle(max_penetration, load_steps)
     started = process_time()

@@ -22,6 +22,10 @@ class HalfSpace:
     ------
     ValueError
         If a value breaks the rules above.
+
+    References
+    ----------
+    docs/theory.md, "1. The problem"
     """
 
     young: float

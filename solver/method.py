@@ -59,6 +59,10 @@ class ContactState:
         dp̄/ds along the branch in Pa/m where the method knows it, else NaN.
     internal : object
         What the method needs to go on from here; nobody else reads it.
+
+    References
+    ----------
+    docs/theory.md, "1. The problem"
     """
 
     separation: float
@@ -83,7 +87,19 @@ class ContactState:
 
 @dataclass(frozen=True)
 class Path:
-    """The states from the one that ``follow`` was given (excluded) to the wanted separation."""
+    """The states from the one that ``follow`` was given (excluded) to the wanted separation.
+
+    Attributes
+    ----------
+    states : tuple of ContactState
+        In the order in which they were visited, the last one at the wanted separation.
+    jumps : tuple of Jump
+        In the same order.
+
+    References
+    ----------
+    docs/methods.md, "Rules of evolution"
+    """
 
     states: tuple[ContactState, ...]
     jumps: tuple[Jump, ...]
@@ -105,6 +121,10 @@ class Fields:
         v in m, zero mean: the deformed surface.
     gap : array
         t = v - h + s in m; zero in contact.
+
+    References
+    ----------
+    docs/theory.md, "1. The problem"
     """
 
     x: Array
@@ -115,7 +135,16 @@ class Fields:
 
 
 class Method(ABC):
-    """Finds and follows contact states of one problem; see the module's numbered contract."""
+    """Finds and follows contact states of one problem; see the module's numbered contract.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    References
+    ----------
+    docs/methods.md, "Rules of evolution"
+    """
 
     name: ClassVar[str]
     chosen: str | None = None

@@ -27,6 +27,10 @@ class Problem:
     ValueError
         If γ breaks the rule, or the profile is flat: two flat surfaces touch everywhere at once,
         and a penetration in units of h_max has no meaning.
+
+    References
+    ----------
+    docs/theory.md, "1. The problem"
     """
 
     profile: Profile

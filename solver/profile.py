@@ -42,6 +42,10 @@ class Profile:
     ------
     ValueError
         If the period is not positive and finite, or a coefficient is not finite, or a_0 is not 0.
+
+    References
+    ----------
+    docs/theory.md, "2. Profiles"; moments after Nayak, J. Lubr. Technol. 93, 398 (1971)
     """
 
     period: float
@@ -243,6 +247,11 @@ def self_affine_profile(
     ------
     ValueError
         If a value breaks the rules above; the text names the value and the rule.
+
+    References
+    ----------
+    docs/theory.md, "2. Profiles"; Carbone, Pierro, Recchia, Phys. Rev. E 92, 062404 (2015),
+    arXiv 1511.08891
     """
     if not 0 < hurst < 1:
         raise ValueError(f"hurst is {hurst!r}: it must lie between 0 and 1, both excluded")
@@ -298,6 +307,10 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     ------
     ValueError
         If the heights are not a one-dimensional array of at least 3 finite numbers.
+
+    References
+    ----------
+    docs/theory.md, "2. Profiles"
     """
     h = np.asarray(heights, dtype=float)
     if h.ndim != 1:
@@ -317,5 +330,17 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
 
 
 def single_wave(amplitude: float, period: float) -> Profile:
-    """Return h = A cos(q0 x), A and λ in m: the profile of the exact references."""
+    """Return h = A cos(q0 x): the profile of the exact references.
+
+    Parameters
+    ----------
+    amplitude : float
+        A in m.
+    period : float
+        λ in m.
+
+    References
+    ----------
+    docs/theory.md, "2. Profiles"
+    """
     return Profile(period, np.array([0.0, amplitude / 2], dtype=np.complex128))

@@ -33,6 +33,10 @@ def make_method(
     ------
     ValueError
         For an unknown name or a value outside its range.
+
+    References
+    ----------
+    docs/methods.md, "Method `auto`"
     """
     if name not in METHOD_NAMES:
         raise ValueError(f"method is {name!r}: it must be one of {', '.join(METHOD_NAMES)}")

@@ -1,0 +1,164 @@
+"""The public door: which names ``adhesis`` offers, and what each one's docstring has to say."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import adhesis
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+
+PUBLIC = [
+    "ContactState",
+    "Fields",
+    "HalfSpace",
+    "Jump",
+    "LoopResult",
+    "Method",
+    "Path",
+    "Problem",
+    "Profile",
+    "make_method",
+    "profile_from_heights",
+    "run_loop",
+    "self_affine_profile",
+    "single_wave",
+]
+UNIT = re.compile(r"(?<!\w)(m|m²|Pa|J/m²?|rad/m|1/m|s|Pa/m|m\^[\w()-]+)(?!\w)")
+NO_UNIT = re.compile(r"dimensionless|fraction|relative|exponent|ratio|Δ/h_max|W~ =|A/A0|H,|ν")
+# Objects of this project or plain words: they have no unit.
+WITHOUT_SIZE = re.compile(r"int|str|bool|dict|tuple|Literal|Callable|Any|Name|Kind|^[A-Z]\w+$")
+
+
+def documented() -> Iterator[tuple[str, Any]]:
+    """Every public name, and what it offers in turn: methods, properties, constructors."""
+    for name in PUBLIC:
+        thing = getattr(adhesis, name)
+        yield name, thing
+        if inspect.isclass(thing):
+            for member, value in vars(thing).items():
+                if not member.startswith("_") and (
+                    inspect.isfunction(value)
+                    or isinstance(value, property | classmethod | staticmethod)
+                    or hasattr(value, "func")  # a cached property
+                ):
+                    yield f"{name}.{member}", value
+
+
+THINGS = dict(documented())
+
+
+def code_of(thing: Any) -> Any:
+    """Return the function behind a property or a class method."""
+    for attribute in ("fget", "func", "__func__"):
+        thing = getattr(thing, attribute, None) or thing
+    return thing
+
+
+def entries(text: str) -> dict[str, str]:
+    """Return what a numpy docstring says of each parameter or attribute, by name."""
+    found: dict[str, str] = {}
+    sections = re.split(r"^(\w[\w ]*)\n-+$", text, flags=re.MULTILINE)
+    for title, body in zip(sections[1::2], sections[2::2], strict=True):
+        if title not in ("Parameters", "Attributes", "Other Parameters"):
+            continue
+        names: list[str] = []
+        for line in body.strip("\n").splitlines():
+            if line and not line.startswith(" "):
+                head, _, kind = line.partition(" : ")
+                names = [name.strip() for name in head.split(",")]
+                found |= dict.fromkeys(names, kind)
+            else:
+                for name in names:
+                    found[name] += " " + line.strip()
+    return found
+
+
+def arguments(thing: Any) -> dict[str, str]:
+    """Return the fields of a dataclass or the parameters of a function, with their annotations."""
+    if dataclasses.is_dataclass(thing):
+        return {f.name: str(f.type) for f in dataclasses.fields(thing)}
+    found = inspect.signature(thing).parameters.values()
+    return {p.name: str(p.annotation) for p in found if p.name not in ("self", "cls")}
+
+
+def raised(thing: Any) -> set[str]:
+    """Return the exceptions that the text of a function raises itself."""
+    code = getattr(thing, "__post_init__", thing) if inspect.isclass(thing) else code_of(thing)
+    if inspect.isclass(code):
+        return set()
+    tree = ast.parse(textwrap.dedent(inspect.getsource(code)))
+    return {
+        node.exc.func.id
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Raise)
+        and isinstance(node.exc, ast.Call)
+        and isinstance(node.exc.func, ast.Name)
+    }
+
+
+def test_the_public_names_are_these() -> None:
+    assert sorted(adhesis.__all__) == PUBLIC
+    modules = {"annotations"}
+    offered = {n for n, v in vars(adhesis).items() if not n.startswith("_") and n not in modules}
+    assert {n for n in offered if not inspect.ismodule(getattr(adhesis, n))} == set(PUBLIC)
+    assert (ROOT / "adhesis" / "py.typed").exists()
+
+
+@pytest.mark.parametrize("name", THINGS)
+def test_every_name_has_a_docstring(name: str) -> None:
+    text = inspect.getdoc(THINGS[name])
+    assert text
+    assert text.split("\n\n")[0].rstrip().endswith((".", ")", ":", "wave")), text
+
+
+@pytest.mark.parametrize("name", THINGS)
+def test_what_is_raised_is_told(name: str) -> None:
+    text = inspect.getdoc(THINGS[name]) or ""
+    for error in raised(THINGS[name]):
+        assert re.search(rf"^Raises\n-+\n(.|\n)*^{error}$", text, re.MULTILINE), error
+
+
+DESCRIBED = [
+    name
+    for name, thing in THINGS.items()
+    if (dataclasses.is_dataclass(thing) or inspect.isfunction(thing)) and "." not in name
+]
+
+
+@pytest.mark.parametrize("name", DESCRIBED)
+def test_arguments_and_fields_are_told_with_shapes_and_units(name: str) -> None:
+    text = inspect.getdoc(THINGS[name]) or ""
+    told = entries(text)
+    lead = text.split("\n\n")[0]
+    assert [n for n in arguments(THINGS[name]) if n not in told] == []
+    for argument, annotation in arguments(THINGS[name]).items():
+        kind = annotation.split(" | None")[0]
+        words = told[argument]
+        if "Array" in kind and "tuple" not in kind:
+            assert "shape" in words or "shape" in lead, f"{argument}: which shape?"
+        if kind in ("float", "Array") or "complex" in kind:
+            assert UNIT.search(words) or NO_UNIT.search(words), f"{argument}: which unit?"
+        else:
+            assert WITHOUT_SIZE.search(kind) or "NDArray" in kind, f"{argument}: {kind}"
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_the_source_is_told(name: str) -> None:
+    """A page of the documentation with its section, which has to be there; or a publication."""
+    text = inspect.getdoc(THINGS[name]) or ""
+    _, found, body = text.partition("References\n----------\n")
+    assert found, "no section References"
+    section = re.search(r"docs/([\w-]+\.md), \"([^\"]+)\"", body.replace("\n", " "))
+    assert section, body
+    page = (ROOT / "docs" / section[1]).read_text()
+    assert re.search(rf"^#+ {re.escape(section[2])}$", page, re.MULTILINE), section[0]
