@@ -50,6 +50,7 @@ class LoopResult:
     mean_stress : array
         p̄ in Pa, compression positive.
     contact_fraction : array
+        A/A0.
     patches : int array
     elastic_energy, adhesion_energy : array
         In J/m, per period.
