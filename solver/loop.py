@@ -7,6 +7,7 @@ of the energy drops at the jumps are the same energy. They are computed independ
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import process_time
@@ -62,7 +63,7 @@ class LoopResult:
     loss_from_drops : float
         Sum of the energy drops at the jumps, in J/m².
     seconds : float
-        CPU time of this process.
+        CPU time of this process, in s.
     method : dict
         What the method says of itself (name, resolution, counters).
 
@@ -109,6 +110,27 @@ class LoopResult:
     def pull_off_stress(self) -> float:
         """Largest mean tension on unloading, -min p̄, in Pa."""
         return float(-self.mean_stress[self.branch == "unloading"].min())
+
+    def __str__(self) -> str:
+        """A few lines for a terminal: what was followed, its losses, its jumps, its pull-off."""
+        profile = self.problem.profile
+        kinds = Counter(jump.kind for jump in self.jumps)
+        several = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+        return "\n".join(
+            (
+                f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
+                f"period {profile.period:.4g} m",
+                f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
+                f"Δ/h_max up to {self.max_penetration:.4g} in {self.load_steps} load steps, "
+                f"method {self.method['name']}",
+                f"loss       {self.loss:.5g} J/m² (W~ = {self.loss_dimensionless:.5g}); "
+                f"sum of drops {self.loss_from_drops:.5g} J/m²",
+                f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
+                f"pull-off   {self.pull_off_stress:.4g} Pa, "
+                f"out of contact at Δ/h_max = {self.pull_off_penetration:.4g}",
+                f"states     {len(self.separation)}, {self.seconds:.2g} s of CPU time",
+            )
+        )
 
     def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
         """Indices of the states of one branch, optionally only those on the load-step axis."""

@@ -249,3 +249,13 @@ def test_exact_wave_fields_fulfil_the_contact_conditions():
 def test_jumps_are_called_by_what_happens_to_the_patches(before, after, kind, length):
     edges = (np.array(e, dtype=float).reshape(-1, 2) for e in (before, after))
     assert classify(*edges, period=10.0) == (kind, pytest.approx(length))
+
+
+def test_a_loop_prints_itself_in_a_few_lines():
+    result = run_loop(exact(0.3), max_penetration=0.5, load_steps=10)
+    lines = str(result).splitlines()
+    words = [line.split()[0] for line in lines]
+    assert words == ["profile", "loop", "loss", "jumps", "pull-off", "states"]
+    assert f"{result.loss:.5g} J/m²" in lines[2]
+    assert lines[3].endswith("2 (1 snap-in, 1 pull-off)")
+    assert str(len(result.separation)) in lines[5]
