@@ -1,23 +1,47 @@
-"""Compiled functions, cached between processes by the sources they were compiled from.
+"""The one door to numba: compiled functions, kept between processes by all that they depend on.
 
-numba's own cache knows only the file of a function, not the files of the functions that it calls:
-after a change in one module, callers in another would silently keep the old code. So the cache
-lies in a folder named after the content of all modules of this package. Where no folder can be
-written the functions are compiled anew in each process.
+numba's own cache knows the file of a function, not the files of the functions that it calls, nor
+the compiler's settings: after a change, callers would silently keep old code. And it wants to write
+where it reads. So code is kept by :mod:`solver.code_cache`, in a folder named after the sources of
+all modules with compiled functions, the versions of numba and LLVM, the settings that change code,
+and the processor. Where no folder can be used, each process compiles anew.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+import pickle
+import platform
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
-from pathlib import Path
 from typing import Any, TypeVar
 
-from numba import config, njit
+# Intel's vector functions, where they are installed, would change bits from machine to machine.
+os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"  # before numba is loaded
+
+import llvmlite
+import numba
+import numpy as np
+from llvmlite import binding
+from numba.core import config as _config
+from numba.core import event
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from solver.code_cache import CodeFiles, folder_name
 
 F = TypeVar("F", bound=Callable[..., Any])
+config: Any = _config  # its attributes are made at run time
+
+# numba's settings that change code, as numba.core.config names them
+_SETTINGS = (
+    *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML", "BOUNDSCHECK"),
+    *("DEBUGINFO_DEFAULT", "EXTEND_VARIABLE_LIFETIMES", "LLVM_REFPRUNE_PASS"),
+    *("LLVM_REFPRUNE_FLAGS", "ENABLE_PROFILING", "DEBUG_NRT"),
+)
 
 
 def compiled(function: F) -> F:
@@ -26,41 +50,149 @@ def compiled(function: F) -> F:
     Division by zero gives inf or NaN, as in numpy: a test before every division would keep the
     loops out of vector registers.
     """
-    return _compile(function)
+    return _compile(function, error_model="numpy")
 
 
 def compiled_sums(function: F) -> F:
     """Compile ``function`` likewise, and let sums be taken in any order (vector registers)."""
-    return _compile(function, fastmath={"reassoc", "contract", "nsz"})
+    return _compile(function, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+
+
+def compiled_finite_sums(function: F) -> F:
+    """Compile ``function`` with sums in any order of numbers that are none of them NaN."""
+    return _compile(function, fastmath={"reassoc", "nnan", "nsz", "contract"})
 
 
 def _compile(function: F, **options: Any) -> F:
-    folder = _cache_folder()
-    dispatcher: F
-    if folder is None:
-        dispatcher = njit(error_model="numpy", **options)(function)
-        return dispatcher
-    settings: Any = config  # its attributes are made at run time
-    before = settings.CACHE_DIR
-    try:
-        settings.CACHE_DIR = str(folder)  # read when the function is decorated
-        dispatcher = njit(cache=True, error_model="numpy", **options)(function)
-    finally:
-        settings.CACHE_DIR = before
-    return dispatcher
+    dispatcher: Any = numba.njit(**options)(function)
+    dispatcher._cache = _Kept(function)
+    compiled_function: F = dispatcher
+    return compiled_function
+
+
+# ----------------------------------------------------------------------- what code depends on
+
+
+def processor() -> str:
+    """Return the processor's name as LLVM knows it, such as ``znver4``."""
+    return str(config.CPU_NAME or binding.get_host_cpu_name())
+
+
+def settings() -> dict[str, str]:
+    """What machine code depends on besides its sources and the name of the processor."""
+    features = config.CPU_FEATURES
+    if features is None:
+        features = binding.get_host_cpu_features().flatten()
+    return {
+        "python": ".".join(platform.python_version_tuple()[:2]),
+        "numba": numba.__version__,
+        "llvmlite": llvmlite.__version__,
+        "numpy": ".".join(np.__version__.split(".")[:2]),
+        "machine": binding.get_process_triple(),
+        "features": str(features),
+        **{name.lower(): str(getattr(config, name, "")) for name in _SETTINGS},
+    }
 
 
 @cache
-def _cache_folder() -> Path | None:
-    """Folder for the present sources, created; None if there is no place to write."""
-    digest = hashlib.sha256()
-    for module in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(module.read_bytes())
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+def code_files(to_installation: bool = False) -> CodeFiles:
+    """Where this process finds and keeps compiled code."""
+    return CodeFiles(folder_name(settings(), processor()), to_installation)
+
+
+# ------------------------------------------------------------------------------- the cache
+
+_target: list[CodeFiles] = []
+
+
+@contextmanager
+def kept_in_installation() -> Iterator[None]:
+    """While this lasts, new code is kept in the installation, if that can be written."""
+    _target.append(code_files(to_installation=True))
     try:
-        root = Path(base) if base else Path.home() / ".cache"
-        folder = root / "adhesis" / digest.hexdigest()[:16]
-        folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, RuntimeError):
-        return None
-    return folder if os.access(folder, os.W_OK) else None
+        yield
+    finally:
+        _target.pop()
+
+
+class _Kept:
+    """What numba's dispatcher asks of a cache, for one function."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._name = f"{function.__module__}.{function.__qualname__}"
+
+    @property
+    def cache_path(self) -> str:
+        """For numba's statistics."""
+        return str(code_files().find(self._name) or "")
+
+    def _file(self, signature: Any) -> str:
+        return f"{self._name}-{hashlib.sha256(str(signature).encode()).hexdigest()[:16]}"
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """Code of a signature, or None."""
+        content = _files().read(self._file(signature))
+        if content is None:
+            return None
+        target.refresh()
+        try:
+            state = pickle.loads(content)
+        except Exception:  # a damaged file can raise anything; it is compiled and written anew
+            return None
+        return CompileResult._rebuild(target, *state)  # type: ignore[no-untyped-call]
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep the code of a signature."""
+        if result.library.has_dynamic_globals:
+            raise RuntimeError(f"{self._name} holds an address of this process and cannot be kept")
+        content: bytes = dumps(result._reduce())  # type: ignore[no-untyped-call]
+        _files().write(self._file(signature), content)
+
+    def flush(self) -> None:
+        """Nothing to forget: a change has another folder."""
+
+
+def _files() -> CodeFiles:
+    return _target[-1] if _target else code_files()
+
+
+# ------------------------------------------------------------------------- watching the compiler
+
+
+class Compilation(event.Listener):
+    """Counts the functions that are compiled, and the time that it takes.
+
+    Attributes
+    ----------
+    functions : int
+        Compiled so far, each signature for itself.
+    seconds : float
+        Wall time.
+    """
+
+    def __init__(self) -> None:
+        self.functions = 0
+        self.seconds = 0.0
+        self._depth = 0
+        self._since = 0.0
+
+    def on_start(self, _: Any) -> None:
+        """One more; a function compiles those that it calls."""
+        if self._depth == 0:
+            self._since = time.perf_counter()
+        self._depth += 1
+
+    def on_end(self, _: Any) -> None:
+        """One is ready."""
+        self._depth -= 1
+        self.functions += 1
+        if self._depth == 0:
+            self.seconds += time.perf_counter() - self._since
+
+
+@contextmanager
+def watch_compilation() -> Iterator[Compilation]:
+    """Count what is compiled while this lasts."""
+    compilation = Compilation()
+    with event.install_listener("numba:compile", compilation):
+        yield compilation

@@ -6,20 +6,13 @@ the input alone.
 
 from __future__ import annotations
 
-from typing import Any
-
-import numba
 import numpy as np
 
+from solver.compiled import compiled, compiled_finite_sums
 from solver.profile import Array
 
-# Sums may be reordered at compile time (vector registers), never at run time.
-_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": {"reassoc", "nnan", "nsz", "contract"}}
-_VECTOR = numba.types.Array(numba.float64, 1, "C")
-_MATRIX = numba.types.Array(numba.float64, 2, "C")
 
-
-@numba.njit(numba.float64(_VECTOR, _VECTOR), **_OPTIONS)
+@compiled_finite_sums
 def dot(a: Array, b: Array) -> float:
     """Sum of a_i b_i."""
     total = 0.0
@@ -28,16 +21,14 @@ def dot(a: Array, b: Array) -> float:
     return total
 
 
-@numba.njit(numba.void(_VECTOR, _VECTOR, _VECTOR, numba.float64), **_OPTIONS)
+@compiled_finite_sums
 def turn(direction: Array, inside: Array, correction: Array, factor: float) -> None:
     """Next search direction: the correction on Ω plus ``factor`` times the last direction."""
     for i in range(direction.size):
         direction[i] = inside[i] * correction[i] + factor * direction[i]
 
 
-@numba.njit(
-    numba.float64(_VECTOR, _VECTOR, _VECTOR, _VECTOR, _VECTOR, _VECTOR, numba.float64), **_OPTIONS
-)
+@compiled_finite_sums
 def advance(
     stress: Array,
     displacement: Array,
@@ -57,7 +48,7 @@ def advance(
     return largest
 
 
-@numba.njit(numba.float64(_MATRIX, _VECTOR), nogil=True)
+@compiled
 def inverse_form(matrix: Array, vector: Array) -> float:
     """bᵀ A⁻¹ b of a symmetric positive definite A by Cholesky; A's lower half is destroyed."""
     n = vector.size

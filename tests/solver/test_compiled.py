@@ -1,30 +1,231 @@
-"""Compiled functions are cached by the sources of the whole package."""
+"""Compiled functions are kept by all that their machine code depends on, and by nothing else."""
 
 from __future__ import annotations
 
+import ast
+import importlib
+import pkgutil
+import shutil
+import types
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+import solver
+from solver import code_cache
 from solver import compiled as module
+from solver.code_cache import CodeFiles, folder_name, kernel_modules
+
+SOLVER = Path(solver.__file__).parent
 
 
 def double(x):
     return 2 * x
 
 
-def test_the_cache_lies_in_a_folder_named_after_the_sources(tmp_path, monkeypatch):
-    """A changed module means another folder, so that no caller keeps old code."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    sources = tmp_path / "package"
-    sources.mkdir()
-    (sources / "one.py").write_text("a = 1\n")
-    monkeypatch.setattr(module, "__file__", str(sources / "compiled.py"))
-    before = module._cache_folder.__wrapped__()
-    assert module._cache_folder.__wrapped__() == before
-    (sources / "one.py").write_text("a = 2\n")
-    assert module._cache_folder.__wrapped__() != before
+def name_of(package: Path, **settings: str) -> str:
+    return folder_name({"numba": "1", **settings}, "a-processor", package)
 
 
-def test_without_a_place_to_write_functions_still_compile(tmp_path, monkeypatch):
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the solver's sources, to be edited."""
+    shutil.copytree(SOLVER, tmp_path / "solver", ignore=shutil.ignore_patterns("__*__"))
+    return tmp_path / "solver"
+
+
+@pytest.fixture
+def places(tmp_path, monkeypatch):
+    """The installation's and the user's folder, both empty; code is kept there from now on."""
+    monkeypatch.setattr(code_cache, "installed_folder", lambda: tmp_path / "installed")
+    monkeypatch.setenv("ADHESIS_CACHE", str(tmp_path / "user"))
+    use_new_files(monkeypatch)
+    return tmp_path / "installed", tmp_path / "user"
+
+
+def use_new_files(monkeypatch):
+    """As a new process would: folders are looked at again."""
+    files = CodeFiles("key"), CodeFiles("key", to_installation=True)
+    monkeypatch.setattr(module, "code_files", lambda to_installation=False: files[to_installation])
+
+
+def compile_double() -> int:
+    """Number of functions compiled to call ``double`` in what might be a new process."""
+    with module.watch_compilation() as seen:
+        assert module.compiled(double)(21) == 42
+    return seen.functions
+
+
+# ------------------------------------------------------------------------------- the name
+
+
+def test_an_edit_of_a_kernel_gives_another_folder_wherever_it_lies(copy):
+    names = {name_of(copy)}
+    for path in kernel_modules(copy):
+        path.write_text(path.read_text() + "\n")
+        names.add(name_of(copy))
+    assert len(names) == len(kernel_modules(copy)) + 1
+
+
+def test_a_kernel_that_moves_gives_another_folder(copy):
+    before = name_of(copy)
+    (copy / "sharp" / "box.py").rename(copy / "grid" / "box.py")
+    assert name_of(copy) != before
+
+
+def test_an_edit_elsewhere_compiles_nothing(copy):
+    before = name_of(copy)
+    kernels = kernel_modules(copy)
+    for path in copy.rglob("*.py"):
+        if path not in kernels:
+            path.write_text(path.read_text() + "\n")
+    assert name_of(copy) == before
+    assert {"loop.py", "profile.py", "method.py"}.isdisjoint(path.name for path in kernels)
+
+
+def test_settings_and_processor_have_a_folder_each(copy, monkeypatch):
+    assert name_of(copy) != name_of(copy, opt="2")
+    assert name_of(copy) != folder_name({"numba": "1"}, "another", copy)
+    seen = {str(module.settings())}
+    for name, value in (("OPT", 0), ("LOOP_VECTORIZE", 0), ("SLP_VECTORIZE", 1), ("ENABLE_AVX", 7)):
+        monkeypatch.setattr(module.config, name, value)
+        seen.add(str(module.settings()))
+    monkeypatch.setattr(module.config, "CPU_FEATURES", "+nothing")
+    seen.add(str(module.settings()))
+    assert len(seen) == 6
+    assert module.settings()["using_svml"] == "False"
+
+
+def _modules() -> list[types.ModuleType]:
+    found = pkgutil.walk_packages([str(SOLVER)], "solver.")
+    return [importlib.import_module(entry.name) for entry in found]
+
+
+def test_compiled_code_reads_nothing_but_kernel_modules():
+    """What a compiled function finds under a global name is part of its code: it must be keyed."""
+    kernels = {str(path) for path in kernel_modules()}
+    functions = {
+        value.py_func
+        for each in _modules()
+        for value in vars(each).values()
+        if isinstance(value, Dispatcher)
+    }
+    assert len(functions) > 40
+    for function in functions:
+        home = importlib.import_module(function.__module__)
+        assert home.__file__ in kernels
+        defined = _assigned(home)
+        for name in function.__code__.co_names:
+            value = function.__globals__.get(name)
+            if value is None or isinstance(value, (types.ModuleType, type)):
+                continue
+            if isinstance(value, Dispatcher):
+                assert importlib.import_module(value.py_func.__module__).__file__ in kernels
+            elif name not in defined:
+                origin = importlib.import_module(_imported(home)[name])
+                assert origin.__file__ in kernels, (function.__name__, name)
+                assert name in _assigned(origin)
+
+
+def _assigned(home: types.ModuleType) -> set[str]:
+    tree = ast.parse(Path(str(home.__file__)).read_text())
+    targets = [n for statement in tree.body for n in ast.walk(statement)]
+    return {n.id for n in targets if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+
+
+def _imported(home: types.ModuleType) -> dict[str, str]:
+    tree = ast.parse(Path(str(home.__file__)).read_text())
+    return {
+        alias.asname or alias.name: str(statement.module)
+        for statement in tree.body
+        if isinstance(statement, ast.ImportFrom)
+        for alias in statement.names
+    }
+
+
+# ------------------------------------------------------------------------------- the places
+
+
+def test_code_is_compiled_once_and_kept_in_the_users_folder(places, monkeypatch):
+    installed, user = places
+    assert compile_double() == 1
+    use_new_files(monkeypatch)
+    assert compile_double() == 0
+    assert len(list((user / "key").iterdir())) == 1
+    assert not installed.exists()
+
+
+def test_the_installation_is_looked_at_first_and_never_written_by_a_run(places, monkeypatch):
+    installed, user = places
+    with module.kept_in_installation():
+        assert compile_double() == 1
+    before = sorted((path, path.stat().st_mtime_ns) for path in installed.rglob("*"))
+    use_new_files(monkeypatch)
+    assert compile_double() == 0
+    assert module.compiled(double)(1.5) == 3.0  # a signature that the installation has not
+    assert len(list((user / "key").iterdir())) == 1
+    after = sorted((path, path.stat().st_mtime_ns) for path in installed.rglob("*"))
+    assert after == before
+
+
+def test_an_installation_that_cannot_be_written_is_no_reason_to_complain(
+    places, monkeypatch, tmp_path
+):
     (tmp_path / "file").write_text("")
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
-    assert module._cache_folder.__wrapped__() is None
-    monkeypatch.setattr(module, "_cache_folder", lambda: None)
-    assert module.compiled(double)(21) == 42
+    monkeypatch.setattr(code_cache, "installed_folder", lambda: tmp_path / "file" / "beneath")
+    use_new_files(monkeypatch)
+    with warnings.catch_warnings(), module.kept_in_installation():
+        warnings.simplefilter("error")
+        assert compile_double() == 1
+    assert len(list((places[1] / "key").iterdir())) == 1
+
+
+def test_a_folder_that_cannot_be_used_is_one_warning(places, monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("ADHESIS_CACHE", str(tmp_path / "file" / "beneath"))
+    use_new_files(monkeypatch)
+    with pytest.warns(RuntimeWarning, match=r"cannot be kept.*file/beneath"):
+        assert compile_double() == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert compile_double() == 1
+
+
+def test_a_damaged_file_is_compiled_anew(places, monkeypatch):
+    compile_double()
+    (kept,) = (places[1] / "key").iterdir()
+    kept.write_bytes(kept.read_bytes()[:100])
+    use_new_files(monkeypatch)
+    assert compile_double() == 1
+    assert compile_double() == 0
+
+
+@pytest.mark.parametrize(
+    ("variables", "wanted"),
+    [
+        ({"ADHESIS_CACHE": "/own", "XDG_CACHE_HOME": "/xdg"}, "/own"),
+        ({"XDG_CACHE_HOME": "/xdg"}, "/xdg/adhesis"),
+        ({"HOME": "/home/somebody"}, "/home/somebody/.cache/adhesis"),
+    ],
+)
+def test_the_users_folder(monkeypatch, variables, wanted):
+    for name in ("ADHESIS_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert code_cache.users_folder() == Path(wanted)
+
+
+def test_kept_code_gives_the_same_bits(places, monkeypatch):
+    from solver.grid.kernels import dot
+
+    a, b = np.random.default_rng(1).standard_normal((2, 1001))
+    fresh = module.compiled_finite_sums(dot.py_func)
+    first = fresh(a, b)
+    use_new_files(monkeypatch)
+    with module.watch_compilation() as seen:
+        again = module.compiled_finite_sums(dot.py_func)(a, b)
+    assert (seen.functions, again) == (0, first)
