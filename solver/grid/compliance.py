@@ -90,10 +90,6 @@ class EdgeCompliance:
         self._known: dict[tuple[int, ...], float] = {}
         self._pairs: dict[tuple[int, ...], Array] = {}
 
-    def isolated(self) -> float:
-        """S at the edge of a single patch that covers half of the period, in m/Pa."""
-        return self(self.n // 2, self.n - self.n // 2, None)
-
     def __call__(
         self,
         width: int,

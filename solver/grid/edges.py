@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grid.compliance import EdgeCompliance
 from solver.grid.contact import Contact, Mask
+from solver.grid.lattice import Lattice
 from solver.profile import Array
 
 Indices = NDArray[np.intp]
@@ -59,30 +59,19 @@ class Edges:
     overlap: NDArray[np.bool_]
 
 
-def survey(
-    contact: Contact,
-    height: Array,
-    adhesion: Array,
-    dx: float,
-    compliance: EdgeCompliance,
-    overlap_below: float,
-) -> Edges:
+def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
     """Price every edge of a contact set.
 
     Parameters
     ----------
     contact : Contact
-    height : array, shape (n,)
-        h in m.
-    adhesion : array, shape (n,)
-        γ sqrt(1 + h'²) in J/m².
-    dx : float
-        In m.
-    compliance : EdgeCompliance
+        Solved.
+    lattice : Lattice
     overlap_below : float
         Gap in m below which a node counts as overlapping.
     """
-    n = height.size
+    n, dx = lattice.n, lattice.dx
+    compliance, adhesion = lattice.compliance, lattice.adhesion
     first, width = patch_ranges(contact.mask)
     count = first.size
     if count == 0:
@@ -117,7 +106,7 @@ def survey(
             s_grow[edge] = compliance(w[k], near_gap, others)
             s_recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
 
-    t = contact.displacement[outer] - height[outer] + contact.separation
+    t = contact.displacement[outer] - lattice.height[outer] + contact.separation
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < overlap_below
     # The last free node never joins: the mean gap is the separation, and it is positive.

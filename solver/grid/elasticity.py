@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from solver.grid.fourier import RealFourier
-from solver.profile import Array, Profile
+from solver.profile import Array
 
 
 class ElasticGrid:
@@ -33,6 +33,7 @@ class ElasticGrid:
 
     def __init__(self, n: int, period: float, modulus: float) -> None:
         self.n = n
+        self.period = period
         self.dx = period / n
         self.modulus = modulus
         self._fourier = RealFourier(n)
@@ -62,18 +63,3 @@ class ElasticGrid:
         unit = np.zeros(self.n)
         unit[0] = 1.0
         return self.displacement(unit).copy()
-
-    def energy(self, stress: Array, displacement: Array) -> float:
-        """½∫σ v dx over one period, in J/m."""
-        return 0.5 * self.dx * float(np.einsum("i,i->", stress, displacement))
-
-
-def full_contact_stress(profile: Profile, modulus: float, n: int) -> Array:
-    """Stress of full contact, σ_q = E*|q| h_q/2, on n nodes, in Pa (zero mean)."""
-    grid = ElasticGrid(n, profile.period, modulus)
-    return grid.stress(profile.heights(n)).copy()
-
-
-def full_contact_energy(profile: Profile, modulus: float) -> float:
-    """Elastic energy of full contact, (E*/4) Σ_q |q||h_q|² per nominal area, in J/m²."""
-    return 0.25 * modulus * profile.moment(1)

@@ -6,22 +6,17 @@ What it does and how accurate it is: docs/methods.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from solver.grid.contact import EDGE_COMPLIANCE, Contact, ContactSolver
-from solver.grid.edges import Indices, patch_ranges
-from solver.grid.elasticity import ElasticGrid
-from solver.grid.path import Steps
-from solver.grid.relax import Relaxation, ranges_mask
-from solver.method import ContactState, Fields, Method, Path
+from solver.grid.contact import Contact, ContactSolver
+from solver.grid.lattice import Lattice
+from solver.grid.path import Counters, Steps
+from solver.grid.relax import Relaxation
+from solver.grid.states import mask_of
+from solver.method import Branch, ContactState, Fields, Method, Path
 from solver.problem import Problem
-
-EDGE_OFFSET = 0.190
-"""An edge lies this many dx inside the outer face of its contact node (numerical calibration of the
-edge stress against K/sqrt(2πr))."""
 
 _FEWEST_NODES_PER_WAVE = 8
 # The loss is of first order in dx. At 32 nodes per shortest wave it is good to 1e-3 on the rough
@@ -30,14 +25,6 @@ _FIRST_ORDER = 0.032
 _MOST_NODES_PER_WAVE = 256
 # A single wave at 32 nodes would be too coarse for its own edges.
 _FEWEST_NODES = 1024
-
-
-@dataclass(frozen=True, eq=False)
-class _Patches:
-    """What a state remembers: its contact set. Everything else follows from it."""
-
-    first: Indices
-    width: Indices
 
 
 class GridMethod(Method):
@@ -79,26 +66,17 @@ class GridMethod(Method):
         profile = problem.profile
         self.accuracy = accuracy
         self.n = n = _node_count(profile.highest_harmonic, accuracy, nodes_per_wave, nodes)
-        modulus = problem.half_space.modulus
-        self.elastic = ElasticGrid(n, profile.period, modulus)
-        self.height = profile.heights(n)
-        dx = self.elastic.dx
-        gamma = problem.work_of_adhesion
-        # Gap that adhesion just closes beside an edge: the unit of tolerances on lengths. Without
-        # adhesion it is what the curvature makes of half a node.
-        closing = float(np.sqrt(2 * gamma * EDGE_COMPLIANCE * dx / modulus))
-        curved = 0.125 * dx**2 * float(np.sqrt(profile.m4))
-        self.solver = ContactSolver(self.elastic, self.height, max(closing, curved))
+        self.lattice = lattice = Lattice.of(problem, n)
+        closing = lattice.closing_gap(problem.work_of_adhesion, float(np.sqrt(profile.m4)))
+        self.solver = ContactSolver(lattice.elastic, lattice.height, closing)
         self.relaxation = Relaxation(
-            self.elastic,
+            lattice,
             self.solver,
-            gamma * np.sqrt(1 + profile.slopes(n) ** 2),
-            longest_step=max(1, int(0.1 * profile.shortest_wavelength / dx)),
+            longest_step=max(1, int(0.1 * profile.shortest_wavelength / lattice.dx)),
             loose=0.02,
             tight=1e-4,
         )
-        self.substeps = 0
-        self.bisections = 0
+        self.count = Counters()
 
     # ------------------------------------------------------------------ contract
 
@@ -108,7 +86,8 @@ class GridMethod(Method):
         See :class:`~solver.method.Method`. A state without contact stays without contact down to
         s = h_max, where the surfaces touch.
         """
-        steps = Steps(self, "loading" if separation <= state.separation else "unloading")
+        branch: Branch = "loading" if separation <= state.separation else "unloading"
+        steps = Steps(self.problem, self.relaxation, self.accuracy, branch, self.count)
         h_max = self.problem.profile.h_max
         if state.patches == 0:
             if separation > h_max:
@@ -131,11 +110,11 @@ class GridMethod(Method):
             raise ValueError(f"fields on {n} nodes: the grid has {self.n}, n must divide that")
         contact = self._contact(state)
         pick = slice(None, None, self.n // n)
-        gap = contact.displacement - self.height + state.separation
+        gap = self.lattice.gap(contact)
         gap[contact.mask] = 0.0
         return Fields(
             x=np.asarray(np.arange(n) * (self.problem.profile.period / n), dtype=np.float64),
-            height=self.height[pick].copy(),
+            height=self.lattice.height[pick].copy(),
             stress=contact.stress[pick].copy(),
             displacement=contact.displacement[pick].copy(),
             gap=gap[pick],
@@ -154,8 +133,8 @@ class GridMethod(Method):
             "flips": self.relaxation.flips,
             "solves": self.solver.solves,
             "cg_iterations": self.solver.iterations,
-            "substeps": self.substeps,
-            "bisections": self.bisections,
+            "substeps": self.count.substeps,
+            "bisections": self.count.bisections,
         }
 
     # ------------------------------------------------------------------ states
@@ -163,37 +142,10 @@ class GridMethod(Method):
     def _contact(self, state: ContactState) -> Contact:
         """Contact of a state of this method, solved from its contact set alone."""
         contact = self.solver.empty(state.separation)
-        patches = state.internal
         if state.patches:
-            if not isinstance(patches, _Patches):
-                raise ValueError("this state was not made by the method grid")
-            contact.mask = ranges_mask(self.n, patches.first, patches.width)
+            contact.mask = mask_of(self.lattice, state)
             self.solver.solve(contact, self.relaxation.tight)
         return contact
-
-    def state(self, contact: Contact) -> ContactState:
-        """Return the contact state of a solved contact."""
-        first, width = patch_ranges(contact.mask)
-        if first.size == 0:
-            return self.detached(contact.separation)
-        dx = self.elastic.dx
-        inset = EDGE_OFFSET - 0.5
-        left = (first + inset) * dx
-        right = (first + width - 1 - inset) * dx
-        wrapped = left < 0
-        period = self.problem.profile.period
-        left, right = left + wrapped * period, right + wrapped * period
-        order = np.argsort(left, kind="stable")
-        area = float(width.sum()) - 2 * EDGE_OFFSET * first.size
-        return ContactState(
-            separation=contact.separation,
-            edges=np.column_stack((left, right))[order],
-            mean_stress=float(contact.stress.mean()),
-            elastic_energy=contact.elastic_energy,
-            adhesion_energy=self.relaxation.adhesion_energy(contact),
-            contact_fraction=max(0.0, area / self.n),
-            internal=_Patches(first, width),
-        )
 
 
 def _node_count(

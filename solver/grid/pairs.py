@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.grid.compliance import EdgeCompliance
 from solver.grid.contact import Contact
 from solver.grid.edges import Edges, Indices
+from solver.grid.lattice import Lattice
 from solver.profile import Array
 
 # More than |S_12|/S_11 of any pair (0.3 across a patch of three nodes).
@@ -36,18 +36,12 @@ class Pair:
         return int(edges.inner[one]), int(edges.inner[two]), self.direction
 
 
-def pairs(
-    contact: Contact,
-    edges: Edges,
-    height: Array,
-    adhesion: Array,
-    dx: float,
-    compliance: EdgeCompliance,
-) -> list[Pair]:
+def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     """Price the pairs of edges of every patch and of every gap of a contact set (J/m)."""
     count = edges.side.size // 2
+    dx, adhesion, compliance = lattice.dx, lattice.adhesion, lattice.compliance
     width, left, right = edges.width[:count], edges.gap[:count], edges.gap[count:]
-    t = contact.displacement[edges.outer] - height[edges.outer] + contact.separation
+    t = contact.displacement[edges.outer] - lattice.height[edges.outer] + contact.separation
     pull = contact.stress[edges.inner]
     found: list[Pair] = []
 

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
 from solver.grid.contact import Contact
 from solver.grid.edges import Indices, patch_ranges
+from solver.grid.lattice import Lattice
+from solver.grid.relax import Relaxation
+from solver.grid.states import state_of
 from solver.jumps import Jump, classify
 from solver.method import Branch, ContactState
-from solver.profile import Array
+from solver.problem import Problem
+from solver.profile import Array, Profile
 
-if TYPE_CHECKING:
-    from solver.grid.method import GridMethod
+
+@dataclass
+class Counters:
+    """What the path cost: sub-steps taken, and those that were halved."""
+
+    substeps: int = 0
+    bisections: int = 0
 
 
 class Steps:
@@ -27,41 +36,49 @@ class Steps:
     there or in between, which is a jump.
     """
 
-    def __init__(self, method: GridMethod, branch: Branch) -> None:
-        self.method = method
+    def __init__(
+        self,
+        problem: Problem,
+        relaxation: Relaxation,
+        accuracy: float,
+        branch: Branch,
+        count: Counters,
+    ) -> None:
+        self.relaxation, self.lattice = relaxation, relaxation.lattice
+        self.solver = relaxation.solver
+        self.profile = problem.profile
+        self.accuracy = accuracy
         self.branch = branch
+        self.count = count
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
-        self.energy = method.relaxation.energy
-        problem = method.problem
+        self.energy = self.lattice.energy
         self.period = problem.profile.period
         self.h_max = problem.profile.h_max
         self.adhesion_scale = problem.work_of_adhesion * self.period
 
     def first_touch(self, separation: float) -> Contact:
         """Contact at the separation at which the highest crests touch."""
-        method = self.method
-        before = method.detached(separation)
+        contact = self.solver.empty(separation)
+        before = state_of(self.lattice, contact)
         self.states.append(before)
-        contact = method.solver.empty(separation)
-        contact.mask[_crests(method)] = True
-        method.solver.solve(contact, method.relaxation.tight)
+        contact.mask[_crests(self.profile, self.lattice)] = True
+        self.solver.solve(contact, self.relaxation.tight)
         if self.energy(contact) < 0:
-            relaxed = method.relaxation.relax(contact)
+            relaxed = self.relaxation.relax(contact)
             assert relaxed is not None
             contact = relaxed
             self._jump(before, contact)
         else:
-            contact = method.solver.empty(separation)
+            contact = self.solver.empty(separation)
         return contact
 
     def run(self, contact: Contact, separation: float) -> None:
         """Go from a relaxed contact to ``separation``, appending states and jumps."""
-        accuracy = self.method.accuracy
         start = contact.separation
         step = separation - start
         # Below this stride a jump is run to its end: only then is it known how well it is located.
-        self.least = accuracy * self.h_max
+        self.least = self.accuracy * self.h_max
         while contact.separation != separation:
             remaining = separation - contact.separation
             if abs(step) >= abs(remaining) * (1 - 1e-9):
@@ -72,16 +89,16 @@ class Steps:
                 target = separation
             after, located = self._substep(contact, target, abs(step) > self.least)
             if after is None:
-                self.method.bisections += 1
+                self.count.bisections += 1
                 step /= 2
                 continue
-            self.method.substeps += 1
+            self.count.substeps += 1
             if not located:
-                self.states.append(self.method.state(after))
+                self.states.append(state_of(self.lattice, after))
             contact = after
             step *= 2
         if not self.states or self.states[-1].separation != separation:
-            self.states.append(self.method.state(contact))
+            self.states.append(state_of(self.lattice, contact))
 
     def _substep(
         self, contact: Contact, target: float, divisible: bool
@@ -90,14 +107,13 @@ class Steps:
 
         No contact: the step must be halved. A jump's two states are appended here.
         """
-        method = self.method
-        accuracy = method.accuracy
+        accuracy, relaxation = self.accuracy, self.relaxation
         stride = abs(target - contact.separation)
         frozen = contact.copy()
         frozen.separation = target
-        if method.problem.work_of_adhesion == 0:
-            return method.relaxation.relax_without_adhesion(frozen), False
-        method.solver.solve(frozen, method.relaxation.tight)
+        if self.adhesion_scale == 0:
+            return relaxation.relax_without_adhesion(frozen), False
+        self.solver.solve(frozen, relaxation.tight)
         energy = self.energy(frozen)
         stress = float(frozen.stress.mean())
         work = self.period * stride
@@ -107,11 +123,11 @@ class Steps:
             change = abs(stress - float(relaxing.stress.mean()))
             return energy - now - work * change > noise
 
-        flips = method.relaxation.flips
-        relaxed = method.relaxation.relax(frozen, jumped if divisible else None)
+        flips = relaxation.flips
+        relaxed = relaxation.relax(frozen, jumped if divisible else None)
         if relaxed is None:
             return None, False
-        flips = method.relaxation.flips - flips
+        flips = relaxation.flips - flips
         drop = energy - self.energy(relaxed)
         change = stress - float(relaxed.stress.mean())
         if jumped(self.energy(relaxed), relaxed):
@@ -119,7 +135,7 @@ class Steps:
             if work * abs(change) > allowed and stride > 0.01 * accuracy * self.h_max:
                 self.least = min(0.5 * stride, allowed / (self.period * abs(change)))
                 return None, False
-            before = method.state(frozen)
+            before = state_of(self.lattice, frozen)
             self.states.append(before)
             self._jump(before, relaxed)
             return relaxed, True
@@ -134,8 +150,7 @@ class Steps:
         return relaxed, False
 
     def _jump(self, before: ContactState, after: Contact) -> None:
-        method = self.method
-        state = method.state(after)
+        state = state_of(self.lattice, after)
         kind, length = classify(before.edges, state.edges, self.period)
         self.states.append(state)
         self.jumps.append(
@@ -153,10 +168,10 @@ class Steps:
         )
 
 
-def _crests(method: GridMethod) -> Indices:
+def _crests(profile: Profile, lattice: Lattice) -> Indices:
     """Nodes nearest to the highest crests of the profile, those of equal height together."""
-    profile, dx, n = method.problem.profile, method.elastic.dx, method.n
-    h = method.height
+    dx, n = lattice.dx, lattice.n
+    h = lattice.height
     spread = dx**2 * float(np.abs(profile.curvatures(n)).max())
     top = (h >= np.roll(h, 1)) & (h >= np.roll(h, -1)) & (h >= profile.h_max - spread)
     nodes = np.flatnonzero(top)

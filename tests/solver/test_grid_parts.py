@@ -11,6 +11,7 @@ from solver.grid.contact import Contact, ContactSolver
 from solver.grid.edges import patch_ranges, survey
 from solver.grid.elasticity import ElasticGrid
 from solver.grid.kernels import dot, inverse_form
+from solver.grid.lattice import Lattice
 from solver.grid.method import GridMethod
 from solver.grid.pairs import pairs
 
@@ -38,10 +39,10 @@ def dense(kernel: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarr
 def exact_energy(method: GridMethod, mask: np.ndarray, separation: float) -> float:
     """U in J/m by dense linear algebra."""
     nodes = np.flatnonzero(mask)
-    target = method.height[nodes] - separation
-    stress = np.linalg.solve(dense(method.elastic.kernel(), nodes, nodes), target)
-    gamma = method.relaxation.adhesion[nodes].sum()
-    return float(method.elastic.dx * (0.5 * stress @ target - gamma))
+    target = method.lattice.height[nodes] - separation
+    stress = np.linalg.solve(dense(method.lattice.elastic.kernel(), nodes, nodes), target)
+    gamma = method.lattice.adhesion[nodes].sum()
+    return float(method.lattice.elastic.dx * (0.5 * stress @ target - gamma))
 
 
 # ------------------------------------------------------------------ conjugate gradients
@@ -54,12 +55,15 @@ def test_conjugate_gradients_give_the_dense_solution(patches):
     contact.mask = random_contact(np.random.default_rng(patches), method.n, patches)
     method.solver.solve(contact, 1e-8)
     nodes = np.flatnonzero(contact.mask)
-    matrix = dense(method.elastic.kernel(), nodes, nodes)
-    exact = np.linalg.solve(matrix, method.height[nodes] - 0.4e-6)
+    matrix = dense(method.lattice.elastic.kernel(), nodes, nodes)
+    exact = np.linalg.solve(matrix, method.lattice.height[nodes] - 0.4e-6)
     assert np.abs(contact.stress[nodes] - exact).max() < 1e-6 * np.abs(exact).max()
     assert not contact.stress[~contact.mask].any()
     np.testing.assert_allclose(
-        contact.displacement, method.elastic.displacement(contact.stress), rtol=0, atol=1e-16
+        contact.displacement,
+        method.lattice.elastic.displacement(contact.stress),
+        rtol=0,
+        atol=1e-16,
     )
 
 
@@ -67,8 +71,8 @@ def test_energy_error_is_of_second_order_in_the_residual():
     method = rough()
     mask = random_contact(np.random.default_rng(0), method.n, 4)
     errors, residuals = [], []
-    exact = exact_energy(method, mask, 0.3e-6) + method.elastic.dx * float(
-        method.relaxation.adhesion[mask].sum()
+    exact = exact_energy(method, mask, 0.3e-6) + method.lattice.elastic.dx * float(
+        method.lattice.adhesion[mask].sum()
     )
     for tolerance in (3.0, 0.3, 0.03):
         contact = method.solver.empty(0.3e-6)
@@ -86,7 +90,7 @@ def test_iterations_hardly_grow_with_the_grid():
     for nodes in (512, 2048, 8192):
         method = rough(nodes=nodes)
         contact = method.solver.empty(0.5e-6)
-        contact.mask = method.height > 0.5e-6
+        contact.mask = method.lattice.height > 0.5e-6
         method.solver.solve(contact, 1e-4)
         iterations.append(method.solver.iterations)
     assert iterations[-1] <= iterations[0] + 10
@@ -128,8 +132,10 @@ def test_compliance_at_the_edge_of_a_long_patch():
 
 def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
     n = 1024
-    kernel = ElasticGrid(n, 2.5, 1e6).kernel()
+    elastic = ElasticGrid(n, 2.0 * n, 1e6)
+    kernel = elastic.kernel()
     compliance = EdgeCompliance(kernel)
+    lattice = Lattice(elastic, compliance, np.zeros(n), np.zeros(n))
     errors = []
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -142,10 +148,9 @@ def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
         mask = np.zeros(n, dtype=bool)
         for a, b in cuts.reshape(-1, 2):
             mask[a:b] = True
-        height = np.zeros(n)
         contact = Contact(1.0, mask, -np.ones(n) * mask, np.zeros(n))
         # Unit gap, unit tension, no adhesion: the prices are S itself.
-        edges = survey(contact, height, np.zeros(n), 2.0, compliance, -1.0)
+        edges = survey(contact, lattice, -1.0)
         for k in range(edges.side.size):
             nodes = np.flatnonzero(mask)
             exact = schur(kernel, nodes, int(edges.outer[k]))
@@ -173,11 +178,11 @@ def test_moving_an_edge_by_one_node_costs_what_the_survey_says():
     method = rough()
     separation = 0.5e-6
     contact = method.solver.empty(separation)
-    contact.mask = method.height > separation
+    contact.mask = method.lattice.height > separation
     method.solver.solve(contact, 1e-6)
-    edges = method.relaxation._survey(contact)
+    edges = method.relaxation.edges(contact)
     now = exact_energy(method, contact.mask, separation)
-    unit = method.elastic.dx * method.problem.work_of_adhesion
+    unit = method.lattice.elastic.dx * method.problem.work_of_adhesion
     for k in range(edges.side.size):
         grown, shrunk = contact.mask.copy(), contact.mask.copy()
         grown[edges.outer[k]] = True
@@ -196,12 +201,11 @@ def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level, monkeypatch):
     monkeypatch.setattr("solver.grid.pairs._COUPLING", np.inf)  # price them all
     method = rough()
     contact = method.solver.empty(0.8 * level)
-    contact.mask = method.height > level
+    contact.mask = method.lattice.height > level
     method.solver.solve(contact, 1e-6)
-    relaxation = method.relaxation
-    edges = relaxation._survey(contact)
-    dx = method.elastic.dx
-    found = pairs(contact, edges, method.height, relaxation.adhesion, dx, relaxation.compliance)
+    edges = method.relaxation.edges(contact)
+    dx = method.lattice.dx
+    found = pairs(contact, edges, method.lattice)
     assert {p.direction for p in found} == {1, -1}
     now = exact_energy(method, contact.mask, contact.separation)
     unit = 2 * dx * method.problem.work_of_adhesion
@@ -220,7 +224,7 @@ def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level, monkeypatch):
 
 def settle(method: GridMethod, separation: float) -> tuple[Contact, list[float]]:
     contact = method.solver.empty(separation)
-    contact.mask = method.height > separation
+    contact.mask = method.lattice.height > separation
     method.solver.solve(contact, 1e-4)
     energies: list[float] = []
 
@@ -239,26 +243,26 @@ def test_energy_never_rises_in_a_relaxation_and_ends_in_a_local_minimum(seed, ga
     method = rough(gamma, seed)
     separation = 0.6e-6
     relaxed, energies = settle(method, separation)
-    unit = method.elastic.dx * gamma
+    unit = method.lattice.elastic.dx * gamma
     assert len(energies) > 3
     assert np.diff(energies).max() <= 1e-5 * unit
     lowest = exact_energy(method, relaxed.mask, separation)
     assert lowest <= energies[-1] + 1e-9 * unit
-    edges = method.relaxation._survey(relaxed)
+    edges = method.relaxation.edges(relaxed)
     for node in {*edges.inner.tolist(), *edges.outer.tolist()}:
         flipped = relaxed.mask.copy()
         flipped[node] ^= True
         if flipped[node] or relaxed.stress[node] < 0:
             # 0.5 %: what S may be wrong by.
             assert exact_energy(method, flipped, separation) > lowest - 0.005 * unit
-    gap = relaxed.displacement - method.height + separation
+    gap = relaxed.displacement - method.lattice.height + separation
     assert gap[~relaxed.mask].min() > -1e-12
 
 
 def test_relaxation_stops_when_told_to():
     method = rough()
     contact = method.solver.empty(0.6e-6)
-    contact.mask = method.height > 0.6e-6
+    contact.mask = method.lattice.height > 0.6e-6
     method.solver.solve(contact, 1e-4)
     mask = contact.mask.copy()
     assert method.relaxation.relax(contact, lambda energy, relaxing: True) is None
@@ -278,6 +282,6 @@ def test_touching_finds_the_crest_between_nodes():
     method = GridMethod(Problem(profile, HALF_SPACE, 0.01), nodes=256)
     crest = profile.h_max
     empty = method.solver.empty(crest * (1 - 1e-6))
-    assert method.height.max() < empty.separation
+    assert method.lattice.height.max() < empty.separation
     assert method.relaxation.touching(empty).tolist() == [0]
     assert method.relaxation.touching(method.solver.empty(crest * (1 + 1e-6))).size == 0

@@ -1,0 +1,69 @@
+"""Contact sets as contact states: effective edges, mean stress, energies; and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.grid.contact import Contact
+from solver.grid.edges import Indices, patch_ranges
+from solver.grid.lattice import Lattice
+from solver.method import ContactState
+
+EDGE_OFFSET = 0.190
+"""An edge lies this many dx inside the outer face of its contact node (numerical calibration of the
+edge stress against K/sqrt(2πr))."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Patches:
+    """What a state remembers: its contact set. Everything else follows from it."""
+
+    first: Indices
+    width: Indices
+
+
+def state_of(lattice: Lattice, contact: Contact) -> ContactState:
+    """Contact state of a solved contact; without a contact node that without contact."""
+    first, width = patch_ranges(contact.mask)
+    if first.size == 0:
+        return ContactState(contact.separation, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+    dx = lattice.dx
+    inset = EDGE_OFFSET - 0.5
+    left = (first + inset) * dx
+    right = (first + width - 1 - inset) * dx
+    wrapped = left < 0
+    period = lattice.elastic.period
+    left, right = left + wrapped * period, right + wrapped * period
+    order = np.argsort(left, kind="stable")
+    area = float(width.sum()) - 2 * EDGE_OFFSET * first.size
+    return ContactState(
+        separation=contact.separation,
+        edges=np.column_stack((left, right))[order],
+        mean_stress=float(contact.stress.mean()),
+        elastic_energy=contact.elastic_energy,
+        adhesion_energy=lattice.adhesion_energy(contact),
+        contact_fraction=max(0.0, area / lattice.n),
+        internal=_Patches(first, width),
+    )
+
+
+def mask_of(lattice: Lattice, state: ContactState) -> NDArray[np.bool_]:
+    """Contact set of a state that :func:`state_of` made.
+
+    Raises
+    ------
+    ValueError
+        If another method made it.
+    """
+    mask = np.zeros(lattice.n, dtype=bool)
+    if state.patches == 0:
+        return mask
+    patches = state.internal
+    if not isinstance(patches, _Patches):
+        raise ValueError("this state was not made by the method grid")
+    for a, w in zip(patches.first.tolist(), patches.width.tolist(), strict=True):
+        mask[np.arange(a, a + w) % lattice.n] = True
+    return mask
