@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.profile import Array
-from solver.sharp.descent import NARROW, RESTING, Law, descend, equilibrium
+from solver.sharp.balance import Law
+from solver.sharp.descent import NARROW, RESTING, descend
+from solver.sharp.equilibrium import equilibrium
 from solver.sharp.field import RULES, GapField, Solution
 from solver.sharp.source import StressSource
 

@@ -1,0 +1,104 @@
+"""Equilibrium of the edges by Newton's iteration, compiled, with its stability and its slope."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from solver.compiled import compiled
+from solver.profile import Array
+from solver.sharp.balance import (
+    Law,
+    at_least,
+    imbalance,
+    moved_gaps,
+    narrowest,
+    symmetric,
+    tangent_of,
+)
+from solver.sharp.coordinate import map_gaps
+from solver.sharp.field import (
+    Kinds,
+    PlainSolution,
+    Rules,
+    choose_kinds,
+    edge_openings,
+    plain,
+    solve,
+)
+from solver.sharp.linear import is_definite
+from solver.sharp.source import Panels
+
+_NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+
+
+@compiled
+def equilibrium(
+    gaps: Array,
+    separation: float,
+    reach: float,
+    least: Kinds,
+    patient: bool,
+    law: Law,
+    rules: Rules,
+    panels: Panels,
+) -> tuple[bool, Array, PlainSolution, Array, float, int]:
+    """Newton's iteration for C_e = C_c from nearby edges.
+
+    Returns whether a stable equilibrium was found with no edge moving further than ``reach``, its
+    gaps, its solution, the rate dn/d(q0 s) of every edge along the branch, dp/d(q0 s) along it, and
+    the number of corrections. ``least`` are the least kinds of the gaps, or empty. If not
+    ``patient``, edges out of equilibrium by no more than ``law.near`` are taken as they are.
+
+    Raises
+    ------
+    LinAlgError
+        If a tangent is singular.
+    """
+    at = gaps
+    kinds = at_least(choose_kinds(map_gaps(gaps), law.digits, rules.counts), least)
+    travelled = np.zeros(gaps.size)
+    last = np.inf
+    found = False
+    rate: Any = np.empty(0)
+    slope = np.nan
+    steps = 0
+    while True:
+        steps += 1
+        of = solve(at, separation, kinds, 2, rules, panels)
+        residual, drift = imbalance(of, law, panels)
+        tangent, by_edge = tangent_of(of, drift, rules)
+        step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float
+        size = np.abs(step).max()
+        # The field has steps of the size of its error, where panels or modes change: an iteration
+        # to and fro across one of them is at its end.
+        stalled = size <= law.coarse and size > 0.3 * last
+        if size <= law.settled or stalled:
+            _, matrix = symmetric(of, tangent, law.overlapping)
+            found = is_definite(matrix) or not patient
+            break
+        if not patient and size <= law.near:
+            found = True
+            break
+        travelled += step
+        # not written as > : a size that is no number is a failure, too
+        within = size <= reach and size <= 2 * last and np.abs(travelled).max() <= reach
+        if not within or steps == _NEWTON_LIMIT:
+            break
+        last = size
+        moved = moved_gaps(at, step)
+        if not narrowest(moved) > 0:
+            break
+        at = moved
+    if found:
+        by_separation = -2 * np.pi / of.unit_mean
+        unit = np.empty((of.f.shape[0], 1))
+        for i in range(of.f.shape[0]):
+            unit[i, 0] = -by_separation * of.solved[i, 1]
+        opening = edge_openings(unit, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+        rate = np.linalg.solve(tangent, -opening[:, 0])
+        slope = by_separation
+        for e in range(rate.shape[0]):
+            slope += by_edge[e] * (rate[e] if e % 2 == 0 else -rate[e])
+    return found, at, plain(of), rate, slope, steps
