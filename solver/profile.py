@@ -25,6 +25,27 @@ _MOST_WAVES = 100_000
 
 # Nodes per shortest wave of the sampling that brackets every crest before Newton's iteration.
 _CREST_SAMPLING = 16
+_CREST_SWEEPS = 60
+
+EQUAL_CRESTS = 1e-9
+"""Crests whose heights differ by less than this share of h_max are equal: they touch together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crests:
+    """Crests of a profile, in the order of x; arrays of shape (crests,).
+
+    Attributes
+    ----------
+    position, height : array
+        In m.
+    curvature : array
+        -h'' in 1/m, positive.
+    """
+
+    position: Array
+    height: Array
+    curvature: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,25 +189,46 @@ class Profile:
         """Root mean square height, in m."""
         return float(np.sqrt(self.m0))
 
+    def crests(self, within: float = EQUAL_CRESTS) -> Crests:
+        """Crests of the continuous function whose height is at least (1 - within) h_max.
+
+        Found between nodes by Newton's iteration, so they depend on no grid. A flat profile has
+        none.
+
+        Parameters
+        ----------
+        within : float
+            Share of h_max, not negative.
+        """
+        if self.is_flat:
+            return Crests(*np.empty((3, 0)))
+        n = _CREST_SAMPLING * 2 * self.highest_harmonic
+        dx = self.period / n
+        h = self.heights(n)
+        crest = (h >= np.roll(h, 1)) & (h > np.roll(h, -1))
+        # A crest between nodes rises at most about dx² |h''|/8 above its highest node.
+        spread = dx**2 * float(np.max(np.abs(self.curvatures(n))))
+        near = np.flatnonzero(crest & (h >= (1 - within) * h.max() - spread))
+        x: Array = np.asarray(near * dx, dtype=np.float64)
+        for sweep in range(_CREST_SWEEPS):
+            second = self.at(x, 2)
+            step = np.where(second < 0, self.at(x, 1) / np.where(second < 0, second, -1.0), 0.0)
+            x = x - np.clip(step, -dx, dx)
+            # a crest without curvature is approached by a third a step
+            if sweep >= 7 and np.abs(step).max() < 1e-9 * dx:
+                break
+        top = self.at(x)
+        high = top >= (1 - within) * top.max()
+        x, top = x[high], top[high]
+        return Crests(x, top, -self.at(x, 2))
+
     @cached_property
     def highest_point(self) -> tuple[float, float]:
         """(x, h) of the highest point of the continuous function, in m, independent of any grid."""
         if self.is_flat:
             return 0.0, 0.0
-        n = _CREST_SAMPLING * 2 * self.highest_harmonic
-        h = self.heights(n)
-        crest = (h >= np.roll(h, 1)) & (h >= np.roll(h, -1))
-        # A crest between nodes rises at most about dx² |h''|/8 above its highest node.
-        spread = (self.period / n) ** 2 * float(np.max(np.abs(self.curvatures(n))))
-        near = np.flatnonzero(crest & (h >= h.max() - spread))
-        x: Array = np.asarray(near * (self.period / n), dtype=np.float64)
-        for _ in range(8):
-            second = self.at(x, 2)
-            step = np.where(second < 0, self.at(x, 1) / np.where(second < 0, second, -1.0), 0.0)
-            x = x - np.clip(step, -self.period / n, self.period / n)
-        top = self.at(x)
-        best = int(np.argmax(top))
-        return float(x[best] % self.period), float(top[best])
+        crests = self.crests(0.0)
+        return float(crests.position[0] % self.period), float(crests.height[0])
 
     @property
     def h_max(self) -> float:

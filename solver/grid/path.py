@@ -7,14 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.grid.contact import Contact
-from solver.grid.edges import Indices, patch_ranges
-from solver.grid.lattice import Lattice
+from solver.grid.edges import patch_ranges
 from solver.grid.relax import Relaxation
 from solver.grid.states import state_of
 from solver.jumps import Jump, classify
 from solver.method import Branch, ContactState
 from solver.problem import Problem
-from solver.profile import Array, Profile
 
 
 @dataclass
@@ -62,7 +60,8 @@ class Steps:
         contact = self.solver.empty(separation)
         before = state_of(self.lattice, contact)
         self.states.append(before)
-        contact.mask[_crests(self.profile, self.lattice)] = True
+        crests = np.rint(self.profile.crests().position / self.lattice.dx).astype(np.intp)
+        contact.mask[crests % self.lattice.n] = True
         self.solver.solve(contact, self.relaxation.tight)
         if self.energy(contact) < 0:
             relaxed = self.relaxation.relax(contact)
@@ -166,20 +165,3 @@ class Steps:
                 patch_length=length,
             )
         )
-
-
-def _crests(profile: Profile, lattice: Lattice) -> Indices:
-    """Nodes nearest to the highest crests of the profile, those of equal height together."""
-    dx, n = lattice.dx, lattice.n
-    h = lattice.height
-    spread = dx**2 * float(np.abs(profile.curvatures(n)).max())
-    top = (h >= np.roll(h, 1)) & (h >= np.roll(h, -1)) & (h >= profile.h_max - spread)
-    nodes = np.flatnonzero(top)
-    x: Array = np.asarray(nodes * dx, dtype=np.float64)
-    for _ in range(6):
-        bend = profile.at(x, 2)
-        x = np.asarray(x - np.clip(profile.at(x, 1) / np.where(bend < 0, bend, -np.inf), -dx, dx))
-    crest = profile.at(x)
-    nodes = nodes[crest >= crest.max() - 1e-9 * profile.h_max]
-    # A crest halfway between two nodes has two highest nodes; one of them nucleates.
-    return np.asarray(nodes[np.diff(nodes, prepend=nodes[-1] - n) > 1])

@@ -29,6 +29,7 @@ from solver.grid.moves import (
     least_release,
     pair_moves,
 )
+from solver.profile import EQUAL_CRESTS
 
 _MAX_SWEEPS = 1_000_000
 _MAX_ACTIVE_SETS = 1000
@@ -65,7 +66,7 @@ class Relaxation:
         self.loose = loose
         self.tight = tight
         self.tight_residual = tight * solver.closing_gap
-        self.tie_height = 1e-9 * float(np.abs(lattice.height).max())
+        self.tie_height = EQUAL_CRESTS * float(np.abs(lattice.height).max())
         # the least fall of the energy that counts
         self.least_fall = 0.1 * least_release(lattice)
         self.sweeps = 0

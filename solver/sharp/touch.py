@@ -20,8 +20,6 @@ from solver.sharp.edges import EdgeMechanics, with_patches
 from solver.sharp.field import GapField
 from solver.sharp.opening import fine_opening
 
-_EQUAL = 1e-12  # maxima of the profile closer than this (of h_max) touch together
-
 
 @dataclass(frozen=True)
 class Touch:
@@ -41,20 +39,12 @@ class Nucleation:
     def first_touch(self) -> tuple[float, list[Touch]]:
         """Separation q0 s at which the first patches are put, and where.
 
-        That is at every maximum that equals h_max to rounding.
+        That is at every crest as high as the highest.
         """
         profile = self.problem.profile
-        n = 32 * profile.highest_harmonic
-        h = profile.heights(n)
-        dx = profile.period / n
-        crest = (h >= np.roll(h, 1)) & (h > np.roll(h, -1))
-        near = h >= h.max() - dx**2 * np.abs(profile.curvatures(n)).max()
-        x = np.asarray(np.flatnonzero(crest & near) * dx, dtype=np.float64)
-        for _ in range(8):
-            x = x - np.clip(profile.at(x, 1) / profile.at(x, 2), -dx, dx)
-        x = x[profile.at(x) >= profile.h_max * (1 - _EQUAL)]
-        curvature = -profile.at(x, 2) / profile.q0
-        theta = x * profile.q0
+        crests = profile.crests()
+        curvature = crests.curvature / profile.q0
+        theta = crests.position * profile.q0
         highest = [Touch(float(a), 0.0, float(c)) for a, c in zip(theta, curvature, strict=True)]
         overlap = max(self.clearance(t) for t in highest)
         return profile.h_max * profile.q0 - overlap, highest

@@ -153,3 +153,35 @@ def test_coefficients_must_describe_a_profile():
 def test_an_absurd_spectrum_is_refused_before_it_fills_the_memory():
     with pytest.raises(ValueError, match="at most 100000 waves"):
         spectral(0.8, period=1.0, n0=10, ratio=1_000_000, seed=1, h_rms=1e-6)
+
+
+def test_crests_are_the_maxima_of_the_continuous_function(rough):
+    crests = rough.crests(0.5)
+    fine = rough.heights(1 << 16)
+    peak = (fine > np.roll(fine, 1)) & (fine > np.roll(fine, -1)) & (fine >= 0.5 * rough.h_max)
+    x = np.flatnonzero(peak) * rough.period / (1 << 16)
+    assert crests.height.size > 5
+    np.testing.assert_allclose(crests.position, x, rtol=0, atol=rough.period / (1 << 16))
+    np.testing.assert_allclose(rough.at(crests.position, 1), 0, atol=1e-12)
+    np.testing.assert_allclose(crests.curvature, -rough.at(crests.position, 2), rtol=1e-12)
+    assert rough.crests().height.tolist() == [rough.h_max]
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.123456])
+def test_equal_crests_are_found_together(shift):
+    a = np.zeros(6, dtype=complex)
+    a[5] = 5e-7
+    equal = Profile(1e-3, a).shifted(shift * 1e-3)
+    assert equal.crests().position.size == 5
+    a[1] = 5e-7 * 1e-6  # crests differ by a millionth
+    unequal = Profile(1e-3, a)
+    assert unequal.crests().position.size == 1
+    assert unequal.crests(1e-5).position.size == 5
+
+
+def test_a_crest_without_curvature_is_found():
+    """Cos x - cos(2x)/4 is 3/4 - x⁴/8 near its crest."""
+    flat_top = Profile(1e-3, np.array([0, 0.5, -0.125]) * 1e-6)
+    x, height = flat_top.highest_point
+    assert height == pytest.approx(0.75e-6, rel=1e-12)
+    assert min(x, 1e-3 - x) < 1e-4 * 1e-3
