@@ -29,15 +29,18 @@ from typing import Any
 
 import numpy as np
 
-import ensemble.run.session
 from ensemble.campaign.file import load_campaign
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import Task
-from ensemble.results.schema import DONE, RESULT_COLUMNS, file_size, scales, shape_of
-from ensemble.results.store import Results, Writer
-from ensemble.run.dispatch import Master, Worker
+from ensemble.results.read import Results
+from ensemble.results.schema import DONE, file_size
+from ensemble.results.write import Writer
 from ensemble.run.ranks import world
-from ensemble.task.compute import TaskResult
+from ensemble.run.session import Engine, run_campaign
+from ensemble.task.compute import check_task, run_task
+from ensemble.task.dataset import KEPT, row_shape, sizes_of
+from ensemble.task.fields import field_plan
+from ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 ROOT = Path(__file__).resolve().parent.parent
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -66,66 +69,58 @@ class Times:
     rows: int = 0
 
 
-def measure(times: Times) -> None:
-    """Put clocks around the loops of the ranks and the writing of rows."""
+def measured(times: Times, pretend: float | None) -> Engine:
+    """Return an engine with clocks around the loops of the ranks and the writing of rows.
+
+    ``pretend``: seconds of tasks that do nothing, instead of loops.
+    """
 
     @contextmanager
-    def timed() -> Iterator[None]:
+    def watch() -> Iterator[None]:
         wall, cpu = time.perf_counter(), time.process_time()
         yield
         times.loop, times.cpu = time.perf_counter() - wall, time.process_time() - cpu
 
-    class TimedMaster(Master):
-        def run(self) -> str | None:
-            with timed():
-                return super().run()
-
-    class TimedWorker(Worker):
-        def run(self) -> None:
-            with timed():
-                super().run()
-
     class TimedWriter(Writer):
-        def write_result(self, row: int, result: TaskResult, rank: int = 0) -> None:
+        def write_result(self, row: int, result: Row, rank: int = 0) -> None:
             started = time.perf_counter()
             super().write_result(row, result, rank)
             times.writing += time.perf_counter() - started
             times.rows += 1
 
-    vars(ensemble.run.session).update(Master=TimedMaster, Worker=TimedWorker, Writer=TimedWriter)
+    compute = run_task if pretend is None else do_nothing(pretend)
+    check = check_task if pretend is None else lambda *_: None
+    return Engine(compute=compute, check=check, writer=TimedWriter, watch=watch)
 
 
-def do_nothing(seconds: float) -> Callable[..., TaskResult]:
+def do_nothing(seconds: float) -> Callable[..., Row]:
     """Return a task that takes ``seconds`` without work and has a row of zeros."""
 
     @cache
-    def row(campaign: Campaign) -> TaskResult:
-        sizes = {s.name: s.values.size for s in scales(campaign)}
-        values: dict[str, Any] = {}
-        for column in RESULT_COLUMNS:
-            zeros = np.zeros(shape_of(column, sizes)[1:], column.dtype)
-            values[column.name] = zeros if zeros.ndim else zeros.item()
-        return TaskResult(**{**values, "wall_time": seconds})
+    def row(campaign: Campaign, keep: bool) -> Row:
+        sizes = sizes_of(row_scales(campaign))
+        values: Row = {}
+        for dataset in RESULT_DATASETS:
+            zeros = np.zeros(row_shape(dataset, sizes), dataset.dtype)
+            if keep or dataset.dims[0] != KEPT:
+                values[dataset.name] = zeros if zeros.ndim else zeros.item()
+        return values | {"wall_time": seconds}
 
-    def run_task(campaign: Campaign, task: Task, progress: Any = None) -> TaskResult:
+    def compute(campaign: Campaign, task: Task, progress: Any = None) -> Row:
         if seconds:
             time.sleep(seconds)
-        return row(campaign)
+        return row(campaign, task.realisation < field_plan(campaign).realisations)
 
-    return run_task
+    return compute
 
 
 def rank(options: argparse.Namespace) -> None:
     """Be one rank of a measured run; leaves its times beside the results file."""
     started = time.perf_counter()
     times = Times()
-    measure(times)
-    if options.pretend is not None:
-        vars(ensemble.run.session).update(
-            run_task=do_nothing(options.pretend), check_task=lambda *_: None
-        )
     comm = world()
-    ensemble.run.session.run_campaign(load_campaign(options.campaign), options.out, comm)
+    engine = measured(times, options.pretend)
+    run_campaign(load_campaign(options.campaign), options.out, comm, engine=engine)
     times.run = time.perf_counter() - started
     place = 0 if comm is None else comm.rank
     Path(f"{options.out}.{place}.json").write_text(json.dumps(vars(times)))
@@ -151,12 +146,12 @@ def launch(
     )
     if process.returncode != 0:
         sys.exit(f"mpirun ended with {process.returncode}: {process.stderr or 'see above'}")
-    measured = []
+    cards = []
     for place in range(workers + 1):
         card = Path(f"{out}.{place}.json")
-        measured.append(Times(**json.loads(card.read_text())))
+        cards.append(Times(**json.loads(card.read_text())))
         card.unlink()
-    return measured[0], measured[1:]
+    return cards[0], cards[1:]
 
 
 def show(rows: list[tuple[str, str, str]]) -> None:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Amplitudes = Literal["deterministic", "rayleigh"]
 
 # Beyond this, memory is measured in gigabytes; loops have been tested to a tenth of it.
-_MOST_WAVES = 100_000
+MOST_WAVES = 100_000
 
 # Nodes per shortest wave of the sampling that brackets every crest before Newton's iteration.
 _CREST_SAMPLING = 16
@@ -314,8 +314,8 @@ def self_affine_profile(
         raise ValueError(f"amplitudes is {amplitudes!r}: it must be 'deterministic' or 'rayleigh'")
 
     top = int(n0) * int(ratio)
-    if top > _MOST_WAVES:
-        raise ValueError(f"n0 · ratio is {top}: at most {_MOST_WAVES} waves are supported")
+    if top > MOST_WAVES:
+        raise ValueError(f"n0 · ratio is {top}: at most {MOST_WAVES} waves are supported")
     phase_stream, size_stream = np.random.SeedSequence(int(seed)).spawn(2)
     phase = np.random.default_rng(phase_stream).uniform(-np.pi, np.pi, top)  # wave numbers 1 … top
     m = np.arange(n0, top + 1)

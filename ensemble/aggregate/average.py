@@ -23,8 +23,8 @@ from ensemble.aggregate.fields import FieldStatistics, aggregate_fields
 from ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
 from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.campaign.tables import Campaign
+from ensemble.results.read import Results
 from ensemble.results.schema import FAILED
-from ensemble.results.store import Results
 
 Array = NDArray[np.float64]
 

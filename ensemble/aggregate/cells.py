@@ -11,8 +11,8 @@ from ensemble.aggregate.curves import Curve
 from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.campaign.tables import Campaign
 from ensemble.errors import InputError
+from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED
-from ensemble.results.store import Results
 from solver.material import HalfSpace
 
 Array = NDArray[np.float64]

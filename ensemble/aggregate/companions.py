@@ -17,7 +17,7 @@ from ensemble.aggregate.cells import Cell, read_cells
 from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.campaign.rules import shown
 from ensemble.campaign.tables import Campaign
-from ensemble.results.store import Results
+from ensemble.results.read import Results
 
 Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.results.blocks import column_blocks
-from ensemble.results.store import Results
+from ensemble.results.read import Results
 
 Array = NDArray[np.float64]
 

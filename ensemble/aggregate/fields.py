@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ensemble.campaign.tables import Campaign
 from ensemble.results.blocks import row_blocks
-from ensemble.results.schema import KEPT
-from ensemble.results.store import Results
+from ensemble.results.read import Results
+from ensemble.task.dataset import KEPT
 from ensemble.task.fields import field_plan
 
 Array = NDArray[np.float64]

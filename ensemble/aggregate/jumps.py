@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.results.blocks import row_blocks
-from ensemble.results.store import Results
+from ensemble.results.read import Results
 from solver.jumps import JUMP_KINDS, SMALL_SCALE
 
 Array = NDArray[np.float64]

@@ -13,10 +13,10 @@ from typing import Any
 from ensemble.campaign.rules import shown
 from ensemble.campaign.tables import TABLES, Campaign, Table
 from ensemble.errors import InputError
+from solver.profile import MOST_WAVES
 
 # HDF5 keeps an attribute of at most 64 KiB, and the text is one.
 _LONGEST_TEXT = 60_000
-_MOST_HARMONICS = 1_000_000
 _MOST_TASKS = 10_000_000
 _LONGEST_AXIS = 1_000_000
 
@@ -104,10 +104,10 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [profile] gives {' and '.join(given) or 'none of h_rms, m2 and c0'}: "
             "exactly one of h_rms, m2 and c0 must be given"
         )
-    if profile.n0 * profile.ratio > _MOST_HARMONICS:
+    if profile.n0 * profile.ratio > MOST_WAVES:
         raise InputError(
             f"{source}: [profile] n0 · ratio is {profile.n0 * profile.ratio}: "
-            f"it must be at most {_MOST_HARMONICS} harmonics"
+            f"it must be at most {MOST_WAVES} harmonics"
         )
     if campaign.task_count > _MOST_TASKS:
         raise InputError(

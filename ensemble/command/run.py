@@ -14,9 +14,12 @@ import sys
 import time
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ensemble.errors import InputError, WriteError
+
+if TYPE_CHECKING:
+    from ensemble.run.session import Engine
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
 OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
@@ -63,8 +66,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def execute(args: argparse.Namespace) -> int:
-    """Run; returns the exit code, the same on every rank."""
+def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
+    """Run, with another engine than loops if one is given; returns the exit code of all ranks."""
     from ensemble.run.ranks import launched, world
 
     started = time.time()
@@ -74,7 +77,7 @@ def execute(args: argparse.Namespace) -> int:
         comm = world()
         if comm is not None:
             first = comm.rank == 0
-        return _run(args, comm, started)
+        return _run(args, comm, started, engine)
     except InputError as error:
         if first:
             print(f"adhesis run: {error}", file=sys.stderr, flush=True)
@@ -96,7 +99,7 @@ def _end_job(comm: Any, code: int) -> None:
         comm.Abort(code)
 
 
-def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
+def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
     from ensemble.campaign.file import load_campaign
     from ensemble.run.dispatch import Overdue
     from ensemble.run.interrupt import deadline, parse_duration
@@ -119,7 +122,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
         print(text, file=sys.stderr, flush=True)
 
     try:
-        summary = run_campaign(campaign, path, comm, options, say)
+        summary = run_campaign(campaign, path, comm, options, say, engine)
     except Overdue as error:
         # Nobody can be waited for; what was given up anyway is lost, the results file is sound.
         say(f"adhesis run: {error}; run the same command again to resume")
@@ -145,7 +148,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float) -> int:
 
 
 def _selection(args: argparse.Namespace) -> Any:
-    from ensemble.run.session import Selection
+    from ensemble.run.plan import Selection
 
     hurst = tuple(_number("--hurst", v) for v in args.hurst)
     gamma = tuple(_number("--work-of-adhesion", v) for v in args.work_of_adhesion)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED, PENDING
-from ensemble.results.store import Results
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60

@@ -37,7 +37,7 @@ class Counts:
     failed: int = 0
 
 
-class Progress:
+class ProgressLine:
     """Tells how far a run is, on rank 0.
 
     Parameters

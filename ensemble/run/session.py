@@ -1,69 +1,69 @@
-"""A campaign from its file to its results: joins campaign, results file and hand-out."""
+"""A campaign from its file to its results: joins plan, results file and hand-out."""
 
 from __future__ import annotations
 
-import math
-import os
 import time
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Protocol, Self
 
 import h5py
-import numpy as np
 
-from ensemble.campaign.compare import compare
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import Task
-from ensemble.errors import InputError
-from ensemble.results.schema import DONE, FAILED, PENDING
-from ensemble.results.store import Results, Writer, create
-from ensemble.run.dispatch import (
-    Check,
-    Compute,
-    Limits,
-    Master,
-    Outcome,
-    Worker,
-    work_alone,
-)
+from ensemble.results.write import Writer
+from ensemble.run.attempt import Compute, Outcome, StopCheck
+from ensemble.run.dispatch import Limits, Master, Worker, work_alone
 from ensemble.run.interrupt import StopSignals
 from ensemble.run.lock import RunLock
-from ensemble.run.progress import Counts, Progress
+from ensemble.run.plan import Group, Plan, Selection, prepare, prior
+from ensemble.run.progress import Counts, ProgressLine
 from ensemble.run.ranks import MpiChannel, together
 from ensemble.run.schedule import Schedule
-from ensemble.task.compute import TaskResult, check_task, run_task
-from ensemble.versions import versions
+from ensemble.task.compute import check_task, run_task
+from ensemble.task.row import Row
+from solver.loop import Progress
 
-Group = tuple[float, float]
+
+class RowWriter(Protocol):
+    """Where rows go; :class:`ensemble.results.write.Writer`."""
+
+    def write_result(self, row: int, result: Row, rank: int = 0) -> None:
+        """Write the row of a task that was computed."""
+
+    def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> None:
+        """Write the row of a task that failed."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: Any) -> None: ...
 
 
 @dataclass(frozen=True)
-class Selection:
-    """Rows to compute again.
+class Engine:
+    """What a run works with; tests and benchmarks pass in their own.
 
     Attributes
     ----------
-    status : {"failed", "all"}
-    hurst, work_of_adhesion, realisation : tuple
-        If not empty, only tasks with one of these values.
+    compute : callable
+        Computes a task of a campaign; it calls its third argument now and then.
+    check : callable
+        Raises InputError if a task cannot be set up.
+    writer : callable
+        Opens the results file for writing: path, and the communicator if all ranks write.
+    all_write : bool
+        Whether each rank writes the rows that it computed, as parallel HDF5 allows.
+    watch : callable
+        Makes what stands around a rank's loop of handing out or working.
     """
 
-    status: Literal["failed", "all"]
-    hurst: tuple[float, ...] = ()
-    work_of_adhesion: tuple[float, ...] = ()
-    realisation: tuple[int, ...] = ()
-
-    def takes(self, task: Task, status: int) -> bool:
-        """Whether a row is selected."""
-        return (
-            (status == FAILED or (self.status == "all" and status == DONE))
-            and (not self.hurst or task.hurst in self.hurst)
-            and (not self.work_of_adhesion or task.work_of_adhesion in self.work_of_adhesion)
-            and (not self.realisation or task.realisation in self.realisation)
-        )
+    compute: Callable[[Campaign, Task, Progress | None], Row] = run_task
+    check: Callable[[Campaign, Task], None] = check_task
+    writer: Callable[[Path, Any], RowWriter] = Writer
+    all_write: bool = bool(h5py.get_config().mpi)
+    watch: Callable[[], AbstractContextManager[object]] = nullcontext
 
 
 @dataclass(frozen=True)
@@ -112,23 +112,13 @@ class Summary:
         return self.total - self.done - self.failed
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """What there is to do, found by rank 0 and told to all."""
-
-    tasks: list[Task]
-    rows: list[int]
-    done: int
-    failed: int
-    times: dict[Group, tuple[float, int]] = field(default_factory=dict)
-
-
 def run_campaign(
     campaign: Campaign,
     path: Path | str,
     comm: Any = None,
     options: Options | None = None,
     say: Callable[[str], None] = lambda text: None,
+    engine: Engine | None = None,
 ) -> Summary:
     """Compute what is missing of a campaign in its results file.
 
@@ -143,6 +133,8 @@ def run_campaign(
     options : Options, optional
     say : callable
         Gets a line about what was found and what will be done, on rank 0.
+    engine : Engine, optional
+        Loops into a results file, if not given.
 
     Raises
     ------
@@ -152,7 +144,7 @@ def run_campaign(
     ensemble.run.dispatch.Overdue
         If workers did not stop in time when told to; the results file is sound.
     """
-    options = options or Options()
+    options, engine = options or Options(), engine or Engine()
     path = Path(path)
     if comm is not None and comm.size == 1:
         comm = None
@@ -160,21 +152,31 @@ def run_campaign(
     lock = RunLock(path)
     with ExitStack() as stack, StopSignals() as signals:
         stack.push(lock)
-        plan = together(comm, lambda: _prepare(campaign, path, lock, size, options, say))
-        own_rows = comm is not None and bool(h5py.get_config().mpi)
+        plan = together(
+            comm,
+            lambda: prepare(
+                *(campaign, path, lock, size),
+                redo=options.redo,
+                patience=options.patience,
+                say=say,
+                check=engine.check,
+            ),
+        )
+        own_rows = comm is not None and engine.all_write
         if own_rows and rank > 0:
             lock.join()
         writer = None
         if own_rows or rank == 0:
-            writer = stack.enter_context(Writer(path, comm if own_rows else None))
-        session = _Session(campaign, plan, writer, options, signals)
-        if comm is None:
-            stopped = session.alone()
-        elif rank == 0:
-            stopped = session.master(MpiChannel(comm), own_rows)
-        else:
-            session.worker(MpiChannel(comm), own_rows)
-            stopped = None
+            writer = stack.enter_context(engine.writer(path, comm if own_rows else None))
+        session = _Session(campaign, plan, writer, options, signals, engine)
+        with engine.watch():
+            if comm is None:
+                stopped = session.alone()
+            elif rank == 0:
+                stopped = session.master(MpiChannel(comm), own_rows)
+            else:
+                session.worker(MpiChannel(comm), own_rows)
+                stopped = None
     return together(comm, lambda: session.summary(stopped))
 
 
@@ -184,16 +186,18 @@ class _Session:
     def __init__(
         self,
         campaign: Campaign,
-        plan: _Plan,
-        writer: Writer | None,
+        plan: Plan,
+        writer: RowWriter | None,
         options: Options,
         signals: StopSignals,
+        engine: Engine,
     ) -> None:
         self._campaign = campaign
         self._plan = plan
         self._writer = writer
         self._options = options
         self._signals = signals
+        self._engine = engine
         self._started = time.monotonic()
         self._counts = Counts(total=len(plan.tasks), done_before=plan.done)
         self._groups: Mapping[int, Group] = {
@@ -207,7 +211,7 @@ class _Session:
 
     def alone(self) -> str | None:
         schedule = self._schedule()
-        progress = Progress(self._counts, lambda: self._estimate(schedule, 0, 1))
+        progress = ProgressLine(self._counts, lambda: self._estimate(schedule, 0, 1))
         try:
             return work_alone(
                 schedule,
@@ -229,7 +233,7 @@ class _Session:
                 self._write(outcome)
             self._count(outcome, progress)
 
-        progress = Progress(
+        progress = ProgressLine(
             self._counts, lambda: self._estimate(schedule, master.in_flight, workers)
         )
         master = Master(channel, schedule, self._groups, collect, self._limits, tick=progress.tick)
@@ -256,12 +260,12 @@ class _Session:
         )
 
     def _computing(self, tick: Callable[[], None]) -> Compute:
-        def compute(row: int, check: Check) -> TaskResult:
+        def compute(row: int, check: StopCheck) -> Row:
             def progress(*_: object) -> None:
                 check()
                 tick()
 
-            return run_task(self._campaign, self._plan.tasks[row], progress)
+            return self._engine.compute(self._campaign, self._plan.tasks[row], progress)
 
         return compute
 
@@ -273,7 +277,7 @@ class _Session:
             self._writer.write_failure(outcome.task, outcome.error, outcome.seconds, outcome.rank)
         return replace(outcome, result=None)
 
-    def _count(self, outcome: Outcome, progress: Progress) -> None:
+    def _count(self, outcome: Outcome, progress: ProgressLine) -> None:
         if outcome.error is None:
             self._counts.done += 1
         else:
@@ -283,7 +287,7 @@ class _Session:
 
     def _schedule(self) -> Schedule:
         groups = sorted({*self._groups.values(), *self._plan.times})
-        schedule = Schedule(self._plan.rows, self._groups, {g: _prior(*g) for g in groups})
+        schedule = Schedule(self._plan.rows, self._groups, {g: prior(*g) for g in groups})
         for group, (seconds, count) in self._plan.times.items():
             schedule.measured(group, seconds, count)
         return schedule
@@ -309,87 +313,3 @@ class _Session:
         if waiting is None or mean is None:
             return None
         return (waiting + 0.5 * mean * in_flight) / workers
-
-
-def _prior(hurst: float, work_of_adhesion: float) -> float:
-    """Relative time of a loop before any is measured: weak adhesion and roughness take more."""
-    return (2.0 - hurst) / math.sqrt(work_of_adhesion + 1e-3)
-
-
-def _prepare(
-    campaign: Campaign,
-    path: Path,
-    lock: RunLock,
-    size: int,
-    options: Options,
-    say: Callable[[str], None],
-) -> _Plan:
-    """Check everything, lock, make or extend the file, and find what is to be done; by rank 0."""
-    tasks = campaign.tasks()
-    for task in {t.hurst: t for t in reversed(tasks)}.values():
-        check_task(campaign, task)
-    _check_path(path)
-    lock.acquire(size, options.patience)
-    if not path.exists():
-        create(path, campaign, versions=versions())
-        say(f"{path}: {len(tasks)} tasks to do")
-        return _Plan(tasks, list(range(len(tasks))), 0, 0)
-    with Results(path) as old:
-        difference = compare(old.campaign, campaign)
-        if difference.other:
-            raise InputError(
-                f"{path} holds another campaign: {'; '.join(difference.other)} "
-                "(here: this campaign, there: the file)"
-            )
-        before = len(old)
-        if difference.grown:
-            create(path, campaign, versions=versions(), grown_from=old)
-    with Results(path) as results:
-        tasks, status = results.tasks(), results.status()
-    if options.redo is not None:
-        again = [
-            row
-            for row, (task, state) in enumerate(zip(tasks, status.tolist(), strict=True))
-            if options.redo.takes(task, state)
-        ]
-        with Writer(path) as writer:
-            writer.reset(again)
-        say(f"{path}: {len(again)} tasks will be computed again")
-    with Results(path) as results:
-        plan = _plan(results)
-    grown = f", {len(tasks) - before} of them new" if difference.grown else ""
-    say(
-        f"{path}: {plan.done} of {len(tasks)} tasks done, {len(plan.rows)} to do{grown}"
-        + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
-    )
-    return plan
-
-
-def _check_path(path: Path) -> None:
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError(f"{path} cannot be written: there is no folder {folder}")
-    if path.is_dir():
-        raise InputError(f"{path} is a directory, not a results file")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{path} cannot be written: the folder {folder} is read-only")
-    if path.exists() and not os.access(path, os.R_OK | os.W_OK):
-        raise InputError(f"{path} cannot be written: permission denied")
-
-
-def _plan(results: Results) -> _Plan:
-    status = results.status()
-    tasks = results.tasks()
-    times: dict[Group, tuple[float, int]] = {}
-    seconds = results.column("wall_time").tolist()
-    for row in np.flatnonzero(status == DONE).tolist():
-        group = (tasks[row].hurst, tasks[row].work_of_adhesion)
-        sum_before, count = times.get(group, (0.0, 0))
-        times[group] = (sum_before + seconds[row], count + 1)
-    return _Plan(
-        tasks=tasks,
-        rows=np.flatnonzero(status == PENDING).tolist(),
-        done=int(np.sum(status == DONE)),
-        failed=int(np.sum(status == FAILED)),
-        times=times,
-    )

@@ -13,7 +13,6 @@ gap, so that the density of the gap integrates to the fraction out of contact.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.campaign.tables import Campaign
+from ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
 from solver.method import Branch, ContactState, Fields, Method
 from solver.profile import Array
 
@@ -116,27 +116,60 @@ class FieldPlan:
         total = np.add.reduceat(power[: edges[-1]], edges[:-1])
         return np.asarray(total / np.diff(edges))
 
-    def columns(self) -> Mapping[str, tuple[int, ...]]:
-        """Shapes of the datasets that every task has a row of."""
-        states = (len(BRANCHES), self.penetration.size)
-        spectrum = (self.wave_number.size,)
-        return {
-            "psd_height": spectrum,
-            "height_density": (HEIGHT_EDGES.size - 1,),
-            "psd_displacement": (*states, *spectrum),
-            "gap_density": (*states, GAP_EDGES.size - 1),
-        }
 
-    def kept_columns(self) -> Mapping[str, tuple[int, ...]]:
-        """Shapes of the datasets that only the first realisations have a row of."""
-        nodes = (self.position.size,)
-        states = (len(BRANCHES), self.penetration.size)
-        return {
-            "field_height": nodes,
-            "field_displacement": (*states, *nodes),
-            "field_stress": (*states, *nodes),
-            "field_gap": (*states, *nodes),
-        }
+def field_scales(plan: FieldPlan) -> tuple[Scale, ...]:
+    """Return the dimensions of the datasets of fields."""
+    return (
+        Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin"),
+        Scale(
+            "gap_bin",
+            np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:]),
+            "1",
+            "gap/h_max, geometric middle of its bin",
+        ),
+        Scale(
+            "height_bin",
+            0.5 * (HEIGHT_EDGES[:-1] + HEIGHT_EDGES[1:]),
+            "1",
+            "height/h_rms, middle of its bin",
+        ),
+        Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
+        Scale("field_penetration", plan.penetration, "1", "penetration/h_max of a field"),
+        Scale("field_position", plan.position, "m", "position of a node of a kept field"),
+    )
+
+
+_STATES = ("field_branch", "field_penetration")
+
+
+def _reduced(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Dataset:
+    return Dataset(name, ("task", *dims), FIELD, unit, meaning)
+
+
+def _kept(name: str, dims: tuple[str, ...], unit: str, meaning: str) -> Dataset:
+    return Dataset(name, (KEPT, *dims, "field_position"), FIELD, unit, meaning)
+
+
+FIELD_DATASETS = (
+    _reduced("psd_height", ("wave_number",), "m3", "two-sided spectral density of the profile"),
+    _reduced("height_density", ("height_bin",), "1", "probability density of height/h_rms"),
+    _reduced(
+        "psd_displacement",
+        (*_STATES, "wave_number"),
+        "m3",
+        "two-sided spectral density of the deformed surface",
+    ),
+    _reduced(
+        "gap_density",
+        (*_STATES, "gap_bin"),
+        "1",
+        "probability density of gap/h_max, nodes in contact left out",
+    ),
+    _kept("field_height", (), "m", "height of the rigid profile"),
+    _kept("field_displacement", _STATES, "m", "displacement of the elastic surface"),
+    _kept("field_stress", _STATES, "Pa", "stress, compression positive"),
+    _kept("field_gap", _STATES, "m", "gap"),
+)
 
 
 def field_plan(campaign: Campaign) -> FieldPlan:
@@ -170,12 +203,15 @@ class FieldRecorder:
 
     def __init__(self, plan: FieldPlan, method: Method, keep: bool) -> None:
         self._plan, self._method, self._keep = plan, method, keep
-        self._row: dict[str, NDArray[np.float32]] = {
-            name: np.full(shape, np.nan, np.float32) for name, shape in plan.columns().items()
-        }
-        self._kept: dict[str, NDArray[np.float32]] = {
-            name: np.full(shape, np.nan, np.float32) for name, shape in plan.kept_columns().items()
-        }
+        sizes = sizes_of(field_scales(plan))
+        self._row, self._kept = (
+            {
+                dataset.name: np.full(row_shape(dataset, sizes), np.nan, np.float32)
+                for dataset in FIELD_DATASETS
+                if (dataset.dims[0] == KEPT) is kept
+            }
+            for kept in (False, True)
+        )
         profile = method.problem.profile
         height = profile.heights(plan.nodes)
         self._row["psd_height"][:] = plan.spectral_density(height)

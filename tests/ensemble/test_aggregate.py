@@ -17,7 +17,7 @@ from ensemble.aggregate.jumps import BIN_EDGES
 from ensemble.aggregate.statistics import estimates, interval, interval_method
 from ensemble.campaign.file import parse_campaign
 from ensemble.errors import InputError
-from ensemble.results.store import create
+from ensemble.results.layout import create
 from ensemble.task.fields import field_plan
 from solver.jumps import JUMP_KINDS
 from tests.support.synthetic_results import campaign, rows, write

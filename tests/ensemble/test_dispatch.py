@@ -11,17 +11,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from ensemble.run.dispatch import (
-    AHEAD,
-    MOST_AHEAD,
-    GivenUp,
-    Limits,
-    Master,
-    Outcome,
-    Overdue,
-    attempt,
-    work_alone,
-)
+from ensemble.run.attempt import GivenUp, Outcome, attempt
+from ensemble.run.dispatch import AHEAD, MOST_AHEAD, Limits, Master, Overdue, work_alone
 from ensemble.run.schedule import Schedule
 
 

@@ -7,16 +7,19 @@ import pytest
 
 from ensemble.campaign.file import parse_campaign
 from ensemble.errors import InputError
-from ensemble.results.schema import COLUMNS, KEPT
-from ensemble.results.store import Results, Writer, create
+from ensemble.results.layout import create
+from ensemble.results.read import Results
+from ensemble.results.schema import DATASETS
+from ensemble.results.write import Writer
 from ensemble.task.compute import make_problem, run_task
+from ensemble.task.dataset import KEPT
 from ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan, gap_shares
 from solver.loop import run_loop
 from solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.fake_run import fake_result
 
-KEPT_COLUMNS = [column.name for column in COLUMNS if column.dims[0] == KEPT]
+KEPT_COLUMNS = [column.name for column in DATASETS if column.dims[0] == KEPT]
 
 
 def campaign_with(output: str = "", **changes: str):
@@ -120,10 +123,10 @@ def test_shares_of_a_linear_gap_are_those_of_its_slope():
 def test_states_without_contact_are_not_a_number():
     campaign = campaign_with("field_penetrations = [-2.5, -0.15, 0.45]\n")
     result = run_task(campaign, campaign.tasks()[0])
-    missing = np.isnan(result.gap_density).all(axis=-1)
+    missing = np.isnan(result["gap_density"]).all(axis=-1)
     assert missing[0].tolist() == [True, True, False]  # loading starts at zero
     assert missing[1, 2] == False  # noqa: E712
-    assert missing[1, 0] == (result.pull_off_penetration > -2.55)
+    assert missing[1, 0] == (result["pull_off_penetration"] > -2.55)
 
 
 def test_only_first_realisations_keep_fields_through_reset_and_growth(tmp_path):
@@ -148,7 +151,7 @@ def test_only_first_realisations_keep_fields_through_reset_and_growth(tmp_path):
                 if task not in results or task == campaign.tasks()[1]:
                     assert np.isnan(values).all()
                 else:
-                    assert values.tobytes() == getattr(results[task], name).tobytes()
+                    assert values.tobytes() == results[task][name].tobytes()
 
 
 def test_a_campaign_can_keep_no_fields_at_all(tmp_path):
@@ -161,4 +164,4 @@ def test_a_campaign_can_keep_no_fields_at_all(tmp_path):
     with Results(path) as results:
         assert results.column("psd_displacement").shape[2] == 0
         assert results.column(KEPT).size == 0
-        np.testing.assert_array_equal(results.column("psd_height")[0], result.psd_height)
+        np.testing.assert_array_equal(results.column("psd_height")[0], result["psd_height"])

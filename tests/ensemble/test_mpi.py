@@ -14,8 +14,8 @@ import time
 
 import pytest
 
+from ensemble.results.read import Results
 from ensemble.results.schema import DONE
-from ensemble.results.store import Results
 from tests.support.campaign_support import (
     MPIRUN,
     ROOT,

@@ -14,7 +14,8 @@ import pytest
 
 from ensemble.campaign.file import load_campaign
 from ensemble.errors import InputError
-from ensemble.results.store import Writer, create
+from ensemble.results.layout import create
+from ensemble.results.write import Writer
 from ensemble.run.interrupt import deadline, parse_duration
 from tests.support.campaign_support import (
     TESTS,
@@ -245,7 +246,7 @@ def test_two_runs_on_one_file(tmp_path):
 def test_processes_of_another_mpi_are_told(tmp_path, monkeypatch):
     for place, words in (("0", 1), ("1", 0)):
         monkeypatch.setattr(
-            "campaign_support.environment",
+            "tests.support.campaign_support.environment",
             lambda place=place: {**environment(), "PMI_SIZE": "2", "PMI_RANK": place},
         )
         process = adhesis("run", write_campaign(tmp_path), cwd=tmp_path)
@@ -341,7 +342,7 @@ def test_the_deadline_of_the_batch_system():
 def test_the_fake_tasks_depend_on_nothing_but_the_task(tmp_path):
     campaign = load_campaign(write_campaign(tmp_path))
     one, two = (fake_result(campaign, campaign.tasks()[2]) for _ in range(2))
-    np.testing.assert_array_equal(one.loading_energy, two.loading_energy)
+    np.testing.assert_array_equal(one["loading_energy"], two["loading_energy"])
     assert TESTS.is_dir()
 
 

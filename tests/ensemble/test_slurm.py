@@ -21,8 +21,8 @@ from pathlib import Path
 
 import pytest
 
+from ensemble.results.read import Results
 from ensemble.results.schema import DONE
-from ensemble.results.store import Results
 from ensemble.run import launch
 from tests.support.campaign_support import CAMPAIGN
 

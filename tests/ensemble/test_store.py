@@ -19,9 +19,13 @@ from hypothesis import strategies as st
 from ensemble.campaign.file import parse_campaign
 from ensemble.errors import InputError
 from ensemble.results import schema
-from ensemble.results.schema import COLUMNS, DONE, FAILED, KEPT, PENDING, RESULT_COLUMNS, scales
-from ensemble.results.store import Results, Writer, create
+from ensemble.results.layout import create
+from ensemble.results.read import Results
+from ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
+from ensemble.results.write import Writer
 from ensemble.run.lock import RunLock
+from ensemble.task.dataset import KEPT
+from ensemble.task.row import RESULT_DATASETS
 from tests.support.campaign_support import ROOT, campaign_text
 from tests.support.fake_run import fake_result
 
@@ -47,7 +51,7 @@ def test_the_documentation_describes_every_dataset_and_no_other():
             names = re.findall(r"`([^`]+)`", cell)
             stem = names[0].split("_", 1)
             described |= {n.replace("unloading_…", f"unloading_{stem[-1]}") for n in names}
-    known = {c.name for c in COLUMNS} | {s.name for s in scales(parse_campaign(campaign_text()))}
+    known = {c.name for c in DATASETS} | {s.name for s in scales(parse_campaign(campaign_text()))}
     assert described == known
 
 
@@ -56,7 +60,7 @@ def test_a_new_file_is_whole_and_pending(path, campaign):
         assert results.campaign == campaign
         assert results.tasks() == campaign.tasks()
         assert not results.status().any()
-        for column in RESULT_COLUMNS:
+        for column in RESULT_DATASETS:
             values = results.column(column.name)
             empty = np.isnan(values) if values.dtype.kind == "f" else values == -1
             assert empty.all(), column.name
@@ -79,10 +83,10 @@ def test_rows_come_back_as_they_were_written(path, campaign):
         writer.write_failure(5, "ValueError: " + "γ" * 400, 2.5, rank=1)
     with Results(path) as results:
         assert results.status().tolist() == [0, 0, 0, DONE, 0, FAILED, 0, 0]
-        for column in RESULT_COLUMNS:
+        for column in RESULT_DATASETS:
             if column.dims[0] == KEPT:  # tests/ensemble/test_fields.py
                 continue
-            value = np.asarray(getattr(result, column.name), column.dtype)
+            value = np.asarray(result[column.name], column.dtype)
             assert results.column(column.name, slice(3, 4))[0].tobytes() == value.tobytes()
         assert results.column("rank")[3] == 7
         (error,) = results.errors(np.array([5]))
@@ -110,7 +114,7 @@ def test_growing_keeps_every_row_in_its_place(path, campaign):
     larger = parse_campaign(campaign_text(hurst="[0.75, 0.7, 0.8]", realisations="3"))
     with Results(path) as old:
         created = old.attributes["created"]
-        before = {c.name: old.column(c.name) for c in COLUMNS}
+        before = {c.name: old.column(c.name) for c in DATASETS}
         place = {task: row for row, task in enumerate(old.tasks())}
         create(path, larger, grown_from=old)
     with Results(path) as results:
@@ -121,7 +125,7 @@ def test_growing_keeps_every_row_in_its_place(path, campaign):
             assert results.status()[row] == (DONE if task in place else PENDING)
         rows = np.array([r for r, t in enumerate(results.tasks()) if t in place])
         olds = [place[t] for t in results.tasks() if t in place]
-        for column in COLUMNS:
+        for column in DATASETS:
             if column.dims[0] == KEPT:  # tests/ensemble/test_fields.py
                 continue
             assert (
@@ -175,7 +179,8 @@ def test_a_reader_sees_only_whole_rows_while_a_run_writes(path, campaign):
 KILLED_WRITER = """
 import sys, os
 sys.path[:0] = sys.argv[2:]
-from ensemble.results.store import Results, Writer
+from ensemble.results.read import Results
+from ensemble.results.write import Writer
 from tests.support.fake_run import fake_result
 with Results(sys.argv[1]) as results:
     campaign, tasks = results.campaign, results.tasks()
@@ -193,7 +198,7 @@ def test_rows_written_before_a_kill_are_whole(path, campaign):
         assert results.status().tolist() == [1] * 5 + [0] * 3
         for row, task in enumerate(results.tasks()[:5]):
             curve = results.column("unloading_energy", slice(row, row + 1))[0]
-            np.testing.assert_array_equal(curve, fake_result(campaign, task).unloading_energy)
+            np.testing.assert_array_equal(curve, fake_result(campaign, task)["unloading_energy"])
 
 
 # ---------------------------------------------------------------- files that are refused
@@ -275,7 +280,7 @@ def test_a_full_disk_leaves_nothing(campaign):
         "from campaign_support import campaign_text\n"
         "from ensemble.campaign.file import parse_campaign\n"
         "from ensemble.errors import InputError\n"
-        "from ensemble.results.store import create\n"
+        "from ensemble.results.layout import create\n"
         "try:\n    create(sys.argv[1], parse_campaign(campaign_text()))\n"
         "except InputError as error:\n    print(error)\n"
     )
@@ -313,6 +318,8 @@ HOLD_LOCK = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
 from ensemble.run.lock import RunLock
+from ensemble.task.dataset import KEPT
+from ensemble.task.row import RESULT_DATASETS
 RunLock(sys.argv[1]).acquire(4, 0.0)
 print("held", flush=True)
 time.sleep(60)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from ensemble.campaign.file import parse_campaign
-from ensemble.results.schema import RESULT_COLUMNS, scales, shape_of
-from ensemble.task.compute import TaskResult, make_problem, row_of, run_task
+from ensemble.task.compute import make_problem, run_task
+from ensemble.task.dataset import KEPT, row_shape, sizes_of
+from ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from solver.jumps import JUMP_KINDS, Jump
 from solver.loop import LoopResult
 from tests.support.campaign_support import campaign_text
@@ -36,9 +35,13 @@ def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
     )  # fmt: skip
 
 
+def loop_row(campaign, loop):
+    return row_of(loop, sizes_of(row_scales(campaign)))
+
+
 def test_curves_end_in_zeros_after_detachment():
     campaign = parse_campaign(campaign_text())
-    row = row_of(campaign, loop_of(campaign, steps_below_zero=2))
+    row = loop_row(campaign, loop_of(campaign, steps_below_zero=2))
     n = campaign.cycle.load_steps
     np.testing.assert_array_equal(row["loading_mean_stress"], np.arange(2, n + 3))
     unloading = row["unloading_mean_stress"]
@@ -50,18 +53,18 @@ def test_curves_end_in_zeros_after_detachment():
 
 def test_curves_are_cut_where_the_axis_ends():
     campaign = parse_campaign(campaign_text(unloading_until="-0.1"))
-    row = row_of(campaign, loop_of(campaign, steps_below_zero=9))
+    row = loop_row(campaign, loop_of(campaign, steps_below_zero=9))
     assert row["unloading_patches"].shape == campaign.unloading_penetration.shape
     assert row["unloading_patches"].all()
 
 
 def test_the_catalogue_keeps_the_largest_drops_in_the_order_of_the_path():
     campaign = parse_campaign(campaign_text())
-    few = row_of(campaign, loop_of(campaign, steps_below_zero=2, jumps=3))
+    few = loop_row(campaign, loop_of(campaign, steps_below_zero=2, jumps=3))
     assert few["jump_count"] == 3
     np.testing.assert_array_equal(few["jump_kind"], [0, 1, 2, -1, -1, -1, -1, -1])
     assert np.isnan(few["jump_energy_drop"][3:]).all()
-    many = row_of(campaign, loop_of(campaign, steps_below_zero=2, jumps=20))
+    many = loop_row(campaign, loop_of(campaign, steps_below_zero=2, jumps=20))
     assert many["jump_count"] == 20
     drops = np.arange(20.0) % 5
     kept = np.sort(np.argsort(-drops, kind="stable")[:8])
@@ -77,14 +80,17 @@ def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
     steps = []
     one = run_task(campaign, task, lambda *step: steps.append(step[:2]))
     two = run_task(campaign, task)
-    sizes = {s.name: s.values.size for s in scales(campaign)}
-    assert {f.name for f in dataclasses.fields(TaskResult)} == {c.name for c in RESULT_COLUMNS}
-    for column in RESULT_COLUMNS:
-        value = np.asarray(getattr(one, column.name), column.dtype)
-        assert value.shape == shape_of(column, sizes)[1:]
-        if column.name not in ("wall_time", "cpu_time"):
-            again = np.asarray(getattr(two, column.name), column.dtype)
-            assert value.tobytes() == again.tobytes(), column.name
+    sizes = sizes_of(row_scales(campaign))
+    assert one.keys() == {d.name for d in RESULT_DATASETS}  # realisation 0 keeps its fields
+    for dataset in RESULT_DATASETS:
+        value = np.asarray(one[dataset.name], dataset.dtype)
+        assert value.shape == row_shape(dataset, sizes)
+        if dataset.name not in ("wall_time", "cpu_time"):
+            again = np.asarray(two[dataset.name], dataset.dtype)
+            assert value.tobytes() == again.tobytes(), dataset.name
+    later = run_task(campaign, campaign.tasks()[1])
+    assert later.keys() == {d.name for d in RESULT_DATASETS if d.dims[0] != KEPT}
     assert len(steps) > campaign.cycle.load_steps
-    assert one.loss > 0
-    assert one.loss_small_scale + one.loss_large_scale == pytest.approx(one.loss_from_drops)
+    assert one["loss"] > 0
+    split = one["loss_small_scale"] + one["loss_large_scale"]
+    assert split == pytest.approx(one["loss_from_drops"])

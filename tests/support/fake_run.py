@@ -8,19 +8,22 @@ step, ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error tha
 
 from __future__ import annotations
 
+import argparse
 import resource
 import signal
 import sys
 import time
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 
-import ensemble.run.session
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import Task
-from ensemble.results.schema import RESULT_COLUMNS, scales, shape_of
-from ensemble.task.compute import TaskResult
+from ensemble.results.write import Writer
+from ensemble.run.session import Engine
+from ensemble.task.dataset import KEPT, row_shape, sizes_of
+from ensemble.task.fields import field_plan
+from ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 
 def matches(pattern: str | None, task: Task) -> bool:
@@ -30,40 +33,31 @@ def matches(pattern: str | None, task: Task) -> bool:
     return all(p == "*" or float(p) == v for p, v in zip(pattern.split(":"), values, strict=True))
 
 
-def fake_result(campaign: Campaign, task: Task) -> TaskResult:
+def fake_result(campaign: Campaign, task: Task) -> Row:
     """Numbers that depend on the task alone."""
     mixed = [task.seed, round(1e6 * task.hurst), round(1e6 * task.work_of_adhesion)]
     rng = np.random.default_rng(mixed)
-    sizes = {s.name: s.values.size for s in scales(campaign)}
+    sizes = sizes_of(row_scales(campaign))
+    keep = task.realisation < field_plan(campaign).realisations
     values = {}
-    for column in RESULT_COLUMNS:
-        shape = shape_of(column, sizes)[1:]
-        drawn = rng.random(shape) if column.dtype == "f8" else rng.integers(0, 2, shape)
-        values[column.name] = np.asarray(drawn, column.dtype)
-    return TaskResult(**{k: v if v.ndim else v.item() for k, v in values.items()})
+    for dataset in RESULT_DATASETS:
+        shape = row_shape(dataset, sizes)
+        drawn = rng.random(shape) if dataset.dtype == "f8" else rng.integers(0, 2, shape)
+        if keep or dataset.dims[0] != KEPT:
+            values[dataset.name] = np.asarray(drawn, dataset.dtype)
+    return {k: v if v.ndim else v.item() for k, v in values.items()}
 
 
-def fill_the_disk(size: int) -> None:
-    """Let every write beyond ``size`` fail once rows are written."""
-    write = ensemble.run.session._Session._write
-
-    def limited(session, outcome):
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
-        return write(session, outcome)
-
-    ensemble.run.session._Session._write = limited
-
-
-def install(behaviour: str) -> None:
+def fake_engine(behaviour: str) -> Engine:
     settings = dict(word.split("=", 1) for word in behaviour.split())
+    broken = False
 
     def run_task(campaign, task, progress=None):
+        nonlocal broken
         if "log" in settings:
             with open(settings["log"], "a") as log:
                 log.write(f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}\n")
-        if matches(settings.get("crash"), task):
-            ensemble.run.session.Writer.write_result = None
+        broken = broken or matches(settings.get("crash"), task)
         while matches(settings.get("hang"), task):
             time.sleep(0.01)
         for _ in range(campaign.cycle.load_steps):
@@ -74,16 +68,25 @@ def install(behaviour: str) -> None:
             raise FloatingPointError("the sum of γ diverged")
         return fake_result(campaign, task)
 
-    if "serial" in settings:
-        ensemble.run.session.h5py.get_config = lambda: SimpleNamespace(mpi=False)
-    if "full" in settings:
-        fill_the_disk(int(settings["full"]))
-    ensemble.run.session.run_task = run_task
-    ensemble.run.session.check_task = lambda campaign, task: None
+    class FakeWriter(Writer):
+        """A writer on a disk that fills, or with an error of its own."""
+
+        def write_result(self, row, result, rank=0):
+            if broken:
+                raise TypeError("not a task's error")
+            if "full" in settings:
+                signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+                limits = (int(settings["full"]), resource.RLIM_INFINITY)
+                resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+            super().write_result(row, result, rank)
+
+    engine = Engine(run_task, lambda campaign, task: None, FakeWriter)
+    return replace(engine, all_write=False) if "serial" in settings else engine
 
 
 if __name__ == "__main__":
-    from ensemble.command.main import main
+    from ensemble.command import run
 
-    install(sys.argv[1])
-    sys.exit(main(sys.argv[2:]))
+    parser = argparse.ArgumentParser(prog="adhesis run")
+    run.add_arguments(parser)
+    sys.exit(run.execute(parser.parse_args(sys.argv[3:]), fake_engine(sys.argv[1])))

@@ -9,8 +9,8 @@ import numpy as np
 
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tables import Campaign
+from ensemble.results.layout import create
 from ensemble.results.schema import kept_rows
-from ensemble.results.store import create
 from ensemble.task.fields import GAP_EDGES, field_plan
 from solver.jumps import JUMP_KINDS
 

@@ -1,0 +1,153 @@
+"""Laying a results file out: at full size, all or nothing, rows of an older file copied in.
+
+What makes it survive a kill at any moment:
+
+- The file is laid out at full size under another name, flushed to disk and renamed, so that it is
+  either there whole or not at all. A full disk is met here, before the first task.
+- Datasets are contiguous and allocated, so that writing a row changes no metadata.
+- A row is written before its status; a row whose status says "done" is whole.
+- A campaign that grew gets a new file with the old rows copied in, renamed over the old one.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ensemble.campaign.tables import Campaign
+from ensemble.errors import InputError
+from ensemble.results.read import Results, stretches
+from ensemble.results.schema import (
+    DATASETS,
+    FILE_TYPE,
+    FILE_VERSION,
+    TASK_DATASETS,
+    file_size,
+    scales,
+    shape_of,
+)
+from ensemble.results.write import reason
+from ensemble.task.dataset import KEPT, Dataset, sizes_of
+
+_COPY_BYTES = 16 * 2**20  # memory of a growing copy
+
+
+def create(
+    path: Path | str,
+    campaign: Campaign,
+    *,
+    versions: Mapping[str, str] | None = None,
+    grown_from: Results | None = None,
+) -> None:
+    """Lay out a results file at full size, by one process; all or nothing.
+
+    Parameters
+    ----------
+    path : path
+        Replaced if it exists.
+    campaign : Campaign
+    versions : mapping of str, optional
+        Root attributes with the versions of what computes (``mpi``, ``hdf5``, ``fftw``, …).
+    grown_from : Results, optional
+        An older file of a campaign that this one extends; its rows are copied.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written or the disk is too small.
+    """
+    path = Path(path)
+    part = path.with_name(f"{path.name}.part")
+    needed = file_size(campaign)
+    try:
+        free = shutil.disk_usage(path.parent).free
+        if needed > free:
+            raise InputError(
+                f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
+            )
+        with h5py.File(part, "w", locking=False, track_order=False) as file:
+            _lay_out(file, campaign)
+            _describe(file, campaign, versions or {}, grown_from)
+            if grown_from is not None:
+                _copy_rows(grown_from, file, campaign)
+        with part.open("rb") as handle:
+            os.fsync(handle.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {reason(error)}") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _lay_out(file: h5py.File, campaign: Campaign) -> None:
+    laid_out = scales(campaign)
+    sizes = sizes_of(laid_out)
+    for scale in laid_out:
+        dataset = file.create_dataset(scale.name, data=scale.values)
+        dataset.make_scale(scale.name)
+        dataset.attrs["units"] = scale.unit
+        dataset.attrs["long_name"] = scale.meaning
+    for column in DATASETS:
+        dataset = _allocate(file, column, shape_of(column, sizes))
+        dataset.attrs["units"] = column.unit
+        dataset.attrs["long_name"] = column.meaning
+        for name, value in column.attributes.items():
+            dataset.attrs[name] = value
+        for axis, dim in enumerate(column.dims):
+            dataset.dims[axis].attach_scale(file[dim])
+    tasks = campaign.tasks()
+    for column in TASK_DATASETS:
+        file[column.name][...] = [getattr(task, column.name) for task in tasks]
+
+
+def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.Dataset:
+    """Create a contiguous dataset, its place on disk taken and filled at once."""
+    dtype = np.dtype(column.dtype)
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_layout(h5py.h5d.CONTIGUOUS)
+    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
+    plist.set_fill_value(np.array(column.fill, dtype))
+    space = h5py.h5s.create_simple(shape)
+    kind = h5py.h5t.py_create(dtype)
+    return h5py.Dataset(h5py.h5d.create(file.id, column.name.encode(), kind, space, plist))
+
+
+def _describe(
+    file: h5py.File, campaign: Campaign, versions: Mapping[str, str], old: Results | None
+) -> None:
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    file.attrs["file_type"] = FILE_TYPE
+    file.attrs["file_version"] = np.array(FILE_VERSION, "i4")
+    file.attrs["Conventions"] = "CF-1.11"
+    file.attrs["title"] = "Loading-unloading hysteresis loops of rough adhesive contacts"
+    file.attrs["campaign"] = campaign.text
+    file.attrs["seed"] = campaign.sweep.seed
+    file.attrs["created"] = now if old is None else old.attributes.get("created", now)
+    file.attrs["laid_out"] = now
+    for name, text in versions.items():
+        file.attrs[name] = text
+
+
+def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
+    place = {task: row for row, task in enumerate(campaign.tasks())}
+    target = np.array([place[task] for task in old.tasks()])
+    # A task that kept its fields does so in the grown campaign: realisations are only added.
+    kept = np.searchsorted(file[KEPT][:], target[old.column(KEPT)])
+    for column in DATASETS:
+        if column in TASK_DATASETS:
+            continue
+        dataset = file[column.name]
+        targets = kept if column.dims[0] == KEPT else target
+        width = max(1, int(np.prod(dataset.shape[1:])) * dataset.dtype.itemsize)
+        for first in range(0, len(targets), max(1, _COPY_BYTES // width)):
+            block = old.column(column.name, slice(first, first + max(1, _COPY_BYTES // width)))
+            rows = targets[first : first + len(block)]
+            for i, (start, stop) in stretches(rows):
+                dataset[start:stop] = block[i : i + stop - start]

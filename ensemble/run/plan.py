@@ -1,0 +1,185 @@
+"""What there is to do: a campaign compared with its results file, which is made or extended."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ensemble.campaign.compare import compare
+from ensemble.campaign.tables import Campaign
+from ensemble.campaign.tasks import Task
+from ensemble.errors import InputError
+from ensemble.results.layout import create
+from ensemble.results.read import Results
+from ensemble.results.schema import DONE, FAILED, PENDING
+from ensemble.results.write import Writer
+from ensemble.run.lock import RunLock
+from ensemble.task.compute import check_task
+from ensemble.versions import versions
+
+Group = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Rows to compute again.
+
+    Attributes
+    ----------
+    status : {"failed", "all"}
+    hurst, work_of_adhesion, realisation : tuple
+        If not empty, only tasks with one of these values.
+    """
+
+    status: Literal["failed", "all"]
+    hurst: tuple[float, ...] = ()
+    work_of_adhesion: tuple[float, ...] = ()
+    realisation: tuple[int, ...] = ()
+
+    def takes(self, task: Task, status: int) -> bool:
+        """Whether a row is selected."""
+        return (
+            (status == FAILED or (self.status == "all" and status == DONE))
+            and (not self.hurst or task.hurst in self.hurst)
+            and (not self.work_of_adhesion or task.work_of_adhesion in self.work_of_adhesion)
+            and (not self.realisation or task.realisation in self.realisation)
+        )
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What there is to do, found by rank 0 and told to all.
+
+    Attributes
+    ----------
+    tasks : list of Task
+        Row by row.
+    rows : list of int
+        Rows to compute.
+    done, failed : int
+        Rows that are.
+    times : dict
+        Of each group of tasks that take about the same time: seconds measured, and tasks.
+    """
+
+    tasks: list[Task]
+    rows: list[int]
+    done: int
+    failed: int
+    times: dict[Group, tuple[float, int]] = field(default_factory=dict)
+
+
+def prepare(
+    campaign: Campaign,
+    path: Path,
+    lock: RunLock,
+    size: int,
+    *,
+    redo: Selection | None = None,
+    patience: float = 0.0,
+    say: Callable[[str], None] = lambda text: None,
+    check: Callable[[Campaign, Task], None] = check_task,
+) -> Plan:
+    """Check everything, lock, make or extend the file, and find what is to be done; by rank 0.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    path : path
+        The results file.
+    lock : RunLock
+        Taken here, after all that can be checked without it.
+    size : int
+        Ranks of the run.
+    redo : Selection, optional
+        Rows to compute again.
+    patience : float
+        How long to wait for another run to let go of the file, in s.
+    say : callable
+        Gets a line about what was found.
+    check : callable
+        Raises InputError if a task cannot be set up.
+
+    Raises
+    ------
+    InputError
+    """
+    tasks = campaign.tasks()
+    for task in {t.hurst: t for t in reversed(tasks)}.values():
+        check(campaign, task)
+    _check_path(path)
+    lock.acquire(size, patience)
+    if not path.exists():
+        create(path, campaign, versions=versions())
+        say(f"{path}: {len(tasks)} tasks to do")
+        return Plan(tasks, list(range(len(tasks))), 0, 0)
+    with Results(path) as old:
+        difference = compare(old.campaign, campaign)
+        if difference.other:
+            raise InputError(
+                f"{path} holds another campaign: {'; '.join(difference.other)} "
+                "(here: this campaign, there: the file)"
+            )
+        before = len(old)
+        if difference.grown:
+            create(path, campaign, versions=versions(), grown_from=old)
+    with Results(path) as results:
+        tasks, status = results.tasks(), results.status()
+    if redo is not None:
+        again = [
+            row
+            for row, (task, state) in enumerate(zip(tasks, status.tolist(), strict=True))
+            if redo.takes(task, state)
+        ]
+        with Writer(path) as writer:
+            writer.reset(again)
+        say(f"{path}: {len(again)} tasks will be computed again")
+    with Results(path) as results:
+        plan = _plan(results)
+    grown = f", {len(tasks) - before} of them new" if difference.grown else ""
+    say(
+        f"{path}: {plan.done} of {len(tasks)} tasks done, {len(plan.rows)} to do{grown}"
+        + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
+    )
+    return plan
+
+
+def _check_path(path: Path) -> None:
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(f"{path} cannot be written: there is no folder {folder}")
+    if path.is_dir():
+        raise InputError(f"{path} is a directory, not a results file")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{path} cannot be written: the folder {folder} is read-only")
+    if path.exists() and not os.access(path, os.R_OK | os.W_OK):
+        raise InputError(f"{path} cannot be written: permission denied")
+
+
+def _plan(results: Results) -> Plan:
+    status = results.status()
+    tasks = results.tasks()
+    times: dict[Group, tuple[float, int]] = {}
+    seconds = results.column("wall_time").tolist()
+    for row in np.flatnonzero(status == DONE).tolist():
+        group = (tasks[row].hurst, tasks[row].work_of_adhesion)
+        sum_before, count = times.get(group, (0.0, 0))
+        times[group] = (sum_before + seconds[row], count + 1)
+    return Plan(
+        tasks=tasks,
+        rows=np.flatnonzero(status == PENDING).tolist(),
+        done=int(np.sum(status == DONE)),
+        failed=int(np.sum(status == FAILED)),
+        times=times,
+    )
+
+
+def prior(hurst: float, work_of_adhesion: float) -> float:
+    """Relative time of a loop before any is measured: weak adhesion and roughness take more."""
+    return (2.0 - hurst) / math.sqrt(work_of_adhesion + 1e-3)

@@ -1,0 +1,80 @@
+"""What one dataset of the results is, and one dimension: names, units, meanings, shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FLOAT, COUNT, FLAG = "f8", "i4", "i1"
+FIELD = "f4"  # fields are looked at and averaged; seven digits are plenty
+
+# First dimension of the datasets that only the first realisations have rows of.
+KEPT = "field_task"
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """One dataset, a row for each task.
+
+    Attributes
+    ----------
+    name : str
+    dims : tuple of str
+        Names of the dimensions, ``task`` or ``field_task`` first.
+    dtype : str
+        numpy's name of the type.
+    unit : str
+        As UDUNITS reads it; "1" if there is none.
+    meaning : str
+        For the attribute ``long_name``.
+    attributes : mapping
+        Further attributes.
+    value : callable, optional
+        How its row is taken from a loop (:mod:`ensemble.task.row`); None where it is not.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    dtype: str
+    unit: str
+    meaning: str
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    value: Callable[..., Any] | None = field(default=None, compare=False)
+
+    @property
+    def fill(self) -> Any:
+        """Value of rows that hold no result: NaN, -1, 0 for the status, empty for texts."""
+        kind = np.dtype(self.dtype).kind
+        return {"f": np.nan, "i": -1, "u": 0, "S": b""}[kind]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """One dimension: its values, with unit and meaning."""
+
+    name: str
+    values: NDArray[Any]
+    unit: str
+    meaning: str
+
+
+def sizes_of(scales: Iterable[Scale]) -> dict[str, int]:
+    """Return the length of each dimension."""
+    return {scale.name: scale.values.size for scale in scales}
+
+
+def row_shape(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:
+    """Return the shape of one row of a dataset, from the lengths of the dimensions."""
+    return tuple(sizes[dim] for dim in dataset.dims[1:])
+
+
+def flags(names: tuple[str, ...], dtype: str) -> dict[str, Any]:
+    """Return the attributes that say what the numbers of a dataset stand for (CF conventions)."""
+    return {
+        "flag_values": np.arange(len(names), dtype=dtype),
+        "flag_meanings": " ".join(name.replace(" ", "_") for name in names),
+    }
