@@ -277,7 +277,7 @@ def test_a_full_disk_leaves_nothing(campaign):
         "import sys, resource, signal; sys.path[:0] = sys.argv[2:]\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
-        "from campaign_support import campaign_text\n"
+        "from tests.support.campaign_support import campaign_text\n"
         "from ensemble.campaign.file import parse_campaign\n"
         "from ensemble.errors import InputError\n"
         "from ensemble.results.layout import create\n"

@@ -23,7 +23,9 @@ FOLDERS = (*PACKAGES, "tests")
 # Who may import what weighs: to the door of MPI, of the file format, of compiled code, of figures.
 MPI = {"ensemble.run.ranks", "ensemble.doctor.probe"}
 HDF5 = {
-    "ensemble.results.store",
+    "ensemble.results.layout",
+    "ensemble.results.read",
+    "ensemble.results.write",
     "ensemble.run.session",
     "ensemble.doctor.probe",
     "ensemble.versions",
