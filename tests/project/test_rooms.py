@@ -133,7 +133,6 @@ def test_the_statements_are_seen_wherever_they_stand(tmp_path: Path) -> None:
     assert len(PATHS) > 80
 
 
-@pytest.mark.xfail(strict=True, reason="solver.grid: path knows method for its types' sake")
 def test_no_circle_of_modules() -> None:
     assert circle({m: {n for n in names if n in PATHS} for m, names in IMPORTS.items()}) == []
 
