@@ -22,6 +22,10 @@ from typing import Literal, get_args
 import numpy as np
 
 from solver.profile import Array
+from solver.state import ContactState
+
+Branch = Literal["loading", "unloading"]
+BRANCHES: tuple[Branch, ...] = get_args(Branch)
 
 JumpKind = Literal[
     "pull-off", "snap-in", "merging", "vanishing", "splitting", "spreading", "receding"
@@ -47,13 +51,18 @@ class Jump:
         Contact fractions.
     patch_length : float
         Length in m of the largest patch that the jump changed, on the side where it is larger.
+    raced : bool
+        Whether several edges ran and another rule of descent would have ended elsewhere.
+    at_stake : float
+        |U_other - U_after| per unit nominal area, in J/m²: how far the energy of the minimum that
+        the other rule reaches lies from that of this one; 0 unless ``raced``.
 
     References
     ----------
     docs/theory.md, "4. Jumps and mechanisms"
     """
 
-    branch: Literal["loading", "unloading"]
+    branch: Branch
     separation: float
     energy_drop: float
     kind: JumpKind
@@ -62,6 +71,47 @@ class Jump:
     contact_before: float
     contact_after: float
     patch_length: float
+    raced: bool = False
+    at_stake: float = 0.0
+
+    @classmethod
+    def between(
+        cls,
+        before: ContactState,
+        after: ContactState,
+        branch: Branch,
+        period: float,
+        *,
+        raced: bool = False,
+        at_stake: float = 0.0,
+    ) -> Jump:
+        """Jump from one contact state to another at the same separation.
+
+        A drop that rounding and the field's error have made negative counts as zero.
+
+        Parameters
+        ----------
+        before, after : ContactState
+        branch : {"loading", "unloading"}
+        period : float
+            λ in m.
+        raced, at_stake
+            As in the class.
+        """
+        kind, length = classify(before.edges, after.edges, period)
+        return cls(
+            branch=branch,
+            separation=before.separation,
+            energy_drop=max(0.0, (before.energy - after.energy) / period),
+            kind=kind,
+            patches_before=before.patches,
+            patches_after=after.patches,
+            contact_before=before.contact_fraction,
+            contact_after=after.contact_fraction,
+            patch_length=length,
+            raced=raced,
+            at_stake=at_stake,
+        )
 
     @property
     def small_scale(self) -> bool:
@@ -75,7 +125,7 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     Parameters
     ----------
     before, after : array, shape (patches, 2)
-        Edges in m, as in :class:`~solver.method.ContactState`.
+        Edges in m, as in :class:`~solver.state.ContactState`.
     period : float
         λ in m.
     """

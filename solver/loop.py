@@ -8,16 +8,15 @@ of the energy drops at the jumps are the same energy. They are computed independ
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from time import process_time
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.jumps import Jump
-from solver.method import Branch, ContactState, Method
+from solver.jumps import Branch, Jump
+from solver.method import ContactState, Method, MethodReport, Path, PathError
 from solver.problem import Problem
 from solver.profile import Array
 
@@ -62,9 +61,11 @@ class LoopResult:
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
     loss_from_drops : float
         Sum of the energy drops at the jumps, in J/m².
+    loss_error : float
+        Estimated numerical error of the loss, in J/m².
     seconds : float
         CPU time of this process, in s.
-    method : dict
+    method : MethodReport
         What the method says of itself (name, resolution, counters).
 
     References
@@ -88,8 +89,9 @@ class LoopResult:
     loss: float
     loss_dimensionless: float
     loss_from_drops: float
+    loss_error: float
     seconds: float
-    method: dict[str, Any]
+    method: MethodReport
 
     @property
     def energy(self) -> Array:
@@ -100,6 +102,16 @@ class LoopResult:
     def audit_residual(self) -> float:
         """(loop integral - sum of drops) / loop integral; 0 for a loop without loss."""
         return (self.loss - self.loss_from_drops) / self.loss if self.loss else 0.0
+
+    @property
+    def races(self) -> int:
+        """Number of jumps that another rule of descent would have ended elsewhere."""
+        return sum(jump.raced for jump in self.jumps)
+
+    @property
+    def energy_at_stake(self) -> float:
+        """Sum over the jumps of the energy that depends on the rule of descent, in J/m²."""
+        return float(sum(jump.at_stake for jump in self.jumps))
 
     @property
     def pull_off_penetration(self) -> float:
@@ -122,7 +134,7 @@ class LoopResult:
                 f"period {profile.period:.4g} m",
                 f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
                 f"Δ/h_max up to {self.max_penetration:.4g} in {self.load_steps} load steps, "
-                f"method {self.method['name']}",
+                f"method {self.method.name}",
                 f"loss       {self.loss:.5g} J/m² (W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²",
                 f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
@@ -170,6 +182,46 @@ def check_cycle(max_penetration: float, load_steps: int) -> None:
         raise ValueError(f"load_steps is {load_steps!r}: it must be a whole number of at least 1")
 
 
+@dataclass
+class Record:
+    """The states of a path in order, each with its branch, and the jumps between them.
+
+    Parameters
+    ----------
+    on_state : callable, optional
+        Called with every state of the path, in order.
+    """
+
+    on_state: Callable[[Branch, ContactState], None] | None = None
+    branches: list[Branch] = field(default_factory=list)
+    on_axis: list[bool] = field(default_factory=list)
+    states: list[ContactState] = field(default_factory=list)
+    jumps: list[Jump] = field(default_factory=list)
+    error: float = 0.0
+    """Sum of what the method knows of its own error, in J/m²; NaN if it does not know."""
+
+    def visit(self, branch: Branch, on_axis: bool, state: ContactState) -> None:
+        """Take down one state; ``on_axis`` if it ends a load step."""
+        self.branches.append(branch)
+        self.on_axis.append(on_axis)
+        self.states.append(state)
+        if self.on_state is not None:
+            self.on_state(branch, state)
+
+    def extend(self, branch: Branch, path: Path) -> ContactState:
+        """Take down one load step, whose last state lies on the axis; return that state."""
+        for passed in path.states[:-1]:
+            self.visit(branch, False, passed)
+        self.visit(branch, True, path.states[-1])
+        self.jumps += path.jumps
+        self.error += path.error
+        return path.states[-1]
+
+    def column(self, name: str) -> Array:
+        """One attribute of every state, shape (states,)."""
+        return np.array([getattr(state, name) for state in self.states])
+
+
 def run_loop(
     method: Method,
     *,
@@ -196,8 +248,9 @@ def run_loop(
     ------
     ValueError
         If the cycle cannot be run (:func:`check_cycle`).
-    RuntimeError
-        If the contact has not detached after a thousand loading strokes.
+    PathError
+        If the path cannot be followed, or the contact has not detached after a thousand loading
+        strokes.
 
     References
     ----------
@@ -205,61 +258,74 @@ def run_loop(
     """
     check_cycle(max_penetration, load_steps)
     started = process_time()
-    problem = method.problem
-    h_max = problem.profile.h_max
-    record: list[tuple[Branch, bool, ContactState]] = []
-    jumps: list[Jump] = []
-
-    def visit(branch: Branch, on_axis: bool, state: ContactState) -> None:
-        record.append((branch, on_axis, state))
-        if on_state is not None:
-            on_state(branch, state)
-
-    def step(branch: Branch, state: ContactState, index: int) -> ContactState:
-        target = problem.separation(max_penetration * index / load_steps)
-        path = method.follow(state, target)
-        for passed in path.states[:-1]:
-            visit(branch, False, passed)
-        visit(branch, True, path.states[-1])
-        jumps.extend(path.jumps)
+    record = Record(on_state)
+    for branch, index, state in _steps(method, record, max_penetration, load_steps):
         if progress is not None:
-            progress(branch, max_penetration * index / load_steps, path.states[-1])
-        return path.states[-1]
+            progress(branch, max_penetration * index / load_steps, state)
+    return _result(method, record, max_penetration, load_steps, started)
 
-    state = method.detached(h_max)
-    visit("loading", False, state)
+
+def _steps(
+    method: Method, record: Record, max_penetration: float, load_steps: int
+) -> Iterator[tuple[Branch, int, ContactState]]:
+    """Go through the load steps of a loop; gives branch, place on the axis and state of each."""
+    problem = method.problem
+
+    def separation(index: int) -> float:
+        return problem.separation(max_penetration * index / load_steps)
+
+    state = method.detached(problem.profile.h_max)
+    record.visit("loading", False, state)
     for i in range(load_steps + 1):
-        state = step("loading", state, i)
+        state = record.extend("loading", method.follow(state, separation(i)))
+        yield "loading", i, state
     # The turning point belongs to both branches: it starts the unloading curve.
-    visit("unloading", True, state)
+    record.visit("unloading", True, state)
     i = load_steps
     while state.patches:
         i -= 1
         if load_steps - i > _MAX_UNLOADING_STROKES * load_steps:
-            raise RuntimeError(f"still in contact at Δ/h_max = {max_penetration * i / load_steps}")
-        state = step("unloading", state, i)
+            raise PathError(f"still in contact at Δ/h_max = {max_penetration * i / load_steps}")
+        state = record.extend("unloading", method.follow(state, separation(i)))
+        yield "unloading", i, state
 
-    separation = np.array([s.separation for _, _, s in record])
-    mean_stress = np.array([s.mean_stress for _, _, s in record])
-    stiffness = np.array([s.stiffness for _, _, s in record])
-    loss = -integral(separation, mean_stress, stiffness)  # dΔ = -ds
+
+def _result(
+    method: Method, record: Record, max_penetration: float, load_steps: int, started: float
+) -> LoopResult:
+    """The loop of a record; ``started`` is the CPU time at which it was begun, in s."""
+    problem = method.problem
+    separation = record.column("separation")
+    mean_stress = record.column("mean_stress")
+    loss = -integral(separation, mean_stress, record.column("stiffness"))  # dΔ = -ds
+    drops = float(sum(jump.energy_drop for jump in record.jumps))
     return LoopResult(
         problem=problem,
         max_penetration=max_penetration,
         load_steps=load_steps,
-        branch=np.array([b for b, _, _ in record]),
-        load_step=np.array([on_axis for _, on_axis, _ in record]),
-        penetration=1.0 - separation / h_max,
+        branch=np.array(record.branches),
+        load_step=np.array(record.on_axis),
+        penetration=1.0 - separation / problem.profile.h_max,
         separation=separation,
         mean_stress=mean_stress,
-        contact_fraction=np.array([s.contact_fraction for _, _, s in record]),
-        patches=np.array([s.patches for _, _, s in record], dtype=np.int64),
-        elastic_energy=np.array([s.elastic_energy for _, _, s in record]),
-        adhesion_energy=np.array([s.adhesion_energy for _, _, s in record]),
-        jumps=tuple(jumps),
+        contact_fraction=record.column("contact_fraction"),
+        patches=record.column("patches").astype(np.int64),
+        elastic_energy=record.column("elastic_energy"),
+        adhesion_energy=record.column("adhesion_energy"),
+        jumps=tuple(record.jumps),
         loss=loss,
         loss_dimensionless=loss / problem.loss_scale,
-        loss_from_drops=float(sum(j.energy_drop for j in jumps)),
+        loss_from_drops=drops,
+        loss_error=_loss_error(loss, drops, record),
         seconds=process_time() - started,
-        method={"name": method.name, "chosen": method.chosen, **method.describe()},
+        method=method.report(),
     )
+
+
+def _loss_error(loss: float, drops: float, record: Record) -> float:
+    """Estimated error of the loss in J/m²: the method's own, or failing that a part in a hundred.
+
+    On top of either comes what the audit sees.
+    """
+    own = record.error if np.isfinite(record.error) else 0.01 * abs(drops)
+    return own + abs(loss - drops)

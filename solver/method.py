@@ -21,68 +21,38 @@ To add a method, subclass :class:`Method` and keep these promises:
     dense enough for the trapezoidal rule.
 5.  Same input, same bits: no clocks, no unseeded random numbers, no threads.
 6.  A state is immutable; ``follow`` may be called again from an older state (partial loops).
+7.  No state is handed out that the path does not visit, or in which surfaces overlap: no gap is
+    narrower than -1e-6 h_max, and below s = h_max no state is without contact. A path that cannot
+    be followed under these promises ends in a :class:`PathError`.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from solver.jumps import Jump
+from solver.jumps import BRANCHES, Branch, Jump
 from solver.problem import Problem
 from solver.profile import Array
+from solver.state import ContactState
 
-Branch = Literal["loading", "unloading"]
+__all__ = [
+    "BRANCHES",
+    "Branch",
+    "ContactState",
+    "Fields",
+    "Method",
+    "MethodReport",
+    "Path",
+    "PathError",
+]
 
 
-@dataclass(frozen=True, eq=False)
-class ContactState:
-    """An equilibrium contact state.
-
-    Attributes
-    ----------
-    separation : float
-        s in m; equals the mean gap.
-    edges : array, shape (patches, 2)
-        Left and right edge of each patch in m, 0 ≤ left < λ, left < right, sorted by the left
-        edge; the right edge of the last patch may exceed λ.
-    mean_stress : float
-        p̄ in Pa, compression positive.
-    elastic_energy, adhesion_energy : float
-        ½∫σ(h - s)dx and -γ∫sqrt(1 + h'²)dx over the contact of one period, in J/m.
-    contact_fraction : float
-        A/A0.
-    stiffness : float
-        dp̄/ds along the branch in Pa/m where the method knows it, else NaN.
-    internal : object
-        What the method needs to go on from here; nobody else reads it.
-
-    References
-    ----------
-    docs/theory.md, "1. The problem"
-    """
-
-    separation: float
-    edges: Array
-    mean_stress: float
-    elastic_energy: float
-    adhesion_energy: float
-    contact_fraction: float
-    stiffness: float = float("nan")
-    internal: Any = field(default=None, repr=False)
-
-    @property
-    def patches(self) -> int:
-        """Number of contact patches in one period."""
-        return len(self.edges)
-
-    @property
-    def energy(self) -> float:
-        """U = elastic + adhesion energy of one period, in J/m."""
-        return self.elastic_energy + self.adhesion_energy
+class PathError(RuntimeError):
+    """A path that cannot be followed: there is no state to hand out, and so no number."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +65,10 @@ class Path:
         In the order in which they were visited, the last one at the wanted separation.
     jumps : tuple of Jump
         In the same order.
+    error : float
+        Estimated error that the states and jumps bring into a loop's loss, in J/m² of nominal area:
+        energies, stresses, and the separations at which jumps were found. Without that of the
+        trapezoidal rule, which is the loop's own; NaN if the method does not know.
 
     References
     ----------
@@ -103,6 +77,7 @@ class Path:
 
     states: tuple[ContactState, ...]
     jumps: tuple[Jump, ...]
+    error: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +109,34 @@ class Fields:
     gap: Array
 
 
+@dataclass(frozen=True)
+class MethodReport:
+    """What a method says of itself; each method adds its settings and its counters.
+
+    Attributes
+    ----------
+    name : str
+    chosen : str or None
+        Why this method was chosen, where the user left the choice open.
+    """
+
+    name: str
+    chosen: str | None
+
+
 class Method(ABC):
     """Finds and follows contact states of one problem; see the module's numbered contract.
 
     Parameters
     ----------
     problem : Problem
+    chosen : str, optional
+        Why this method was chosen, where the user left the choice open.
+
+    Attributes
+    ----------
+    nodes : int or None
+        Nodes of the method's own grid, where it has one.
 
     References
     ----------
@@ -147,11 +144,11 @@ class Method(ABC):
     """
 
     name: ClassVar[str]
-    chosen: str | None = None
-    """Why this method was chosen, where the user left the choice open."""
+    nodes: int | None = None
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, *, chosen: str | None = None) -> None:
         self.problem = problem
+        self.chosen = chosen
 
     @abstractmethod
     def follow(self, state: ContactState, separation: float) -> Path:
@@ -168,8 +165,8 @@ class Method(ABC):
         """
 
     @abstractmethod
-    def describe(self) -> dict[str, Any]:
-        """Return what was chosen and what it cost: resolution, tolerances, counters."""
+    def report(self) -> MethodReport:
+        """What was chosen and what it cost so far: resolution, tolerances, counters."""
 
     def detached(self, separation: float) -> ContactState:
         """State without contact at ``separation`` (m)."""

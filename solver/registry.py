@@ -49,7 +49,9 @@ def make_method(
     if name == "grid":
         from solver.grid.method import GridMethod
 
-        method = GridMethod(problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy)
+        method = GridMethod(
+            problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen
+        )
     else:
         from solver.sharp.method import SharpMethod
 
@@ -57,8 +59,7 @@ def make_method(
             raise ValueError(
                 f"nodes_per_wave is {nodes_per_wave!r}: it belongs to the method 'grid' alone"
             )
-        method = SharpMethod(problem, accuracy=accuracy)
-    method.chosen = chosen
+        method = SharpMethod(problem, accuracy=accuracy, chosen=chosen)
     return method
 
 

@@ -14,19 +14,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ensemble.aggregate.cells import Cell, read_cells, stress_scale
 from ensemble.aggregate.companions import Companion, read_companion
-from ensemble.aggregate.curves import BRANCHES, average_curves
+from ensemble.aggregate.curves import average_curves
 from ensemble.aggregate.fields import FieldStatistics, aggregate_fields
 from ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
 from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.campaign.tables import Campaign
 from ensemble.results.read import Results
 from ensemble.results.schema import FAILED
-
-Array = NDArray[np.float64]
+from solver.method import BRANCHES
+from solver.profile import Array
 
 _MOST_FAILURES = 20
 

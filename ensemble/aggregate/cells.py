@@ -14,8 +14,8 @@ from ensemble.errors import InputError
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED
 from solver.material import HalfSpace
+from solver.profile import Array
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _PER_TASK = (

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from ensemble.results.blocks import column_blocks
 from ensemble.results.read import Results
+from solver.profile import Array
 
-Array = NDArray[np.float64]
-
-BRANCHES = ("loading", "unloading")
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 

@@ -17,8 +17,7 @@ from ensemble.results.blocks import row_blocks
 from ensemble.results.read import Results
 from ensemble.task.dataset import KEPT
 from ensemble.task.fields import field_plan
-
-Array = NDArray[np.float64]
+from solver.profile import Array
 
 
 @dataclass(frozen=True, eq=False)

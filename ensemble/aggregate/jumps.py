@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from ensemble.results.blocks import row_blocks
 from ensemble.results.read import Results
 from solver.jumps import JUMP_KINDS, SMALL_SCALE
-
-Array = NDArray[np.float64]
+from solver.profile import Array
 
 BINS_PER_DECADE = 2
 # Energy drops outside these bounds (J/m²) are counted in the outermost bin.

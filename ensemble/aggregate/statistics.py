@@ -16,10 +16,9 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
-Array = NDArray[np.float64]
+from solver.profile import Array
 
 CONFIDENCE = 0.95
 RESAMPLES = 9999

@@ -228,9 +228,8 @@ def _field_penetrations(args: argparse.Namespace) -> list[float]:
 def _field_nodes(args: argparse.Namespace, method: Method) -> int:
     """Nodes of the fields: those asked for, else the method's own, else 32 per shortest wave."""
     if args.field_nodes is None:
-        own = method.describe().get("nodes")
-        if own is not None:
-            return int(own)
+        if method.nodes is not None:
+            return method.nodes
         return 1 << (32 * method.problem.profile.highest_harmonic - 1).bit_length()
     with _bad_input():
         # A method refuses a number of nodes here, not after the loop has been computed.

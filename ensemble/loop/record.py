@@ -11,7 +11,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from ensemble.errors import InputError
 from solver.loop import LoopResult
-from solver.method import Branch, ContactState, Fields, Method
+from solver.method import BRANCHES, Branch, ContactState, Fields, Method
 
 _STATE_KEYS = ("branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy")
 _MORE_STATE_KEYS = ("separation", "elastic_energy", "adhesion_energy", "load_step")
@@ -34,7 +34,7 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
     profile = result.problem.profile
     columns = {key: getattr(result, key).tolist() for key in _STATE_KEYS + _MORE_STATE_KEYS}
     rows = zip(*columns.values(), strict=True)
-    details = dict(result.method)
+    details = asdict(result.method)
     return {
         "h_max": profile.h_max,
         "h_rms": profile.h_rms,
@@ -51,6 +51,9 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
         "loss_dimensionless": result.loss_dimensionless,
         "loss_from_drops": result.loss_from_drops,
         "audit_residual": result.audit_residual,
+        "loss_error": result.loss_error,
+        "races": result.races,
+        "energy_at_stake": result.energy_at_stake,
         "pull_off_stress": result.pull_off_stress,
         "pull_off_penetration": result.pull_off_penetration,
         "seconds": result.seconds,
@@ -67,6 +70,8 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
                 "contact_before": jump.contact_before,
                 "contact_after": jump.contact_after,
                 "patch_length": jump.patch_length,
+                "raced": jump.raced,
+                "at_stake": jump.at_stake,
             }
             for jump in result.jumps
         ],
@@ -96,7 +101,7 @@ def loop_summary(result: LoopResult) -> str:
             f"residual {result.audit_residual:.2e}",
             f"jumps       {kinds}",
             f"pull-off    mean tension {result.pull_off_stress:.6g} Pa",
-            f"method      {result.method['name']}, {result.seconds:.1f} s",
+            f"method      {result.method.name}, {result.seconds:.1f} s",
         )
     )
 
@@ -143,8 +148,7 @@ class FieldStates:
         ``displacement`` and ``gap`` (k, n), ``edges`` (k, most patches, 2) with NaN for none.
         """
         found: list[tuple[Branch, float, ContactState, Fields]] = []
-        branches: tuple[Branch, ...] = ("loading", "unloading")
-        for branch in branches:
+        for branch in BRANCHES:
             for wanted in self.penetrations:
                 state = self._state(branch, wanted)
                 found.append((branch, wanted, state, self.method.fields(state, n)))

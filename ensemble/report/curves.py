@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 
 from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.curves import BRANCHES, QUANTILES
+from ensemble.aggregate.curves import QUANTILES
+from solver.method import BRANCHES
 
 # curve -> (unit, what it is)
 QUANTITIES = {

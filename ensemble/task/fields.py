@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 
 from ensemble.campaign.tables import Campaign
 from ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
-from solver.method import Branch, ContactState, Fields, Method
+from solver.method import BRANCHES, Branch, ContactState, Fields, Method
 from solver.profile import Array
-
-BRANCHES: tuple[Branch, ...] = ("loading", "unloading")
 
 # Nodes per shortest wave: spectra then reach four times the highest wave number of the profile.
 NODES_PER_WAVE = 8

@@ -14,14 +14,12 @@ import numpy as np
 from ensemble.campaign.tables import Campaign
 from ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
 from ensemble.task.fields import FIELD_DATASETS, field_plan, field_scales
-from solver.jumps import JUMP_KINDS, Jump
+from solver.jumps import BRANCHES, JUMP_KINDS, Jump
 from solver.loop import LoopResult
 from solver.method import Branch
 
 Row = dict[str, Any]
 """Values of one task by dataset; those of kept fields only where the task keeps them."""
-
-BRANCHES: tuple[Branch, ...] = ("loading", "unloading")
 
 
 def _task(

@@ -6,7 +6,8 @@ What it does and how accurate it is: docs/methods.md.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from solver.grid.lattice import Lattice
 from solver.grid.path import Counters, Steps
 from solver.grid.relax import Relaxation
 from solver.grid.states import mask_of
-from solver.method import Branch, ContactState, Fields, Method, Path
+from solver.method import Branch, ContactState, Fields, Method, MethodReport, Path
 from solver.problem import Problem
 
 _FEWEST_NODES_PER_WAVE = 8
@@ -25,6 +26,34 @@ _FIRST_ORDER = 0.032
 _MOST_NODES_PER_WAVE = 256
 # A single wave at 32 nodes would be too coarse for its own edges.
 _FEWEST_NODES = 1024
+
+
+@dataclass(frozen=True)
+class GridReport(MethodReport):
+    """Resolution, tolerances and counters.
+
+    Attributes
+    ----------
+    nodes : int
+    nodes_per_wave : float
+        Per shortest wave.
+    accuracy : float
+    longest_step : int
+        Longest step of an edge in one sweep, in nodes.
+    sweeps, rejected_sweeps, flips, solves, cg_iterations, substeps, bisections : int
+    """
+
+    nodes: int
+    nodes_per_wave: float
+    accuracy: float
+    longest_step: int
+    sweeps: int
+    rejected_sweeps: int
+    flips: int
+    solves: int
+    cg_iterations: int
+    substeps: int
+    bisections: int
 
 
 class GridMethod(Method):
@@ -42,6 +71,8 @@ class GridMethod(Method):
         grid has the next power of two, and by default no fewer than 1024 nodes.
     nodes : int, optional
         Number of nodes, even, instead of the above.
+    chosen : str, optional
+        See :class:`~solver.method.Method`.
 
     Raises
     ------
@@ -59,13 +90,15 @@ class GridMethod(Method):
         accuracy: float = 1e-3,
         nodes_per_wave: int | None = None,
         nodes: int | None = None,
+        chosen: str | None = None,
     ) -> None:
-        super().__init__(problem)
+        super().__init__(problem, chosen=chosen)
         if not 0 < accuracy < 1:
             raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1")
         profile = problem.profile
         self.accuracy = accuracy
         self.n = n = _node_count(profile.highest_harmonic, accuracy, nodes_per_wave, nodes)
+        self.nodes = n
         self.lattice = lattice = Lattice.of(problem, n)
         closing = lattice.closing_gap(problem.work_of_adhesion, float(np.sqrt(profile.m4)))
         self.solver = ContactSolver(lattice.elastic, lattice.height, closing)
@@ -120,22 +153,23 @@ class GridMethod(Method):
             gap=gap[pick],
         )
 
-    def describe(self) -> dict[str, Any]:
+    def report(self) -> GridReport:
         """Resolution, tolerances and counters."""
-        profile = self.problem.profile
-        return {
-            "nodes": self.n,
-            "nodes_per_wave": self.n / max(profile.highest_harmonic, 1),
-            "accuracy": self.accuracy,
-            "longest_step": self.relaxation.longest_step,
-            "sweeps": self.relaxation.sweeps,
-            "rejected_sweeps": self.relaxation.rejected,
-            "flips": self.relaxation.flips,
-            "solves": self.solver.solves,
-            "cg_iterations": self.solver.iterations,
-            "substeps": self.count.substeps,
-            "bisections": self.count.bisections,
-        }
+        return GridReport(
+            name=self.name,
+            chosen=self.chosen,
+            nodes=self.n,
+            nodes_per_wave=self.n / max(self.problem.profile.highest_harmonic, 1),
+            accuracy=self.accuracy,
+            longest_step=self.relaxation.longest_step,
+            sweeps=self.relaxation.sweeps,
+            rejected_sweeps=self.relaxation.rejected,
+            flips=self.relaxation.flips,
+            solves=self.solver.solves,
+            cg_iterations=self.solver.iterations,
+            substeps=self.count.substeps,
+            bisections=self.count.bisections,
+        )
 
     # ------------------------------------------------------------------ states
 

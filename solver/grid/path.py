@@ -10,8 +10,8 @@ from solver.grid.contact import Contact
 from solver.grid.edges import patch_ranges
 from solver.grid.relax import Relaxation
 from solver.grid.states import state_of
-from solver.jumps import Jump, classify
-from solver.method import Branch, ContactState
+from solver.jumps import Branch, Jump
+from solver.method import ContactState
 from solver.problem import Problem
 
 
@@ -150,18 +150,5 @@ class Steps:
 
     def _jump(self, before: ContactState, after: Contact) -> None:
         state = state_of(self.lattice, after)
-        kind, length = classify(before.edges, state.edges, self.period)
         self.states.append(state)
-        self.jumps.append(
-            Jump(
-                branch=self.branch,
-                separation=after.separation,
-                energy_drop=max(0.0, (before.energy - state.energy) / self.period),
-                kind=kind,
-                patches_before=before.patches,
-                patches_after=state.patches,
-                contact_before=before.contact_fraction,
-                contact_after=state.contact_fraction,
-                patch_length=length,
-            )
-        )
+        self.jumps.append(Jump.between(before, state, self.branch, self.period))

@@ -8,15 +8,23 @@ state by state. For a single wave only; the adhesive area is measured along the 
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from solver.jumps import Jump, classify
-from solver.method import Branch, ContactState, Fields, Method, Path
+from solver.jumps import Branch, Jump
+from solver.method import ContactState, Fields, Method, MethodReport, Path
 from solver.problem import Problem
 from solver.profile import Array
 from solver.references.single_wave import SingleWave
+
+
+@dataclass(frozen=True)
+class ExactWaveReport(MethodReport):
+    """The one setting."""
+
+    states_per_step: int
 
 
 class ExactWave(Method):
@@ -64,7 +72,7 @@ class ExactWave(Method):
             state = self._state(self.wave.touch_half_width)
             states += [before, state]
             if state.patches:
-                jumps.append(self._jump(branch, before, state))
+                jumps.append(Jump.between(before, state, branch, self.wave.period))
             if separation == self.wave.amplitude:
                 return Path(tuple(states), tuple(jumps))
         a_from = state.internal or 0.0  # without adhesion contact grows from a point
@@ -76,7 +84,7 @@ class ExactWave(Method):
             after = self.detached(self.wave.loop.fold_separation)
             states += [before, after, self.detached(separation)]
             if before.patches:
-                jumps.append(self._jump(branch, before, after))
+                jumps.append(Jump.between(before, after, branch, self.wave.period))
         else:
             states.append(self._state(a_to, separation))
         return Path(tuple(states), tuple(jumps))
@@ -92,9 +100,9 @@ class ExactWave(Method):
         stress = self.wave.stress(x - self.crest, state.internal)
         return Fields(x, height, stress, gap + height - state.separation, gap)
 
-    def describe(self) -> dict[str, Any]:
+    def report(self) -> ExactWaveReport:
         """Return the only choice there is."""
-        return {"states_per_step": self.states_per_step}
+        return ExactWaveReport(self.name, self.chosen, self.states_per_step)
 
     def _contact_width(self, separation: float) -> float:
         """Half-width at ``separation``, or at the end of the branch beyond it."""
@@ -115,18 +123,4 @@ class ExactWave(Method):
             adhesion_energy=adhesion,
             contact_fraction=2 * a / self.wave.period,
             internal=a,
-        )
-
-    def _jump(self, branch: Branch, before: ContactState, after: ContactState) -> Jump:
-        kind, length = classify(before.edges, after.edges, self.wave.period)
-        return Jump(
-            branch=branch,
-            separation=before.separation,
-            energy_drop=(before.energy - after.energy) / self.wave.period,
-            kind=kind,
-            patches_before=before.patches,
-            patches_after=after.patches,
-            contact_before=before.contact_fraction,
-            contact_after=after.contact_fraction,
-            patch_length=length,
         )

@@ -21,6 +21,7 @@ from solver.sharp.equilibrium import equilibrium
 from solver.sharp.field import RULES, GapField, Solution
 from solver.sharp.source import StressSource
 
+CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min
 _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
 _DESCENT_LIMIT = 100_000
 _RESTS = 20  # how often a descent may come to rest without a minimum that Newton's iteration finds

@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.problem import Problem
 from solver.profile import Array
-from solver.sharp.edges import EdgeMechanics, with_patches
+from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
 from solver.sharp.field import GapField
 from solver.sharp.opening import fine_opening
 
@@ -73,6 +73,54 @@ class Nucleation:
         # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
         # the surface follows it, 10 to 20 here.
         return touch.opening + (4 * touch.curvature * width**2 if width <= narrowest else 0.0)
+
+    def ready(self, minima: list[Touch]) -> list[Touch]:
+        """Those of the minima at which it is time to put a patch."""
+        return [t for t in minima if self.clearance(t) <= 0]
+
+    def least(self, field: GapField) -> tuple[float, list[Touch]]:
+        """Least clearance of a field, and all its minima."""
+        minima = self.minima(field)
+        return min((self.clearance(t) for t in minima), default=np.inf), minima
+
+    def located(
+        self, trail: list[Point], resolution: float
+    ) -> tuple[tuple[Point, list[Touch]] | None, float]:
+        """First point of a trail at which surfaces touch inside a gap, with the touches.
+
+        Else None and the least clearance at the end of the trail. The trail starts at a point known
+        to be clear; between its points the touch is located to ``resolution`` (q0 s).
+        """
+        hit = trail[-1]
+        hit_value, hit_minima = self.least(hit.field)
+        if hit_value > 0:
+            return None, hit_value
+        clear_value = np.nan
+        # over the points of the trail, then within one step of it
+        low, high = 0, len(trail) - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            value, minima = self.least(trail[middle].field)
+            if value > 0:
+                low, clear_value = middle, value
+            else:
+                high, hit, hit_minima, hit_value = middle, trail[middle], minima, value
+        clear = trail[low].at
+        while clear - hit.at > resolution and hit_value < 0:
+            share = 0.5
+            if np.isfinite(clear_value):
+                # secant, kept off the ends
+                share = min(max(clear_value / (clear_value - hit_value), 0.02), 0.98)
+            aim = clear + (hit.at - clear) * share
+            point = self.edges.equilibrium(hit.predicted(aim), aim, CORRECTED * self.edges.wave)
+            if point is None:
+                break
+            value, minima = self.least(point.field)
+            if value > 0:
+                clear, clear_value = aim, value
+            else:
+                hit, hit_minima, hit_value = point, minima, value
+        return (hit, self.ready(hit_minima)), 0.0
 
     def seeded(self, gaps: Array, touches: list[Touch]) -> Array:
         """Edges with a seed at each touch."""

@@ -293,7 +293,7 @@ def audit(judge: Judge) -> Iterator[Row]:
         result.audit_residual,
         0.01,
         f"H = 0.8, harmonics 2 to 32; {len(result.jumps)} jumps: {', '.join(kinds)}",
-        f"{method.describe().get('nodes', '')} nodes" if judge.standard.nodes else "",
+        f"{method.nodes} nodes" if judge.standard.nodes else "",
     )
 
 

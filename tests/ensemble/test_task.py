@@ -11,6 +11,7 @@ from ensemble.task.dataset import KEPT, row_shape, sizes_of
 from ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from solver.jumps import JUMP_KINDS, Jump
 from solver.loop import LoopResult
+from solver.method import MethodReport
 from tests.support.campaign_support import campaign_text
 
 
@@ -31,7 +32,8 @@ def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
     )
     return LoopResult(
         problem, top, n, branch, on_axis, penetration, problem.separation(0) * (1 - penetration),
-        value, value, value.astype(int), value, value, catalogue, 2.0, 3.0, 1.5, 0.1, {},
+        value, value, value.astype(int), value, value, catalogue, 2.0, 3.0, 1.5, 0.02, 0.1,
+        MethodReport("grid", None),
     )  # fmt: skip
 
 

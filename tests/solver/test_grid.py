@@ -305,8 +305,8 @@ def test_number_of_nodes():
     assert GridMethod(problem, nodes_per_wave=32).n == 512
     assert GridMethod(problem, nodes=200).n == 200
     method = make_method("grid", problem, nodes_per_wave=100)
-    described = method.describe()
-    assert (described["nodes"], described["nodes_per_wave"]) == (2048, 2048 / 12)
+    report = method.report()
+    assert (report.nodes, report.nodes_per_wave) == (2048, 2048 / 12)
 
 
 @pytest.mark.parametrize(

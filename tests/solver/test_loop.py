@@ -10,7 +10,7 @@ import pytest
 from adhesis import ContactState, HalfSpace, Path, Problem, run_loop, single_wave
 from solver.jumps import classify
 from solver.loop import check_cycle
-from solver.method import Fields, Method
+from solver.method import Fields, Method, MethodReport, PathError
 from solver.profile import Profile
 from solver.references.exact_wave import ExactWave
 from solver.references.single_wave import SingleWave
@@ -175,8 +175,8 @@ class _Sticking(Method):
     def fields(self, state: ContactState, n: int) -> Fields:
         raise NotImplementedError
 
-    def describe(self) -> dict[str, object]:
-        return {}
+    def report(self) -> MethodReport:
+        return MethodReport(self.name, self.chosen)
 
 
 def test_audit_catches_energy_drops_that_are_not_the_loss():
@@ -186,7 +186,7 @@ def test_audit_catches_energy_drops_that_are_not_the_loss():
 
 
 def test_a_contact_that_never_detaches_is_reported():
-    with pytest.raises(RuntimeError, match="still in contact"):
+    with pytest.raises(PathError, match="still in contact"):
         run_loop(_Sticking(exact(0.2).problem), max_penetration=0.5, load_steps=2)
 
 

@@ -11,7 +11,6 @@ from matplotlib.patches import Patch
 
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.cells import Cell
-from ensemble.aggregate.curves import BRANCHES
 from ensemble.aggregate.fields import FieldStatistics, Shape
 from ensemble.report.figures.style import (
     LINE_OF_BRANCH,
@@ -31,6 +30,7 @@ from ensemble.report.figures.style import (
 )
 from ensemble.report.findings import typical_cell
 from ensemble.task.fields import field_plan
+from solver.method import BRANCHES
 
 # Gap/h_max below which the density is that of the interpolation beside edges alone.
 _LEAST_GAP = 1e-3

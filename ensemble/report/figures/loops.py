@@ -9,7 +9,6 @@ from matplotlib.lines import Line2D
 
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.cells import Cell
-from ensemble.aggregate.curves import BRANCHES
 from ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     MM,
@@ -26,6 +25,7 @@ from ensemble.report.figures.style import (
     shown_gammas,
     spread_out,
 )
+from solver.method import BRANCHES
 
 _MARKERS_PER_CURVE = 8
 

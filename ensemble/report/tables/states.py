@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.curves import BRANCHES
 from ensemble.aggregate.fields import fitted_slope
 from ensemble.report.tables.table import (
     KEY,
@@ -18,6 +17,7 @@ from ensemble.report.tables.table import (
     percent,
     plain,
 )
+from solver.method import BRANCHES
 
 
 def jumps(data: Aggregate) -> Table:
