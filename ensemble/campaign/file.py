@@ -125,5 +125,5 @@ def _check_together(source: str, campaign: Campaign) -> None:
     if length > _LONGEST_AXIS:
         raise InputError(
             f"{source}: [cycle] unloading_until is {cycle.unloading_until}: with these load steps "
-            f"the unloading curve has {length:.0f} values, and at most {_LONGEST_AXIS} are allowed"
+            f"the unloading curve has {length:.6g} values, and at most {_LONGEST_AXIS} are allowed"
         )

@@ -57,9 +57,8 @@ def test_text_names_the_writer_and_every_library() -> None:
         assert f"\n{word}" in text
 
 
+@pytest.mark.mpi
 def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path: Path) -> None:
-    if launch.launcher() is None:
-        pytest.skip("no mpirun here")
     # As the other MPI's mpirun does to these ranks: two processes, each alone in its world.
     wrong = tmp_path / "mpirun"
     wrong.write_text('#!/bin/sh\nshift 2\n"$@" & "$@"\nwait\n')

@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 import random
-import shutil
 import signal
 import subprocess
 import sys
@@ -30,7 +29,7 @@ from tests.support.campaign_support import (
     write_campaign,
 )
 
-pytestmark = pytest.mark.skipif(shutil.which(MPIRUN) is None, reason="there is no mpirun here")
+pytestmark = pytest.mark.mpi
 
 
 @pytest.fixture

@@ -25,28 +25,10 @@ from ensemble.results.read import Results
 from ensemble.results.schema import DONE
 from ensemble.run import launch
 from tests.support.campaign_support import CAMPAIGN
+from tests.support.launchers import PATH
 
 ROOT = Path(__file__).parent.parent.parent
-PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "scontrol", "squeue")
-# Daemons live where an ordinary user's PATH does not look.
-PATH = os.pathsep.join([os.environ.get("PATH", ""), "/usr/sbin", "/sbin"])
-
-
-def missing() -> list[str]:
-    return [name for name in PROGRAMS if shutil.which(name, path=PATH) is None]
-
-
-pytestmark = [
-    pytest.mark.skipif(
-        bool(missing()),
-        reason=f"no Slurm here: {', '.join(missing())} not found (Debian, as root: make test "
-        "installs slurmctld slurmd slurm-client munge)",
-    ),
-    pytest.mark.skipif(
-        not hasattr(os, "geteuid") or os.geteuid() != 0,
-        reason="only root can start a slurmd of its own",
-    ),
-]
+pytestmark = pytest.mark.slurm
 
 
 def wait_for(what: Callable[[], object], text: str, seconds: float) -> None:

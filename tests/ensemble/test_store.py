@@ -237,9 +237,7 @@ def test_a_file_that_lacks_a_dataset_is_refused(path):
     assert "damaged" in refused(path)
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damaged_bytes_are_read_or_refused_in_one_sentence(path, tmp_path, data):
     content = bytearray(path.read_bytes())
@@ -289,7 +287,7 @@ def test_a_full_disk_leaves_nothing(campaign):
     with tempfile.TemporaryDirectory() as folder:
         target = f"{folder}/r.h5"
         run = subprocess.run(
-            [sys.executable, "-c", code, target, str(ROOT), str(ROOT / "tests")],
+            [sys.executable, "-c", code, target, str(ROOT)],
             capture_output=True,
             text=True,
         )

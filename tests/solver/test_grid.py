@@ -18,8 +18,8 @@ from adhesis import (
 from solver.grid.method import GridMethod
 from solver.method import ContactState
 from solver.references.single_wave import SingleWave
+from tests.support.scenes import HALF_SPACE
 
-HALF_SPACE = HalfSpace(1e6, 0.5)
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5
 ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 

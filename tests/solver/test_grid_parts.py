@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from adhesis import Problem, self_affine_profile, single_wave
 from solver.grid.compliance import EdgeCompliance
 from solver.grid.contact import Contact, ContactSolver
 from solver.grid.edges import patch_ranges, survey
@@ -14,8 +14,8 @@ from solver.grid.kernels import dot, inverse_form
 from solver.grid.lattice import Lattice
 from solver.grid.method import GridMethod
 from solver.grid.pairs import pairs
+from tests.support.scenes import HALF_SPACE
 
-HALF_SPACE = HalfSpace(1e6, 0.5)
 PERIOD = 2e-3 * np.pi
 
 

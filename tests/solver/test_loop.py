@@ -14,9 +14,9 @@ from solver.method import Fields, Method, MethodReport, PathError
 from solver.profile import Profile
 from solver.references.exact_wave import ExactWave
 from solver.references.single_wave import SingleWave
+from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11
-HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)
 ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 
 

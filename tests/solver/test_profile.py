@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, Profile, profile_from_heights, single_wave
+from adhesis import Problem, Profile, profile_from_heights, single_wave
 from adhesis import self_affine_profile as spectral
+from tests.support.scenes import HALF_SPACE
 
 ROUGH = {"period": 2e-3 * np.pi, "n0": 10, "ratio": 20, "seed": 3}
 
@@ -147,7 +148,7 @@ def test_coefficients_must_describe_a_profile():
         with pytest.raises(ValueError, match=text):
             Profile(1e-3, np.array(bad, dtype=complex))
     with pytest.raises(ValueError, match="flat"):
-        Problem(Profile(1e-3, np.zeros(3, dtype=complex)), HalfSpace(1e6, 0.5), 0.01)
+        Problem(Profile(1e-3, np.zeros(3, dtype=complex)), HALF_SPACE, 0.01)
 
 
 def test_an_absurd_spectrum_is_refused_before_it_fills_the_memory():

@@ -17,8 +17,8 @@ from adhesis import (
 from solver.references.single_wave import SingleWave
 from solver.sharp.box import running_step
 from solver.sharp.method import SharpMethod
+from tests.support.scenes import HALF_SPACE
 
-SOLID = HalfSpace(young=1e6, poisson=0.5)
 PERIOD = 2e-3 * np.pi
 
 
@@ -26,7 +26,7 @@ def rough(seed=3, *, n0=5, ratio=8, hurst=0.8):
     return self_affine_profile(hurst, period=PERIOD, n0=n0, ratio=ratio, h_rms=1e-6, seed=seed)
 
 
-def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, solid=SOLID):
+def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, solid=HALF_SPACE):
     method = make_method("sharp", Problem(profile, solid, gamma), accuracy=accuracy)
     return run_loop(method, max_penetration=max_penetration, load_steps=load_steps)
 
@@ -38,7 +38,7 @@ def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, s
 def test_exact_losses_of_the_single_wave(alpha):
     """Sum of drops to 1e-8 of the exact loss, loop integral to 1e-5; A q0 = 6e-5 is flat."""
     amplitude, period = 1e-8, 1e-3
-    exact = SingleWave.with_alpha(alpha, amplitude, period, SOLID.modulus)
+    exact = SingleWave.with_alpha(alpha, amplitude, period, HALF_SPACE.modulus)
     result = loop(
         single_wave(amplitude, period),
         exact.work_of_adhesion,
@@ -58,7 +58,7 @@ def test_exact_losses_of_the_single_wave(alpha):
 
 def test_grid_converges_to_sharp():
     """The grid's losses approach the sharp one as nodes are added, and end within 0.2 %."""
-    problem = Problem(rough(), SOLID, 0.01)
+    problem = Problem(rough(), HALF_SPACE, 0.01)
     sharp = run_loop(make_method("sharp", problem), max_penetration=0.9, load_steps=20).loss
     errors = []
     for nodes in (16, 64):
@@ -103,7 +103,7 @@ def test_loss_depends_on_neither_tolerances_nor_the_descents_steps(seed, gamma):
     profile = rough(seed)
     losses = []
     for accuracy, share in ((1e-3, 1.0), (1e-5, 1.0), (1e-3, 0.4)):
-        method = SharpMethod(Problem(profile, SOLID, gamma), accuracy=accuracy)
+        method = SharpMethod(Problem(profile, HALF_SPACE, gamma), accuracy=accuracy)
         longest = share * method.edges.law.longest
         method.edges.law = method.edges.law._replace(longest=longest)
         losses.append(run_loop(method, max_penetration=0.9, load_steps=20).loss)
@@ -173,7 +173,7 @@ def test_no_loss_without_adhesion():
 def test_westergaard_without_adhesion():
     amplitude, period = 1e-6, 1e-3
     result = loop(single_wave(amplitude, period), 0.0, max_penetration=0.95, accuracy=1e-6)
-    p_star = np.pi * SOLID.modulus * amplitude / period
+    p_star = np.pi * HALF_SPACE.modulus * amplitude / period
     inside = (result.contact_fraction > 0.05) & (result.branch == "loading")
     y = np.sin(np.pi * result.contact_fraction[inside] / 2) ** 2
     assert inside.sum() > 5
@@ -214,10 +214,12 @@ def test_equal_maxima_touch_together():
     """Two equal crests in one period behave as one crest in half the period."""
     profile = twin_crests()
     gamma = 2e-5
-    method = make_method("sharp", Problem(profile, SOLID, gamma), accuracy=1e-6)
+    method = make_method("sharp", Problem(profile, HALF_SPACE, gamma), accuracy=1e-6)
     state = method.follow(method.detached(profile.h_max), profile.h_max).states[-1]
     assert state.patches == 2
-    half = make_method("sharp", Problem(single_wave(1e-6, PERIOD / 2), SOLID, gamma), accuracy=1e-6)
+    half = make_method(
+        "sharp", Problem(single_wave(1e-6, PERIOD / 2), HALF_SPACE, gamma), accuracy=1e-6
+    )
     once = half.follow(half.detached(1e-6), 1e-6).states[-1]
     assert state.mean_stress == pytest.approx(once.mean_stress, rel=1e-6)
     assert state.contact_fraction == pytest.approx(once.contact_fraction, rel=1e-6)
@@ -226,13 +228,13 @@ def test_equal_maxima_touch_together():
 def test_an_unstable_symmetric_state_is_left():
     """Strong adhesion: with equal gaps no minimum, one gap closes and the energy falls further."""
     profile, gamma = twin_crests(), 0.005
-    problem = Problem(profile, SOLID, gamma)
+    problem = Problem(profile, HALF_SPACE, gamma)
     state = (
         make_method("sharp", problem)
         .follow(make_method("sharp", problem).detached(profile.h_max), profile.h_max)
         .states[-1]
     )
-    half = make_method("sharp", Problem(single_wave(1e-6, PERIOD / 2), SOLID, gamma))
+    half = make_method("sharp", Problem(single_wave(1e-6, PERIOD / 2), HALF_SPACE, gamma))
     once = half.follow(half.detached(1e-6), 1e-6).states[-1]
     assert state.energy < 2 * once.energy
 
@@ -247,7 +249,7 @@ def test_extreme_hurst_exponents(hurst):
 def test_ten_thousand_waves():
     """Wave numbers 10 … 10,000: the field needs no more modes than before."""
     profile = rough(1, n0=10, ratio=1000)
-    method = make_method("sharp", Problem(profile, SOLID, 0.01))
+    method = make_method("sharp", Problem(profile, HALF_SPACE, 0.01))
     state = method.detached(profile.h_max)
     path = method.follow(state, profile.h_max)
     assert path.jumps[0].kind == "snap-in"
@@ -260,18 +262,18 @@ def test_hundreds_of_patches_appear_and_grow():
     coefficients = np.zeros(waves + 1, dtype=complex)
     coefficients[waves] = 5e-9
     profile = Profile(PERIOD, coefficients)
-    method = make_method("sharp", Problem(profile, SOLID, 0.0), accuracy=1e-2)
+    method = make_method("sharp", Problem(profile, HALF_SPACE, 0.0), accuracy=1e-2)
     state = method.follow(method.detached(profile.h_max), 0.9 * profile.h_max).states[-1]
     assert state.patches == waves
     y = np.sin(np.pi * state.contact_fraction / 2) ** 2
-    p_star = np.pi * SOLID.modulus * profile.h_max * waves / PERIOD
+    p_star = np.pi * HALF_SPACE.modulus * profile.h_max * waves / PERIOD
     assert state.mean_stress == pytest.approx(p_star * y, rel=1e-4)
 
 
 def test_partial_loops_close():
     """Unload half-way from a state that a jump reached, reload: the same state returns."""
     profile = rough(4)
-    method = make_method("sharp", Problem(profile, SOLID, 0.005))
+    method = make_method("sharp", Problem(profile, HALF_SPACE, 0.005))
     state = method.detached(profile.h_max)
     for penetration in np.linspace(0, 0.6, 13):
         state = method.follow(state, profile.h_max * (1 - penetration)).states[-1]
@@ -287,7 +289,7 @@ def test_partial_loops_close():
 
 def test_settling_at_the_same_separation_returns_the_state():
     profile = rough()
-    method = make_method("sharp", Problem(profile, SOLID, 0.01))
+    method = make_method("sharp", Problem(profile, HALF_SPACE, 0.01))
     state = method.follow(method.detached(profile.h_max), 0.5 * profile.h_max).states[-1]
     path = method.follow(state, state.separation)
     assert path.jumps == ()
@@ -297,7 +299,7 @@ def test_settling_at_the_same_separation_returns_the_state():
 def test_fields_obey_the_boundary_conditions():
     """Gap open and stress-free outside, closed inside; means are p̄ and s; energy is ½∫σ(h-s)."""
     profile = rough()
-    method = make_method("sharp", Problem(profile, SOLID, 0.01), accuracy=1e-5)
+    method = make_method("sharp", Problem(profile, HALF_SPACE, 0.01), accuracy=1e-5)
     state = method.follow(method.detached(profile.h_max), 0.4 * profile.h_max).states[-1]
     n = 1 << 15
     fields = method.fields(state, n)
@@ -313,7 +315,7 @@ def test_fields_obey_the_boundary_conditions():
 
 def test_flat_profile_is_refused():
     with pytest.raises(ValueError, match="flat"):
-        Problem(Profile(PERIOD, np.zeros(3, dtype=complex)), SOLID, 0.01)
+        Problem(Profile(PERIOD, np.zeros(3, dtype=complex)), HALF_SPACE, 0.01)
 
 
 @pytest.mark.parametrize(
@@ -340,7 +342,7 @@ def test_a_path_goes_on_from_a_minimum_next_to_a_fold():
     profile = self_affine_profile(
         0.8, period=PERIOD, n0=10, ratio=100, seed=765497817817844, c0=1e-13
     )
-    method = SharpMethod(Problem(profile, SOLID, 0.04), accuracy=1e-3)
+    method = SharpMethod(Problem(profile, HALF_SPACE, 0.04), accuracy=1e-3)
     state = method.detached(profile.h_max)
     for penetration in (0.0, 0.2, 0.4, 0.6):
         state = method.follow(state, (1 - penetration) * profile.h_max).states[-1]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
+from adhesis import Problem, self_affine_profile, single_wave
 from solver.grid.method import GridMethod
 from solver.sharp.coordinate import map_gaps, theta_at
 from solver.sharp.field import GapField
 from solver.sharp.opening import fine_opening, work_of_gaps
 from solver.sharp.source import StressSource, gap_moments
 from tests.support.explicit_solution import explicit_solution
+from tests.support.scenes import HALF_SPACE
 
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
 
@@ -176,7 +177,7 @@ def test_edge_opening_against_the_edge_stress_of_the_grid():
     outer face of that node (docs/methods.md).
     """
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=2, ratio=8, h_rms=1e-6, seed=2)
-    source, half_space = StressSource(profile), HalfSpace(1e6, 0.5)
+    source, half_space = StressSource(profile), HALF_SPACE
     separation = 0.3 * profile.h_max
     wanted = np.array([[0.4, 1.5], [2.0, 2.9], [3.3, 4.6], [5.1, 5.9]])  # patches
     errors = []

@@ -13,9 +13,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from tests.support.launchers import MPIRUN
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 TESTS = Path(__file__).resolve().parent
-MPIRUN = os.environ.get("MPIRUN") or "mpirun"
 
 # Time and place may differ between two runs of one campaign; nothing else may.
 TIMING = {"wall_time", "cpu_time", "rank"}

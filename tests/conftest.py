@@ -1,0 +1,39 @@
+"""What all tests share: markers and what they need, one answer from the property tests.
+
+Values and helpers that several tests use are in :mod:`tests.support`.
+"""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from hypothesis import settings
+
+from tests.support.launchers import without_mpi, without_slurm
+
+# The same examples every time. `make fuzz` draws anew, from a seed that it prints.
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("anew", deadline=None, database=None, print_blob=True)
+settings.load_profile(os.environ.get("ADHESIS_PROPERTIES", "same"))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add ``--slow``."""
+    parser.addoption("--slow", action="store_true", help="run what is marked slow, too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skip, with the reason, what cannot run here; a test that is slow says why."""
+    reasons = {"mpi": without_mpi(), "slurm": without_slurm()}
+    for item in items:
+        for name, reason in reasons.items():
+            if reason and item.get_closest_marker(name):
+                item.add_marker(pytest.mark.skip(reason=reason))
+        slow = item.get_closest_marker("slow")
+        if slow is None:
+            continue
+        if not slow.kwargs.get("reason"):
+            raise pytest.UsageError(f"{item.nodeid} is slow, but gives no reason")
+        if not config.getoption("--slow"):
+            item.add_marker(pytest.mark.skip(reason=f"slow ({slow.kwargs['reason']}): --slow"))

@@ -1,0 +1,7 @@
+"""Solids and profiles that several tests use."""
+
+from __future__ import annotations
+
+from adhesis import HalfSpace
+
+HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)
