@@ -109,6 +109,19 @@ RULES = _rules(
 )
 
 
+class Hold(NamedTuple):
+    """What is prescribed, d = share·q0 s - give·p (:mod:`solver.control` in the units used here).
+
+    (1, 0) is a fixed separation, (1, E* q0/(2k)) a stiffness k, (0, 1) a load.
+    """
+
+    share: float
+    give: float
+
+
+FIXED = Hold(1.0, 0.0)
+
+
 class Solution(NamedTuple):
     """Solution of (1), as the compiled code hands it on; N nodes of all gaps together.
 
@@ -128,10 +141,12 @@ class Solution(NamedTuple):
         Loads S~, X and, if asked for, S~', and (B + G)⁻¹ of them.
     beyond : array, shape (L, 2, 1 or 2)
         What the modes of S and S' above M add at the ends.
-    unit_mean : float
-        Xᵀ (B + G)⁻¹ X.
-    pressure : float
-        p = 2p̄/E*.
+    share : float
+        Of the :class:`Hold`.
+    unit_mean, resistance : float
+        Xᵀ (B + G)⁻¹ X, and share·that + 2π give: -2π/resistance is ∂p/∂d at fixed edges.
+    separation, pressure : float
+        q0 s and p = 2p̄/E*.
     f : array, shape (N,)
         The openings over sqrt(1-η²).
     opening : array, shape (2L,)
@@ -149,7 +164,10 @@ class Solution(NamedTuple):
     rhs: Array
     solved: Array
     beyond: Array
+    share: float
     unit_mean: float
+    resistance: float
+    separation: float
     pressure: float
     f: Array
     opening: Array
@@ -157,7 +175,7 @@ class Solution(NamedTuple):
 
 PlainSolution = tuple[
     Array, Kinds, Kinds, Array, Array, Array, Array, Array, Array, Array, Array, float, float,
-    Array, Array,
+    float, float, float, Array, Array,
 ]  # fmt: skip
 """The fields of :class:`Solution` in order."""
 
@@ -171,10 +189,11 @@ class GapField:
     gaps : array, shape (L, 2)
         Left and right end of each gap in θ: increasing, the last right end below
         gaps[0, 0] + 2π.
-    separation : float
-        q0 s.
+    prescribed : float
+        d of :class:`Hold`: q0 s at fixed separation.
     tolerance : float
         Wanted relative accuracy of the interaction between gaps.
+    hold : Hold
     solution : Solution, optional
         The solution for these gaps, if it is known already.
 
@@ -195,36 +214,38 @@ class GapField:
         self,
         source: StressSource,
         gaps: Array,
-        separation: float,
+        prescribed: float,
         tolerance: float,
+        hold: Hold = FIXED,
         solution: Solution | None = None,
     ) -> None:
-        self.source, self.gaps, self.separation = source, gaps, separation
+        self.source, self.gaps, self.prescribed, self.hold = source, gaps, prescribed, hold
         if solution is None:
             kinds = choose_kinds(map_gaps(gaps), -np.log(tolerance), RULES.counts)
-            solution = Solution(*solve_plain(gaps, separation, kinds, 2, RULES, source.panels))
+            solution = Solution(*solve_plain(gaps, prescribed, hold, kinds, 2, RULES, source.panels))
         if np.isnan(solution.pressure):
             raise FloatingPointError("the matrix of the gaps is not positive definite")
         self.solution = solution
         self.pressure = float(solution.pressure)
+        self.separation = float(solution.separation)
         self.opening = solution.opening.reshape(-1, 2)
 
     @property
-    def pressure_by_separation(self) -> float:
-        """∂p/∂(q0 s) at fixed edges; negative."""
-        return -2 * np.pi / float(self.solution.unit_mean)
+    def pressure_by_prescribed(self) -> float:
+        """∂p/∂d at fixed edges; negative."""
+        return -2 * np.pi / float(self.solution.resistance)
 
     @cached_property
-    def opening_by_separation(self) -> Array:
-        """∂C/∂(q0 s) at fixed edges, shape (L, 2)."""
+    def opening_by_prescribed(self) -> Array:
+        """∂C/∂d at fixed edges, shape (L, 2)."""
         of = self.solution
-        unit = np.ascontiguousarray(-self.pressure_by_separation * of.solved[:, 1:2])
+        unit = np.ascontiguousarray(-self.pressure_by_prescribed * of.solved[:, 1:2])
         out: Array = edge_openings(unit, of.slope, of.kinds, of.offset, RULES.start, RULES.ends)
         return out[:, 0].reshape(-1, 2)
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array]:
-        """∂C_e/∂θ_f, shape (2L, 2L), and ∂p/∂θ_f, shape (2L,), at fixed separation.
+        """∂C_e/∂θ_f, shape (2L, 2L), and ∂Y/∂θ_f, shape (2L,), at fixed d (Y is p, or q0 s).
 
         Edges in the order of ``gaps.ravel()``; θ_f grows to the right.
         """
@@ -245,7 +266,13 @@ def choose_kinds(table: Array, digits: float, counts: Kinds) -> Kinds:
 
 @compiled
 def solve(
-    gaps: Array, separation: float, kinds: Kinds, fields: int, rules: Rules, panels: Panels
+    gaps: Array,
+    prescribed: float,
+    hold: Hold,
+    kinds: Kinds,
+    fields: int,
+    rules: Rules,
+    panels: Panels,
 ) -> Solution:
     """Solve (1) with the source S (``fields`` 1), or S and S' (2) for :func:`derivatives`.
 
@@ -264,6 +291,8 @@ def solve(
     opening = np.full(2 * table.shape[0], np.nan)
     pressure = np.nan
     unit_mean = np.nan
+    resistance = np.nan
+    separation = np.nan
     f = np.empty(theta.shape[0])
     if definite:
         solve_factored(factor, solved)
@@ -272,7 +301,11 @@ def solve(
         for i in range(theta.shape[0]):
             load_mean += weight[i] * solved[i, 0]
             unit_mean += weight[i] * solved[i, 1]
-        pressure = -(2 * np.pi * separation + load_mean) / unit_mean
+        resistance = hold.share * unit_mean + 2 * np.pi * hold.give
+        pressure = -(2 * np.pi * prescribed + hold.share * load_mean) / resistance
+        separation = prescribed
+        if hold.give != 0:
+            separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
         for i in range(theta.shape[0]):
             f[i] = -solved[i, 0] - pressure * solved[i, 1]
         opening = edge_openings(f.reshape(-1, 1), slope, kinds, offset, rules.start, rules.ends)[
@@ -283,7 +316,7 @@ def solve(
                 opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
     return Solution(
         table, kinds, offset, theta, weight, slope, matrix, factor, rhs, solved, beyond,
-        unit_mean, pressure, f, opening,
+        hold.share, unit_mean, resistance, separation, pressure, f, opening,
     )  # fmt: skip
 
 
@@ -296,21 +329,31 @@ def plain(of: Solution) -> PlainSolution:
     """
     return (
         of.table, of.kinds, of.offset, of.theta, of.weight, of.slope, of.matrix, of.factor, of.rhs,
-        of.solved, of.beyond, of.unit_mean, of.pressure, of.f, of.opening,
+        of.solved, of.beyond, of.share, of.unit_mean, of.resistance, of.separation, of.pressure, of.f,
+        of.opening,
     )  # fmt: skip
 
 
 @compiled
 def solve_plain(
-    gaps: Array, separation: float, kinds: Kinds, fields: int, rules: Rules, panels: Panels
+    gaps: Array,
+    prescribed: float,
+    hold: Hold,
+    kinds: Kinds,
+    fields: int,
+    rules: Rules,
+    panels: Panels,
 ) -> PlainSolution:
     """As :func:`solve`, for calls from Python."""
-    return plain(solve(gaps, separation, kinds, fields, rules, panels))
+    return plain(solve(gaps, prescribed, hold, kinds, fields, rules, panels))
 
 
 @compiled
 def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
-    """∂C_e/∂θ_f, shape (2L, 2L), and ∂p/∂θ_f, shape (2L,), of a solution with S and S'."""
+    """∂C_e/∂θ_f, shape (2L, 2L), and ∂Y/∂θ_f, shape (2L,), of a solution with S and S'.
+
+    Y is p, under a load q0 s.
+    """
     edges = 2 * of.slope.shape[0]
     load, area = _singular_loads(
         of.table, of.slope, of.kinds, of.offset, rules.counts, rules.start, rules.square,
@@ -321,16 +364,19 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
     for i in range(load.shape[0]):
         for e in range(edges):
             p[e] += of.weight[i] * load[i, e]
-    p /= of.unit_mean
-    for i in range(load.shape[0]):
-        for e in range(edges):
-            load[i, e] -= of.solved[i, 1] * p[e]
+    if of.share == 0:
+        p /= 2 * np.pi  # of the separation; the pressure stays
+    else:
+        p /= of.resistance
+        for i in range(load.shape[0]):
+            for e in range(edges):
+                load[i, e] -= of.solved[i, 1] * p[e]
     by_edge = edge_openings(load, of.slope, of.kinds, of.offset, rules.start, rules.ends)
     # Translation: all edges together against the profile.
     drift = 0.0
     for i in range(load.shape[0]):
         drift -= of.weight[i] * of.solved[i, 2]
-    drift /= of.unit_mean
+    drift = of.share * drift / of.resistance
     moving = np.empty((load.shape[0], 1))
     for i in range(load.shape[0]):
         moving[i, 0] = -of.solved[i, 2] - drift * of.solved[i, 1]

@@ -8,7 +8,7 @@ import pytest
 from adhesis import Problem, self_affine_profile, single_wave
 from solver.grid.method import GridMethod
 from solver.sharp.coordinate import map_gaps, theta_at
-from solver.sharp.field import GapField
+from solver.sharp.field import FIXED, GapField, Hold
 from solver.sharp.opening import fine_opening, work_of_gaps
 from solver.sharp.source import StressSource, gap_moments
 from tests.support.explicit_solution import explicit_solution
@@ -107,20 +107,43 @@ def test_energy_by_edge_is_the_energy_release_rate(source, separation):
         assert abs(slope - (-release if side else release)) < 2e-5 * scale
 
 
-def test_derivatives_against_differences(source, separation):
-    field = GapField(source, GAPS, separation, 1e-13)
-    by_edge, pressure_by_edge = field.derivatives
+HOLDS = {"separation": FIXED, "stiffness": Hold(1.0, 0.7), "load": Hold(0.0, 1.0)}
+
+
+def held(source, gaps, separation, hold):
+    """Field of the gaps, held so that it is the one that they have at the separation."""
+    fixed = GapField(source, gaps, separation, 1e-13)
+    prescribed = hold.share * separation - hold.give * fixed.pressure
+    return GapField(source, gaps, prescribed, 1e-13, hold)
+
+
+@pytest.mark.parametrize("name", HOLDS)
+def test_the_field_does_not_know_what_holds_it(source, separation, name):
+    fixed = GapField(source, GAPS, separation, 1e-13)
+    field = held(source, GAPS, separation, HOLDS[name])
+    assert field.separation == pytest.approx(separation, rel=1e-9)
+    assert field.pressure == pytest.approx(fixed.pressure, rel=1e-11)
+    assert np.allclose(field.opening, fixed.opening, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", HOLDS)
+def test_derivatives_against_differences(source, separation, name):
+    hold = HOLDS[name]
+    field = held(source, GAPS, separation, hold)
+    by_edge, conjugate_by_edge = field.derivatives
     step = 1e-6
     for f in range(10):
         up, down = GAPS.ravel().copy(), GAPS.ravel().copy()
         up[f] += step
         down[f] -= step
-        high = GapField(source, up.reshape(-1, 2), separation, 1e-13)
-        low = GapField(source, down.reshape(-1, 2), separation, 1e-13)
+        high = GapField(source, up.reshape(-1, 2), field.prescribed, 1e-13, hold)
+        low = GapField(source, down.reshape(-1, 2), field.prescribed, 1e-13, hold)
         difference = (high.opening - low.opening).ravel() / (2 * step)
         assert np.abs(difference - by_edge[:, f]).max() < 2e-6 * np.abs(difference).max()
         slope = (high.pressure - low.pressure) / (2 * step)
-        assert abs(slope - pressure_by_edge[f]) < 2e-6 * np.abs(pressure_by_edge).max()
+        if name == "load":
+            slope = (high.separation - low.separation) / (2 * step)
+        assert abs(slope - conjugate_by_edge[f]) < 2e-6 * np.abs(conjugate_by_edge).max()
 
 
 def test_hessian_is_symmetric(source, separation):
@@ -132,14 +155,14 @@ def test_hessian_is_symmetric(source, separation):
     assert np.abs(off - off.T).max() < 1e-9 * np.abs(off).max()
 
 
-def test_derivatives_by_separation(source, separation):
-    field = GapField(source, GAPS, separation, 1e-12)
-    other = GapField(source, GAPS, 2 * separation, 1e-12)
-    assert np.allclose(
-        other.opening - field.opening, separation * field.opening_by_separation, rtol=1e-9
-    )
-    assert abs(other.pressure - field.pressure - separation * field.pressure_by_separation) < (
-        1e-9 * abs(field.pressure)
+@pytest.mark.parametrize("name", HOLDS)
+def test_derivatives_by_what_is_prescribed(source, separation, name):
+    field = held(source, GAPS, separation, HOLDS[name])
+    way = 0.5 * separation
+    other = GapField(source, GAPS, field.prescribed + way, 1e-13, HOLDS[name])
+    assert np.allclose(other.opening - field.opening, way * field.opening_by_prescribed, rtol=1e-8)
+    assert abs(other.pressure - field.pressure - way * field.pressure_by_prescribed) < (
+        1e-8 * abs(field.pressure)
     )
 
 
