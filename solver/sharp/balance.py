@@ -9,7 +9,7 @@ import numpy as np
 from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp.coordinate import LEFT, RIGHT, RIGHT_PATCH, map_gaps
-from solver.sharp.field import Kinds, Rules, Solution, derivatives
+from solver.sharp.field import Hold, Kinds, Rules, Solution, derivatives
 from solver.sharp.source import Panels, measure_at
 
 
@@ -34,6 +34,8 @@ class Law(NamedTuple):
         Narrower patches and gaps are gone.
     overlapping : float
         An opening this far below zero is an overlap that descent cannot weigh.
+    hold : Hold
+        What is prescribed.
     """
 
     critical: float
@@ -44,6 +46,7 @@ class Law(NamedTuple):
     longest: float
     smallest: float
     overlapping: float
+    hold: Hold
 
 
 @compiled
@@ -72,7 +75,7 @@ def imbalance(of: Solution, law: Law, panels: Panels) -> tuple[Array, Array]:
 
 @compiled
 def tangent_of(of: Solution, drift: Array, rules: Rules) -> tuple[Array, Array]:
-    """∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂p/∂θ_f."""
+    """∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂Y/∂θ_f."""
     matrix, pressure = derivatives(of, rules)
     for e in range(matrix.shape[0]):
         matrix[e, e] -= drift[e]

@@ -42,9 +42,9 @@ def _limits(table: Array, longest: float) -> Array:
 
 @compiled
 def descend(
-    gaps: Array, separation: float, most: int, least: Kinds, law: Law, rules: Rules, panels: Panels
+    gaps: Array, prescribed: float, most: int, least: Kinds, law: Law, rules: Rules, panels: Panels
 ) -> tuple[Array, int, int, int, Kinds]:
-    """Descend in energy at fixed separation, for at most ``most`` steps.
+    """Descend in energy, d being ``prescribed``, for at most ``most`` steps.
 
     Edges out of equilibrium run in the direction in which the energy falls, all at the same speed
     (their limit, twice as long for one that runs alone); edges near equilibrium follow them by
@@ -74,7 +74,7 @@ def descend(
         held = runners > 0 and reuses < _REUSES
         table = map_gaps(gaps)
         kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
-        of = solve(gaps, separation, kinds, 1 if held else 2, rules, panels)
+        of = solve(gaps, prescribed, law.hold, kinds, 1 if held else 2, rules, panels)
         residual, drift = imbalance(of, law, panels)
         # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²
         rise = 0.0

@@ -18,7 +18,7 @@ from solver.profile import Array
 from solver.sharp.balance import Law
 from solver.sharp.descent import NARROW, RESTING, descend
 from solver.sharp.equilibrium import equilibrium
-from solver.sharp.field import RULES, GapField, Solution
+from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution
 from solver.sharp.source import StressSource
 
 CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min
@@ -47,12 +47,12 @@ class Point:
     Attributes
     ----------
     at : float
-        q0 s.
+        d, what is prescribed: q0 s at fixed separation.
     field : GapField
     rate : array, shape (2L,)
-        dn/d(q0 s) of every edge along the branch, n the outward motion of the contact.
+        dn/dd of every edge along the branch, n the outward motion of the contact.
     slope : float
-        dp/d(q0 s) along the branch.
+        dY/dd along the branch: Y is p, under a load q0 s.
     """
 
     at: float
@@ -61,7 +61,7 @@ class Point:
     slope: float
 
     def predicted(self, at: float) -> Array:
-        """Gaps at q0 s = ``at``, along the tangent."""
+        """Gaps at d = ``at``, along the tangent."""
         motion = outward(self.field.gaps) * self.rate * (at - self.at)
         return self.field.gaps + motion.reshape(-1, 2)
 
@@ -76,9 +76,13 @@ class EdgeMechanics:
         4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
     tolerance : float
         Relative accuracy of the field.
+    hold : Hold
+        What is prescribed.
     """
 
-    def __init__(self, source: StressSource, critical: float, tolerance: float) -> None:
+    def __init__(
+        self, source: StressSource, critical: float, tolerance: float, hold: Hold = FIXED
+    ) -> None:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
         self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
@@ -105,13 +109,14 @@ class EdgeMechanics:
             longest=self.longest_step,
             smallest=float(self.smallest),
             overlapping=float(0.1 * max(critical, rough)),
+            hold=hold,
         )
         self.count = Counters()
 
-    def field(self, gaps: Array, separation: float) -> GapField:
+    def field(self, gaps: Array, prescribed: float) -> GapField:
         """Solve the field of these gaps."""
         self.count.fields += 1
-        return GapField(self.source, gaps, separation, self.tolerance)
+        return GapField(self.source, gaps, prescribed, self.tolerance, self.law.hold)
 
     def widths(self, gaps: Array) -> tuple[Array, Array]:
         """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
@@ -123,7 +128,7 @@ class EdgeMechanics:
     def equilibrium(
         self,
         gaps: Array,
-        separation: float,
+        prescribed: float,
         reach: float,
         kinds: NDArray[np.int64] = _ANY,
         *,
@@ -140,7 +145,7 @@ class EdgeMechanics:
             return None
         try:
             found, at, solution, rate, slope, steps = equilibrium(
-                gaps, separation, max(reach, self.settled), kinds, patient, self.law, RULES,
+                gaps, prescribed, max(reach, self.settled), kinds, patient, self.law, RULES,
                 self.source.panels,
             )  # fmt: skip
         except np.linalg.LinAlgError:
@@ -150,11 +155,13 @@ class EdgeMechanics:
         self.count.derivatives += steps
         if not found:
             return None
-        field = GapField(self.source, at, separation, self.tolerance, Solution(*solution))
-        return Point(separation, field, rate, slope)
+        field = GapField(
+            self.source, at, prescribed, self.tolerance, self.law.hold, Solution(*solution)
+        )
+        return Point(prescribed, field, rate, slope)
 
-    def relax(self, gaps: Array, separation: float, reach: float) -> Point | Array:
-        """Descend in energy at fixed separation to the next minimum.
+    def relax(self, gaps: Array, prescribed: float, reach: float) -> Point | Array:
+        """Descend in energy, what is prescribed being fixed, to the next minimum.
 
         Returns
         -------
@@ -172,7 +179,7 @@ class EdgeMechanics:
         rests = 0
         while left > 0:
             gaps, ended, fields, tangents, kinds = descend(
-                gaps, separation, left, kinds, self.law, RULES, self.source.panels
+                gaps, prescribed, left, kinds, self.law, RULES, self.source.panels
             )
             self.count.fields += fields
             self.count.descent_steps += fields
@@ -187,10 +194,10 @@ class EdgeMechanics:
                 # is taken for it, the next step in s decides.
                 rests += 1
                 patient = rests <= _RESTS
-                point = self.equilibrium(gaps, separation, reach, kinds, patient=patient)
+                point = self.equilibrium(gaps, prescribed, reach, kinds, patient=patient)
                 if point is not None:
                     return point
-        raise RuntimeError(f"the descent at q0 s = {separation} did not end")
+        raise RuntimeError(f"the descent at q0 s = {prescribed} did not end")
 
     def without_small(self, gaps: Array) -> Array | None:
         """Gaps without closed gaps or vanished patches, or None if there are none."""

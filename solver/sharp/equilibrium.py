@@ -36,7 +36,7 @@ _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
 @compiled
 def equilibrium(
     gaps: Array,
-    separation: float,
+    prescribed: float,
     reach: float,
     least: Kinds,
     patient: bool,
@@ -47,8 +47,9 @@ def equilibrium(
     """Newton's iteration for C_e = C_c from nearby edges.
 
     Returns whether a stable equilibrium was found with no edge moving further than ``reach``, its
-    gaps, its solution, the rate dn/d(q0 s) of every edge along the branch, dp/d(q0 s) along it, and
-    the number of corrections. ``least`` are the least kinds of the gaps, or empty. If not
+    gaps, its solution, the rate dn/dd of every edge along the branch (d is what is prescribed),
+    dY/dd along it (Y is p, under a load q0 s), and the number of corrections. ``least`` are the
+    least kinds of the gaps, or empty. If not
     ``patient``, edges out of equilibrium by no more than ``law.near`` are taken as they are.
 
     Raises
@@ -66,7 +67,7 @@ def equilibrium(
     steps = 0
     while True:
         steps += 1
-        of = solve(at, separation, kinds, 2, rules, panels)
+        of = solve(at, prescribed, law.hold, kinds, 2, rules, panels)
         residual, drift = imbalance(of, law, panels)
         tangent, by_edge = tangent_of(of, drift, rules)
         step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float
@@ -92,13 +93,13 @@ def equilibrium(
             break
         at = moved
     if found:
-        by_separation = -2 * np.pi / of.unit_mean
+        by_prescribed = -2 * np.pi / of.resistance
         unit = np.empty((of.f.shape[0], 1))
         for i in range(of.f.shape[0]):
-            unit[i, 0] = -by_separation * of.solved[i, 1]
+            unit[i, 0] = -by_prescribed * of.solved[i, 1]
         opening = edge_openings(unit, of.slope, of.kinds, of.offset, rules.start, rules.ends)
         rate = np.linalg.solve(tangent, -opening[:, 0])
-        slope = by_separation
+        slope = by_prescribed if of.share != 0 else of.unit_mean / (2 * np.pi)
         for e in range(rate.shape[0]):
             slope += by_edge[e] * (rate[e] if e % 2 == 0 else -rate[e])
     return found, at, plain(of), rate, slope, steps

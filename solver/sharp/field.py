@@ -222,7 +222,9 @@ class GapField:
         self.source, self.gaps, self.prescribed, self.hold = source, gaps, prescribed, hold
         if solution is None:
             kinds = choose_kinds(map_gaps(gaps), -np.log(tolerance), RULES.counts)
-            solution = Solution(*solve_plain(gaps, prescribed, hold, kinds, 2, RULES, source.panels))
+            solution = Solution(
+                *solve_plain(gaps, prescribed, hold, kinds, 2, RULES, source.panels)
+            )
         if np.isnan(solution.pressure):
             raise FloatingPointError("the matrix of the gaps is not positive definite")
         self.solution = solution
@@ -329,8 +331,8 @@ def plain(of: Solution) -> PlainSolution:
     """
     return (
         of.table, of.kinds, of.offset, of.theta, of.weight, of.slope, of.matrix, of.factor, of.rhs,
-        of.solved, of.beyond, of.share, of.unit_mean, of.resistance, of.separation, of.pressure, of.f,
-        of.opening,
+        of.solved, of.beyond, of.share, of.unit_mean, of.resistance, of.separation, of.pressure,
+        of.f, of.opening,
     )  # fmt: skip
 
 

@@ -84,7 +84,7 @@ class States:
     def shifted(self, state: ContactState, gap_field: GapField, at: float) -> ContactState:
         """State at q0 s = ``at`` with the edges of ``state``: p is linear in s, U quadratic."""
         way = at - gap_field.separation
-        pressure = gap_field.pressure + gap_field.pressure_by_separation * way
+        pressure = gap_field.pressure + gap_field.pressure_by_prescribed * way
         work = -np.pi * way * (gap_field.pressure + pressure)
         return replace(
             state,
