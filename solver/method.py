@@ -109,6 +109,27 @@ class Fields:
     gap: Array
 
 
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """Opening of one gap, from edge to edge of contact; see :mod:`solver.fields`.
+
+    Attributes
+    ----------
+    x : array, shape (points,)
+        Position in m, ascending; the first and the last are the edges. It may exceed λ.
+    gap : array, shape (points,)
+        t in m; zero at the edges. So dense that between two points t is linear in φ,
+        x = middle - half-width · cos φ.
+
+    References
+    ----------
+    docs/theory.md, "5. Spectra and densities"
+    """
+
+    x: Array
+    gap: Array
+
+
 @dataclass(frozen=True)
 class MethodReport:
     """What a method says of itself; each method adds its settings and its counters.
@@ -163,6 +184,10 @@ class Method(ABC):
         ValueError
             If the method cannot give them at this n.
         """
+
+    @abstractmethod
+    def openings(self, state: ContactState) -> list[Opening]:
+        """Return the opening of every gap of ``state``; none for a state without contact."""
 
     @abstractmethod
     def report(self) -> MethodReport:

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from ensemble.campaign.tables import Campaign
 from ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
-from solver.method import BRANCHES, Branch, ContactState, Fields, Method
+from solver.fields import gap_shares, spectral_density
+from solver.method import BRANCHES, Branch, ContactState, Method
 from solver.profile import Array
 
 # Nodes per shortest wave: spectra then reach four times the highest wave number of the profile.
@@ -109,7 +110,7 @@ class FieldPlan:
 
     def spectral_density(self, values: Array) -> Array:
         """Spectral density in the bins, of values with unit u on the nodes, in u² m."""
-        power = np.abs(np.fft.rfft(values) / values.size) ** 2 * (self.period / (2 * np.pi))
+        power = spectral_density(values, self.period)
         edges = self.harmonic_edges
         total = np.add.reduceat(power[: edges[-1]], edges[:-1])
         return np.asarray(total / np.diff(edges))
@@ -161,7 +162,7 @@ FIELD_DATASETS = (
         "gap_density",
         (*_STATES, "gap_bin"),
         "1",
-        "probability density of gap/h_max, nodes in contact left out",
+        "probability density of gap/h_max out of contact",
     ),
     _kept("field_height", (), "m", "height of the rigid profile"),
     _kept("field_displacement", _STATES, "m", "displacement of the elastic surface"),
@@ -226,14 +227,14 @@ class FieldRecorder:
         # States between load steps lie beside the axis by far more than rounding.
         if distance[nearest] > 1e-9:
             return
-        self._record(
-            (BRANCHES.index(branch), nearest), self._method.fields(state, self._plan.nodes)
-        )
+        self._record((BRANCHES.index(branch), nearest), state)
 
-    def _record(self, place: tuple[int, int], fields: Fields) -> None:
-        plan, h_max = self._plan, self._method.problem.profile.h_max
+    def _record(self, place: tuple[int, int], state: ContactState) -> None:
+        plan, profile = self._plan, self._method.problem.profile
+        fields = self._method.fields(state, plan.nodes)
         self._row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
-        shares = gap_shares(fields.gap / h_max, GAP_EDGES)
+        openings = self._method.openings(state)
+        shares = gap_shares(openings, profile.period, GAP_EDGES * profile.h_max)
         self._row["gap_density"][place] = shares / np.diff(GAP_EDGES)
         if self._keep:
             pick = slice(None, None, plan.stride)
@@ -244,36 +245,6 @@ class FieldRecorder:
     def row(self) -> dict[str, NDArray[np.float32]]:
         """Return the values by dataset; NaN where a state had no contact."""
         return self._row | self._kept if self._keep else self._row
-
-
-def gap_shares(gap: Array, edges: Array) -> Array:
-    """Share of the period in which the gap lies in each bin.
-
-    Beside an edge of contact the gap rises like the square root of the distance, so steeply that
-    values at nodes alone would give a row of spikes: between nodes it is interpolated so there,
-    linearly elsewhere, and the shares are those of the interpolation, exactly.
-
-    Parameters
-    ----------
-    gap : array, shape (n,)
-        At equally spaced nodes of the period; zero in contact.
-    edges : array, shape (bins + 1,)
-        Ascending, positive. What lies outside counts in the outermost bins.
-
-    Returns
-    -------
-    array, shape (bins,)
-        They add up to the share of the period that is out of contact.
-    """
-    pair = np.sort(np.stack([gap, np.roll(gap, -1)]), axis=0)
-    low, high = pair[:, pair[1] > 0]
-    below = np.zeros(edges.size)  # share with a gap below each edge
-    for k, edge in enumerate(edges[1:-1], start=1):
-        linear = np.clip((edge - low) / np.maximum(high - low, 1e-300), 0, 1)
-        root = np.minimum(edge / high, 1) ** 2
-        below[k] = np.where(low == 0, root, linear).sum()
-    below[-1] = low.size
-    return np.asarray(np.diff(below) / gap.size)
 
 
 def _density(values: Array, edges: Array) -> Array:

@@ -11,12 +11,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from solver.fields import openings_between
 from solver.grid.contact import Contact, ContactSolver
 from solver.grid.lattice import Lattice
 from solver.grid.path import Counters, Steps
 from solver.grid.relax import Relaxation
 from solver.grid.states import mask_of
-from solver.method import Branch, ContactState, Fields, Method, MethodReport, Path
+from solver.method import Branch, ContactState, Fields, Method, MethodReport, Opening, Path
 from solver.problem import Problem
 
 _FEWEST_NODES_PER_WAVE = 8
@@ -152,6 +153,17 @@ class GridMethod(Method):
             displacement=contact.displacement[pick].copy(),
             gap=gap[pick],
         )
+
+    def openings(self, state: ContactState) -> list[Opening]:
+        """Openings from the nodes' gaps, and from Griffith's balance at the edges."""
+        if not state.patches:
+            return []
+        profile, gamma = self.problem.profile, self.problem.work_of_adhesion
+        slope = profile.at(state.edges, derivative=1)
+        tough = gamma * np.sqrt(1 + slope**2)
+        coefficient = 4 * np.sqrt(tough / (np.pi * self.problem.half_space.modulus))
+        fields = self.fields(state, self.n)
+        return openings_between(state.edges, fields, coefficient, profile.period)
 
     def report(self) -> GridReport:
         """Resolution, tolerances and counters."""

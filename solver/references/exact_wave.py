@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from solver.jumps import Branch, Jump
-from solver.method import ContactState, Fields, Method, MethodReport, Path
+from solver.method import ContactState, Fields, Method, MethodReport, Opening, Path
 from solver.problem import Problem
 from solver.profile import Array
 from solver.references.single_wave import SingleWave
@@ -99,6 +99,15 @@ class ExactWave(Method):
         gap = self.wave.gap(x - self.crest, state.internal)
         stress = self.wave.stress(x - self.crest, state.internal)
         return Fields(x, height, stress, gap + height - state.separation, gap)
+
+    def openings(self, state: ContactState) -> list[Opening]:
+        """Opening of the only gap by the closed form."""
+        if not state.patches:
+            return []
+        a, period = state.internal, self.problem.profile.period
+        phi = np.linspace(0, np.pi, 2001)
+        place = period / 2 - (period / 2 - a) * np.cos(phi)
+        return [Opening(self.crest + place, self.wave.gap(place, a))]
 
     def report(self) -> ExactWaveReport:
         """Return the only choice there is."""

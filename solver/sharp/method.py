@@ -14,12 +14,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from solver.jumps import Branch
-from solver.method import ContactState, Fields, Method, MethodReport, Path
+from solver.method import ContactState, Fields, Method, MethodReport, Opening, Path
 from solver.problem import Problem
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.follow import Follower, Resolution, Target
 from solver.sharp.jump import Jumps
-from solver.sharp.output import fields_of
+from solver.sharp.output import fields_of, openings_of
 from solver.sharp.source import StressSource
 from solver.sharp.states import States, Trace
 from solver.sharp.touch import Nucleation
@@ -112,6 +112,12 @@ class SharpMethod(Method):
         if state.patches:
             field = self.edges.field(state.internal, state.separation * self.q0)
         return fields_of(self.problem, field, state.separation, n)
+
+    def openings(self, state: ContactState) -> list[Opening]:
+        """Openings of all gaps from their series."""
+        if not state.patches:
+            return []
+        return openings_of(self.edges.field(state.internal, state.separation * self.q0), self.q0)
 
     def follow(self, state: ContactState, separation: float) -> Path:
         """Follow the quasi-static path; see the contract."""

@@ -100,3 +100,11 @@ def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> Open
     b = -s / np.arange(1, len(s) + 1)
     b[:m] = (2 / np.pi) * (RULES.w[start : start + m] * f) @ u
     return Opening(theta, dst(b, type=1)[::-1] / 2, span, b)
+
+
+def finer_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]:
+    """θ, increasing, and T at about ``factor`` times as many sine nodes as there are modes b_n."""
+    count = next_fast_len(factor * (len(modes) + 1), real=True) - 1
+    more = np.zeros(count)
+    more[: len(modes)] = modes
+    return _fine_nodes(gap, count)[0], dst(more, type=1)[::-1] / 2

@@ -10,14 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from solver.compiled import compiled
-from solver.method import Fields
+from solver.method import Fields, Opening
 from solver.problem import Problem
 from solver.profile import Array
 from solver.sharp.coordinate import one_minus_plus
 from solver.sharp.field import GapField
-from solver.sharp.opening import fine_opening
+from solver.sharp.opening import fine_opening, finer_opening
 
 _FIELD_NODES = 6.0  # sine nodes per shortest wave
+_FINER = 8  # points of an opening, between which it is taken as linear, for each of these nodes
 
 
 def fields_of(problem: Problem, field: GapField | None, separation: float, n: int) -> Fields:
@@ -57,6 +58,17 @@ def fields_of(problem: Problem, field: GapField | None, separation: float, n: in
         displacement=height + gap - separation,
         gap=gap,
     )
+
+
+def openings_of(field: GapField, q0: float) -> list[Opening]:
+    """Opening of every gap at points that are dense beside its edges, in m."""
+    out = []
+    for k, (left, right) in enumerate(field.gaps):
+        modes = fine_opening(field, k, _FIELD_NODES).modes
+        theta, sine_sum = finer_opening(field.solution.table[k], modes, _FINER)
+        theta = np.concatenate([[left], theta, [right]])
+        out.append(Opening(theta / q0, np.concatenate([[0.0], sine_sum, [0.0]]) / q0))
+    return out
 
 
 @compiled

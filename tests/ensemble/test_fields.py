@@ -13,7 +13,7 @@ from ensemble.results.schema import DATASETS
 from ensemble.results.write import Writer
 from ensemble.task.compute import make_problem, run_task
 from ensemble.task.dataset import KEPT
-from ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan, gap_shares
+from ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan
 from solver.loop import run_loop
 from solver.registry import make_method
 from tests.support.campaign_support import campaign_text
@@ -86,9 +86,10 @@ def test_reductions_agree_with_the_states_of_the_loop():
     assert np.sum(row["height_density"] * np.diff(HEIGHT_EDGES)) == pytest.approx(1, rel=1e-6)
     for place, state in wanted.items():
         fields = method.fields(state, plan.nodes)
-        out_of_contact = np.mean((fields.gap > 0) | (np.roll(fields.gap, -1) > 0))
         density = row["gap_density"][place].astype(float)
-        assert np.sum(density * np.diff(GAP_EDGES)) == pytest.approx(out_of_contact, rel=1e-6)
+        assert np.sum(density * np.diff(GAP_EDGES)) == pytest.approx(
+            1 - state.contact_fraction, rel=1e-6
+        )
         middle = np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:]) * profile.h_max
         mean_gap = np.sum(density * np.diff(GAP_EDGES) * middle)
         assert mean_gap == pytest.approx(fields.gap.mean(), rel=0.05)
@@ -97,27 +98,6 @@ def test_reductions_agree_with_the_states_of_the_loop():
         kept = row["field_gap"][place]
         assert kept.shape == (16,)
         np.testing.assert_array_equal(kept, fields.gap[:: plan.stride].astype(np.float32))
-
-
-def test_gaps_beside_contact_are_counted_as_a_square_root():
-    """For t = c sqrt(r) the share below t grows as t²; from the nodes alone it would be a stair."""
-    r = np.maximum(np.arange(4096) - 2048.0, 0)
-    r[0] = r[-1]  # no second edge
-    edges = np.concatenate([[1e-9], np.linspace(0.05, 45.2, 60), [100]])
-    shares = gap_shares(np.sqrt(r), edges)
-    assert shares.sum() == pytest.approx(0.5, abs=1e-3)
-    expected = np.diff(edges[:-1] ** 2) / 4096
-    # Beyond the first node the interpolation is linear: 2 % off in its first interval.
-    np.testing.assert_allclose(np.cumsum(shares)[:-1], np.cumsum(expected), rtol=0.03)
-    np.testing.assert_allclose(shares[0], expected[0], rtol=1e-3)
-
-
-def test_shares_of_a_linear_gap_are_those_of_its_slope():
-    gap = 1 + np.abs(np.arange(64) - 32) / 32  # a triangle from 1 to 2, no contact
-    edges = np.array([0.1, 1.0, 1.25, 1.5, 2.0, 3.0])
-    np.testing.assert_allclose(gap_shares(gap, edges), [0, 0.25, 0.25, 0.5, 0], atol=1e-12)
-    flat = gap_shares(np.full(8, 0.5), np.array([0.1, 0.4, 0.6, 1.0]))
-    np.testing.assert_allclose(flat, [0, 1, 0])
 
 
 def test_states_without_contact_are_not_a_number():

@@ -10,7 +10,7 @@ import pytest
 from adhesis import ContactState, HalfSpace, Path, Problem, run_loop, single_wave
 from solver.jumps import classify
 from solver.loop import check_cycle
-from solver.method import Fields, Method, MethodReport, PathError
+from solver.method import Fields, Method, MethodReport, Opening, PathError
 from solver.profile import Profile
 from solver.references.exact_wave import ExactWave
 from solver.references.single_wave import SingleWave
@@ -173,6 +173,9 @@ class _Sticking(Method):
         return Path((ContactState(separation, patch, -1.0, 0.0, 0.0, 0.1),), ())
 
     def fields(self, state: ContactState, n: int) -> Fields:
+        raise NotImplementedError
+
+    def openings(self, state: ContactState) -> list[Opening]:
         raise NotImplementedError
 
     def report(self) -> MethodReport:
