@@ -8,7 +8,7 @@ per nominal area in J/m². Loads no MPI and no matplotlib.
 from solver.jumps import Jump
 from solver.loop import LoopResult, run_loop
 from solver.material import HalfSpace
-from solver.method import ContactState, Fields, Method, Path
+from solver.method import ContactState, Fields, Method, Opening, Path
 from solver.problem import Problem
 from solver.profile import Profile, profile_from_heights, self_affine_profile, single_wave
 from solver.registry import make_method
@@ -20,6 +20,7 @@ __all__ = [
     "Jump",
     "LoopResult",
     "Method",
+    "Opening",
     "Path",
     "Problem",
     "Profile",

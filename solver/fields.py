@@ -73,7 +73,7 @@ def _widths(opening: Opening, bins: Array) -> Array:
     one = phi[:-1][interval] + step * np.where(rising, begin, 1 - end)
     two = phi[:-1][interval] + step * np.where(rising, end, 1 - begin)
     length = width * np.sin((one + two) / 2) * np.sin((two - one) / 2)
-    return np.bincount(number, length, minlength=bins.size - 1)
+    return np.asarray(np.bincount(number, length, minlength=bins.size - 1), dtype=np.float64)
 
 
 def openings_between(

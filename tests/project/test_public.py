@@ -24,6 +24,7 @@ PUBLIC = [
     "Jump",
     "LoopResult",
     "Method",
+    "Opening",
     "Path",
     "Problem",
     "Profile",

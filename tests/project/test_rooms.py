@@ -57,6 +57,7 @@ NOT_IN_SOLVER = {
 }
 # All that campaigns know of the mechanics.
 SOLVER_FOR_ENSEMBLE = {
+    "solver.fields",
     "solver.jumps",
     "solver.loop",
     "solver.material",

@@ -12,7 +12,7 @@ from solver.material import HalfSpace
 from solver.method import ContactState, Method, Opening
 from solver.problem import Problem
 from solver.profile import self_affine_profile, single_wave
-from solver.references import SingleWave
+from solver.references.single_wave import SingleWave
 from solver.registry import make_method
 
 PERIOD = 2e-3
