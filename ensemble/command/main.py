@@ -18,6 +18,7 @@ COMMANDS: dict[str, str] = {
     "status": "what of a results file is pending, done and failed",
     "report": "tables, curves and figures of a results file",
     "loop": "one loop of one profile",
+    "trace": "a measured trace to its loss, with what is doubtful about it",
     "validate": "the exact references: error against bound",
     "bench": "speed against error of each method",
     "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",

@@ -38,6 +38,7 @@ FIGURES = {
     "ensemble.report.figures.loops",
     "ensemble.report.figures.losses",
     "ensemble.report.figures.style",
+    "ensemble.trace.figures",
 }
 DOORS = {"mpi4py": MPI, "h5py": HDF5, "numba": COMPILED, "matplotlib": FIGURES}
 
@@ -66,6 +67,7 @@ SOLVER_FOR_ENSEMBLE = {
     "solver.profile",
     "solver.references.single_wave",
     "solver.registry",
+    "solver.trace",
     "solver.validate.claims",
 }
 

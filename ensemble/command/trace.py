@@ -1,0 +1,244 @@
+"""A measured trace to its loss, with what is doubtful about it.
+
+Reads a text of one or two columns, or an instrument's file, says what it read, makes one period of
+it step by step, runs the loop and what could have been decided otherwise, and writes one page.
+Lengths are in m unless they carry a unit (5um), stresses in Pa.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from ensemble.errors import InputError
+from ensemble.loop.record import check_writable, write_json
+from ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
+from ensemble.trace.plan import Plan, clock, make_plan
+from ensemble.trace.pool import Pool
+from ensemble.trace.prepare import Prepared, prepare_trace
+from ensemble.trace.read import Trace, read_trace
+from ensemble.trace.units import parse_length
+from solver.material import HalfSpace
+from solver.registry import METHOD_NAMES
+
+_SECONDS_BETWEEN_LINES = 10.0
+
+
+def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare how a trace is read and prepared; ``adhesis loop --trace`` shares them."""
+    reading = parser.add_argument_group("reading a trace")
+    reading.add_argument(
+        "--unit", metavar="U", help="unit of a text: um, or mm,um for positions and heights"
+    )
+    reading.add_argument("--step", metavar="S", help="step, for heights without positions: 0.5um")
+    reading.add_argument("--columns", metavar="X,Z", help="columns of a text, from 1")
+    reading.add_argument("--delimiter", metavar="C", help="of a text, if it is not found out")
+    reading.add_argument("--decimal", choices=[",", "."], help="decimal sign, if not found out")
+    reading.add_argument("--row", type=int, metavar="K", help="row of an instrument's map, from 0")
+    reading.add_argument("--channel", type=int, metavar="K", help="of an instrument's file, from 0")
+    making = parser.add_argument_group("preparing a trace")
+    making.add_argument(
+        "--degree", type=int, metavar="N", help="polynomial taken off (default 1, or as is seen)"
+    )
+    making.add_argument(
+        "--cut-off", metavar="W", help="shortest wave kept (default from step, noise and tip)"
+    )
+    making.add_argument("--tip-radius", metavar="R", help="of the stylus or probe: 2um")
+    making.add_argument(
+        "--longest-gap", metavar="G", help="drop-outs up to this length are interpolated"
+    )
+    making.add_argument("--keep-outliers", action="store_true", help="leave spikes in")
+    making.add_argument("--invert", action="store_true", help="z points into the sample: turn it")
+
+
+def trace_of(args: argparse.Namespace, path: Path) -> Trace:
+    """Read the trace as the options say."""
+    columns = None
+    if args.columns is not None:
+        try:
+            columns = [int(word) for word in args.columns.split(",")]
+        except ValueError:
+            raise InputError(
+                f"--columns is {args.columns!r}: two whole numbers, as in 1,3"
+            ) from None
+    delimiter = {"\\t": "\t", "tab": "\t", "space": " "}.get(args.delimiter, args.delimiter)
+    if delimiter is not None and len(delimiter) != 1:
+        raise InputError(f"--delimiter is {args.delimiter!r}: it must be one sign, or tab")
+    return read_trace(
+        path,
+        unit=args.unit,
+        step=None if args.step is None else parse_length(args.step, "--step"),
+        columns=columns,
+        row=args.row,
+        channel=args.channel,
+        delimiter=delimiter,
+        decimal=args.decimal,
+    )
+
+
+def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:
+    """Prepare the trace as the options say."""
+
+    def length(text: str | None, option: str) -> float | None:
+        return None if text is None else parse_length(text, option)
+
+    return prepare_trace(
+        trace,
+        degree=args.degree,
+        cut_off=length(args.cut_off, "--cut-off"),
+        tip_radius=length(args.tip_radius, "--tip-radius"),
+        longest_gap=length(args.longest_gap, "--longest-gap"),
+        keep_outliers=args.keep_outliers,
+        invert=args.invert,
+    )
+
+
+def what_was_read(prepared: Prepared) -> str:
+    """What was read and done, line by line, for the terminal."""
+    trace = prepared.trace
+    lines = [
+        f"read        {trace.path}: {trace.points} points, step {trace.step:.5g} m, "
+        f"length {trace.length:.5g} m, range {trace.height_range:.4g} m, "
+        f"{trace.drop_outs} drop-outs"
+    ]
+    lines += [f"            {said}" for said in trace.said]
+    lines += [f"{step.name:<11} {step.said}" for step in prepared.steps]
+    return "\n".join(lines)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``adhesis trace``."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="text or instrument's file")
+    contact = parser.add_argument_group("contact and cycle")
+    contact.add_argument(
+        "--work-of-adhesion",
+        required=True,
+        metavar="G",
+        help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others a table",
+    )
+    contact.add_argument("--young", type=float, required=True, metavar="E", help="Pa")
+    contact.add_argument("--poisson", type=float, required=True, metavar="NU")
+    contact.add_argument(
+        "--max-penetration", default="0.9", metavar="D", help="Δ/h_max, or several (default 0.9)"
+    )
+    contact.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+    contact.add_argument(
+        "--method", default="auto", metavar="NAME", help=f"{', '.join(METHOD_NAMES)} (default auto)"
+    )
+    contact.add_argument("--accuracy", type=float, default=1e-3, help="of each loop (default 1e-3)")
+    add_reading_arguments(parser)
+    output = parser.add_argument_group("output")
+    output.add_argument("--to", type=Path, metavar="DIR", help="for the page, its figures and JSON")
+    output.add_argument("--plan", action="store_true", help="say what would be done, do nothing")
+    output.add_argument(
+        "--quick", action="store_true", help="without tables of γ and turning point"
+    )
+    output.add_argument("--processes", type=int, metavar="N", help="side by side (default: cores)")
+    output.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Read, plan, run, write; returns the exit code."""
+    if args.to is None and not args.plan:
+        raise InputError("give --to, the directory for the page, or --plan")
+    if args.processes is not None and args.processes < 1:
+        raise InputError(f"--processes is {args.processes}: it must be at least 1")
+    gammas = _numbers(args.work_of_adhesion, "--work-of-adhesion")
+    depths = _numbers(args.max_penetration, "--max-penetration")
+    if args.method not in METHOD_NAMES:
+        raise InputError(f"method is {args.method!r}: it must be one of {', '.join(METHOD_NAMES)}")
+    prepared = prepared_of(args, trace_of(args, args.file))
+    try:
+        half_space = HalfSpace(args.young, args.poisson)
+        cycle = make_cycle(half_space, gammas, depths, args.load_steps, args.method, args.accuracy)
+        check(prepared, cycle)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    plan = make_plan(prepared, cycle, quick=args.quick, processes=args.processes)
+    print(what_was_read(prepared))
+    for warning in prepared.warnings:
+        print(f"WARNING     {warning}")
+    print(plan.said, flush=True)
+    if args.plan:
+        return 0
+    _make_folder(args.to)
+    try:
+        answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
+    except NoAnswer as error:
+        print(f"adhesis trace: {error}", file=sys.stderr)
+        return 1
+    from ensemble.trace.page import summary, write_page
+
+    write_json(args.to / "trace.json", document(answer))
+    write_page(answer, args.to)
+    print(summary(answer))
+    print(f"wrote       {args.to / 'trace.html'}, trace.md, trace.json and the figures")
+    return 0
+
+
+def _numbers(text: str, option: str) -> list[float]:
+    try:
+        values = [float(word) for word in str(text).split(",")]
+    except ValueError:
+        raise InputError(f"{option} is {text!r}: one number, or several with commas") from None
+    if len(set(values)) < len(values):
+        raise InputError(f"{option} is {text!r}: it names a value twice")
+    return values
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the directory {folder}: {error.strerror or error}") from None
+    check_writable(folder / "trace.json")
+
+
+class _Progress:
+    """Lines on stderr: loops done, what is running, time left; none is longer silent than 10 s."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.started = self.last = time.monotonic()
+        self.live = sys.stderr.isatty()
+
+    def __call__(self, pool: Pool) -> None:
+        now = time.monotonic()
+        finished = not pool.running and not pool.waiting
+        if not self.live and now - self.last < _SECONDS_BETWEEN_LINES:
+            return
+        self.last = now
+        running = ", ".join(
+            f"{name} ({branch} {penetration:+.2f})"
+            for name, (_, branch, penetration) in pool.running.items()
+        )
+        left = self._left(pool, now)
+        line = f"{len(pool.done)} of {len(self.plan.runs)} loops"
+        if not pool.done and now - self.started > 8:
+            running += "; the first loop of an installation waits a minute or two for machine code"
+        if running:
+            line += f"; running {running}"
+        line += f"; {now - self.started:.0f} s so far"
+        line += f", about {clock(left)} left" if left > 0 and not finished else ""
+        if self.live:
+            print(
+                f"\r\x1b[K{line[:150]}", end="\n" if finished else "", file=sys.stderr, flush=True
+            )
+        else:
+            print(line, file=sys.stderr, flush=True)
+
+    def _left(self, pool: Pool, now: float) -> float:
+        """Expected seconds, corrected by what the loops that are done have really taken."""
+        expected = self.plan.seconds
+        ended = {name: found for name, found in pool.done.items() if isinstance(found, dict)}
+        told = sum(expected[name] for name in ended)
+        took = sum(found["seconds"] for found in ended.values())
+        ratio = min(max(took / told, 0.05), 20.0) if len(ended) > 1 else 1.0
+        waiting = sum(ratio * expected[job.name] for job in pool.waiting)
+        rest = [
+            max(ratio * expected[name] - (now - started), 1.0)
+            for name, (started, _, _) in pool.running.items()
+        ]
+        return max([(waiting + sum(rest)) / pool.processes, *rest])

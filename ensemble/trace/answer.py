@@ -1,0 +1,339 @@
+"""The answer: loss, pull-off and contact of a trace, and how far each is in doubt."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
+from ensemble.trace.pool import Pool, Result, Watch
+from ensemble.trace.prepare import Prepared
+from solver.loop import check_cycle
+from solver.material import HalfSpace
+from solver.problem import Problem
+
+QUANTITIES = {
+    "loss": "J/m²",
+    "pull_off_stress": "Pa",
+    "contact_fraction": "",
+}
+
+# A doubt counts with the root mean square change of its variants; the interval is so many times
+# the root of their sum of squares. Measured on profiles of known loss: docs/measured-profile.md.
+COVERAGE = 2.0
+# Never more certain than this: scatter between traces of one surface is not even looked at.
+_LEAST = 0.02
+
+_NOT_CONVERGED = 0.10
+_DOUBTS = {
+    "cut-off": "the shortest wave kept",
+    "continuation": "how the period is closed",
+    "form": "what is form and what roughness",
+    "noise": "noise of the instrument",
+}
+
+
+class NoAnswer(RuntimeError):
+    """The loop of the answer itself could not be run to its end."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of the answer.
+
+    Attributes
+    ----------
+    value : float
+        In the unit of :data:`QUANTITIES`.
+    uncertainty : float
+        Half-width of the interval, in the same unit.
+    doubts : dict
+        Standard uncertainty by doubt, relative.
+    """
+
+    value: float
+    uncertainty: float
+    doubts: dict[str, float]
+
+    @property
+    def relative(self) -> float:
+        """Half-width of the interval over the value."""
+        return self.uncertainty / abs(self.value) if self.value else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Loss, pull-off stress and contact fraction of a trace, with their doubts.
+
+    Attributes
+    ----------
+    loss, pull_off_stress, contact_fraction : Quantity
+    results : dict
+        Numbers of each loop by name (:func:`ensemble.trace.worker.run`); a text if it failed.
+    warnings : tuple of str
+    seconds : float
+        Wall time.
+    """
+
+    prepared: Prepared
+    cycle: Cycle
+    plan: Plan
+    results: dict[str, Result | str]
+    loss: Quantity
+    pull_off_stress: Quantity
+    contact_fraction: Quantity
+    warnings: tuple[str, ...]
+    seconds: float
+
+    def result(self, name: str) -> Result | None:
+        """Numbers of a loop, or None if it failed or was not run."""
+        found = self.results.get(name)
+        return found if isinstance(found, dict) else None
+
+    @property
+    def main(self) -> Result:
+        """Numbers of the answer's own loop."""
+        found = self.result("answer")
+        assert found is not None
+        return found
+
+    def group(self, name: str) -> list[tuple[str, str, Result]]:
+        """Name, words and numbers of the loops of one doubt or table that came to their end."""
+        rows = []
+        for run in self.plan.runs:
+            found = self.result(run.name)
+            if run.group == name and found is not None:
+                rows.append((run.name, run.said, found))
+        return rows
+
+    def change(self, name: str, quantity: str = "loss") -> float | None:
+        """Relative change of a quantity in one loop against the loop that it is compared with."""
+        run = next((run for run in self.plan.runs if run.name == name), None)
+        found, reference = self.result(name), self.result(run.reference) if run else None
+        if found is None or reference is None or reference[quantity] == 0:
+            return None
+        return float(found[quantity] / reference[quantity] - 1)
+
+
+def loss_of_trace(
+    prepared: Prepared,
+    *,
+    half_space: HalfSpace,
+    work_of_adhesion: float | Sequence[float],
+    max_penetration: float | Sequence[float] = 0.9,
+    load_steps: int = 40,
+    method: str = "auto",
+    accuracy: float = 1e-3,
+    quick: bool = False,
+    processes: int | None = None,
+    watch: Watch | None = None,
+) -> Answer:
+    """Run the loop of a prepared trace and its variants on the cores at hand.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    half_space : HalfSpace
+    work_of_adhesion : float or several
+        γ in J/m²; the first is the answer's, the others fill its table (without others, half and
+        twice as much).
+    max_penetration : float or several
+        Turning points Δ/h_max in the same way (without others, one and two thirds).
+    quick : bool
+        Without the two tables.
+    processes : int, optional
+        Side by side; without it one for each core.
+    watch : callable, optional
+        Called with the :class:`~ensemble.trace.pool.Pool` about once a second.
+
+    Raises
+    ------
+    ValueError
+        If a value breaks the solver's rules.
+    NoAnswer
+        If the loop itself failed; a failed variant is a warning.
+    """
+    cycle = make_cycle(half_space, work_of_adhesion, max_penetration, load_steps, method, accuracy)
+    check(prepared, cycle)
+    return run_plan(
+        prepared, cycle, make_plan(prepared, cycle, quick=quick, processes=processes), watch
+    )
+
+
+def make_cycle(
+    half_space: HalfSpace,
+    work_of_adhesion: float | Sequence[float],
+    max_penetration: float | Sequence[float],
+    load_steps: int,
+    method: str,
+    accuracy: float,
+) -> Cycle:
+    """Contact and cycle, with the values of both tables."""
+    gammas, depths = default_tables(_several(work_of_adhesion), _several(max_penetration))
+    return Cycle(half_space, gammas, depths, load_steps, method, accuracy)
+
+
+def check(prepared: Prepared, cycle: Cycle) -> None:
+    """Refuse, before any work, what the solver would refuse (ValueError)."""
+    profile = prepared.profile()
+    for gamma in cycle.works_of_adhesion:
+        Problem(profile, cycle.half_space, gamma)
+    for depth in cycle.max_penetrations:
+        check_cycle(depth, cycle.load_steps)
+    if not 0 < cycle.accuracy < 1:
+        raise ValueError(f"accuracy is {cycle.accuracy!r}: it must lie between 0 and 1")
+
+
+def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
+    """Run a plan; see :func:`loss_of_trace`."""
+    started = time.monotonic()
+    results = Pool(plan.jobs, plan.processes).run(watch)
+    main = results.get("answer")
+    if not isinstance(main, dict):
+        raise NoAnswer(f"the loop could not be run to its end: {main}")
+    bare = {name: Quantity(float(main[name]), 0.0, {}) for name in QUANTITIES}
+    draft = Answer(prepared, cycle, plan, results, warnings=(), seconds=0.0, **bare)
+    quantities = {name: _quantity(draft, name) for name in QUANTITIES}
+    return Answer(
+        prepared=prepared,
+        cycle=cycle,
+        plan=plan,
+        results=results,
+        warnings=(*prepared.warnings, *_warnings(draft, quantities["loss"])),
+        seconds=time.monotonic() - started,
+        **quantities,
+    )
+
+
+def _several(value: float | Sequence[float]) -> Sequence[float]:
+    return value if isinstance(value, Sequence) else (float(value),)
+
+
+# ---------------------------------------------------------------------- doubts
+
+
+def _quantity(answer: Answer, name: str) -> Quantity:
+    value = float(answer.main[name])
+    doubts = {}
+    for doubt in _DOUBTS:
+        changes = []
+        for run in answer.plan.runs:
+            if run.group != doubt or not _counts(run.name):
+                continue
+            change = answer.change(run.name, name)
+            if change is not None:
+                changes.append(change)
+        if changes:
+            doubts[doubt] = float(np.sqrt(np.mean(np.square(changes))))
+    if name == "loss" and value:
+        told = answer.main["loss_error"]
+        numerics = abs(answer.main["audit_residual"]) if told is None else abs(told) / abs(value)
+        doubts["numerics"] = float(numerics)
+    spread = float(np.sqrt(sum(d * d for d in doubts.values())))
+    return Quantity(value, abs(value) * max(_LEAST, COVERAGE * spread), doubts)
+
+
+def _counts(name: str) -> bool:
+    """Of the cut-offs, only the neighbours count as doubts; the others are for the figure."""
+    if not name.startswith("cut-off"):
+        return True
+    return float(name.split("×")[1]) <= 2.01
+
+
+def _warnings(answer: Answer, loss: Quantity) -> list[str]:
+    found = []
+    for run in answer.plan.runs:
+        text = answer.results.get(run.name)
+        if isinstance(text, str):
+            found.append(f"the loop “{run.name}” did not end ({text}): its doubt is not counted")
+    last = answer.change("cut-off × 2")
+    if last is not None and abs(last) > _NOT_CONVERGED:
+        found.append(
+            f"the short-wave end is not converged: the last halving of the shortest wave changes "
+            f"the loss by {-last / (1 + last):+.0%}; a finer step or a sharper tip would tell more"
+        )
+    if loss.relative > 0.5:
+        found.append(
+            f"the loss is known to {loss.relative:.0%} only: measure a longer trace, or several"
+        )
+    races = answer.main["races"]
+    if races:
+        found.append(
+            f"{races:.0f} jumps would have ended elsewhere under another rule of descent "
+            f"({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
+        )
+    return found
+
+
+def document(answer: Answer) -> dict[str, Any]:
+    """Return every number of the answer as one JSON document, in SI units."""
+    prepared, trace, cycle, plan = answer.prepared, answer.prepared.trace, answer.cycle, answer.plan
+    spectrum = prepared.spectrum
+    runs = []
+    for run in plan.runs:
+        found = answer.results.get(run.name)
+        row: dict[str, Any] = {"name": run.name, "group": run.group, "said": run.said}
+        row["reference"] = run.reference
+        row["expected_seconds"] = plan.seconds[run.name]
+        if isinstance(found, dict):
+            row |= {key: value for key, value in found.items() if key != "states"}
+            row["loss_change"] = answer.change(run.name)
+        else:
+            row["failed"] = found
+        runs.append(row)
+    return {
+        "file": str(trace.path),
+        "read": {
+            "said": list(trace.said),
+            "points": trace.points,
+            "step": trace.step,
+            "length": trace.length,
+            "height_range": trace.height_range,
+            "drop_outs": trace.drop_outs,
+            "tip_radius": trace.tip_radius,
+        },
+        "preparation": [
+            {"name": step.name, "said": step.said, **step.numbers} for step in prepared.steps
+        ],
+        "cut_off": prepared.cut_off,
+        "cut_off_limits": prepared.limits,
+        "degree": prepared.degree,
+        "noise": prepared.spectrum.noise,
+        "spectrum": {
+            "wave_number": spectrum.wave_number.tolist(),
+            "power": spectrum.power.tolist(),
+            "floor": spectrum.floor,
+        },
+        "young": cycle.half_space.young,
+        "poisson": cycle.half_space.poisson,
+        "work_of_adhesion": cycle.works_of_adhesion[0],
+        "max_penetration": cycle.max_penetrations[0],
+        "load_steps": cycle.load_steps,
+        "loss": _plain(answer.loss),
+        "pull_off_stress": _plain(answer.pull_off_stress),
+        "contact_fraction": _plain(answer.contact_fraction),
+        "loop": dict(answer.main),
+        "runs": runs,
+        "plan": {
+            "waves": plan.waves,
+            "patches": plan.patches,
+            "seconds": sum(plan.seconds.values()),
+            "wall": plan.wall,
+            "processes": plan.processes,
+            "hints": list(plan.hints),
+        },
+        "warnings": list(answer.warnings),
+        "seconds": answer.seconds,
+    }
+
+
+def _plain(quantity: Quantity) -> dict[str, Any]:
+    return {
+        "value": quantity.value,
+        "uncertainty": quantity.uncertainty,
+        "doubts": quantity.doubts,
+    }

@@ -1,0 +1,246 @@
+"""Figures of an answer: trace, spectrum, loop, loss against cut-off, γ and turning point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ensemble.report.figures.style import (
+    LINE_OF_BRANCH,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    new_figure,
+    plain_decades,
+    style,
+)
+from ensemble.trace.answer import Answer
+from solver.profile import Array
+from solver.trace import trace_spectrum
+
+_GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
+_MOST_SHOWN = 4000  # points of a curve; of more, the lowest and highest of each stretch
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure on disk and what it shows."""
+
+    path: Path
+    title: str
+    caption: str
+
+
+def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
+    """Draw every figure for which there are numbers, as PNG (200 dpi)."""
+    drawn = []
+    with style():
+        for stem, title, build in (
+            ("trace", "The trace, as measured and as used", _trace),
+            ("spectrum", "Its power spectrum", _spectrum),
+            ("loop", "The loop", _loop),
+            ("cut-off", "Loss against the shortest wave kept", _cut_off),
+            ("tables", "Against work of adhesion and turning point", _tables),
+        ):
+            built = build(answer)
+            if built is None:
+                continue
+            figure, caption = built
+            path = folder / f"{stem}.png"
+            figure.savefig(path, dpi=200, metadata={"Software": None})
+            drawn.append(Drawn(path, title, caption))
+    return drawn
+
+
+def _scale(size: float) -> tuple[float, str]:
+    """Unit in which a length of this size reads well, and its name."""
+    for factor, name in ((1e3, "mm"), (1e6, "µm"), (1e9, "nm")):
+        if size * factor >= 1:
+            return factor, name
+    return 1e9, "nm"
+
+
+def _thinned(x: Any, y: Any) -> tuple[Array, Array]:
+    """Few points that look like all: lowest and highest of each stretch, in order."""
+    if x.size <= _MOST_SHOWN:
+        return x, y
+    each = int(np.ceil(x.size / (_MOST_SHOWN // 2)))
+    whole = (x.size // each) * each
+    rows = np.where(np.isfinite(y[:whole]), y[:whole], 0.0).reshape(-1, each)
+    base = np.arange(rows.shape[0]) * each
+    picked = np.sort(np.concatenate([base + rows.argmin(axis=1), base + rows.argmax(axis=1)]))
+    return x[picked], y[picked]
+
+
+def _trace(answer: Answer) -> tuple[Figure, str]:
+    prepared = answer.prepared
+    heights = prepared.trace.heights
+    level, profile = prepared.level(), prepared.profile()
+    x = prepared.step * np.arange(level.size)
+    by_x, unit_x = _scale(prepared.trace.length)
+    figure = new_figure(2, 1, TWO_COLUMNS, 3.3, sharex=True)
+    above, below = figure.axes
+    by_z, unit_z = _scale(prepared.trace.height_range)
+    measured = x[0] + prepared.step * np.arange(heights.size)
+    above.plot(by_x * measured, by_z * heights, color=_GREY, lw=0.7)
+    fit = prepared.filled - level
+    sign = -1.0 if any(step.name == "turned over" for step in prepared.steps) else 1.0
+    above.plot(by_x * x, sign * by_z * fit, color=_ORANGE, lw=1.0, label="form taken off")
+    if prepared.gaps.any():
+        gaps = np.flatnonzero(prepared.gaps)
+        above.plot(
+            by_x * x[gaps],
+            sign * by_z * prepared.filled[gaps],
+            ".",
+            ms=2.5,
+            color="k",
+            label="interpolated",
+        )
+    above.set(ylabel=f"measured ({unit_z})")
+    above.legend(loc="best")
+    by_z, unit_z = _scale(float(np.ptp(level)))
+    below.plot(*_thinned(by_x * x, by_z * level), color=_GREY, lw=0.7, label="level")
+    n = max(4 * profile.highest_harmonic, 2000) + 1
+    used = profile.heights(n)
+    place = profile.period * np.arange(n) / n
+    below.plot(*_thinned(by_x * place, by_z * used), color=_BLUE, lw=0.8, label="used, one period")
+    below.set(xlabel=f"position ({unit_x})", ylabel=f"height ({unit_z})")
+    below.legend(loc="best", ncols=2)
+    return figure, (
+        "Above: heights as they were read, the form that is taken off, and the heights that were "
+        "interpolated. Below: the level trace, and the period of the profile that is pressed on."
+    )
+
+
+def _spectrum(answer: Answer) -> tuple[Figure, str]:
+    prepared = answer.prepared
+    tilt_only = prepared.filled - prepared.filled.mean()
+    before, after = trace_spectrum(tilt_only, prepared.step), prepared.spectrum
+    profile = answer.prepared.profile()
+    a = np.abs(profile.coefficients[1:]) ** 2 * profile.period
+    q = profile.q0 * np.arange(1, profile.coefficients.size)
+    figure = new_figure(1, 1, ONE_COLUMN * 1.5, 2.8)
+    (axes,) = figure.axes
+    axes.loglog(before.wave_number, before.power, color=_GREY, lw=0.9, label="as measured")
+    axes.loglog(after.wave_number, after.power, color="k", lw=0.9, label="level")
+    edges = np.unique(np.round(np.geomspace(1, q.size + 1, 60)).astype(int))
+    mean = [a[i - 1 : j - 1].mean() for i, j in pairwise(edges)]
+    middle = np.sqrt(edges[:-1] * (edges[1:] - 1.0)) * profile.q0
+    axes.loglog(middle, mean, color=_BLUE, lw=1.2, label="used")
+    if after.floor > 0:
+        axes.axhline(after.floor, color=_ORANGE, lw=0.8, ls=":", label="white noise")
+    axes.axvline(2 * np.pi / prepared.cut_off, color=_BLUE, lw=0.8, ls="--", label="cut-off")
+    low = min(float(np.min(after.power[after.power > 0])), float(np.min(mean)))
+    axes.set(
+        xlabel="wave number $q$ (rad/m)",
+        ylabel="power $C(q)$ (m³)",
+        ylim=(0.3 * low, None),
+    )
+    plain_decades([axes])
+    axes.legend(loc="best")
+    return figure, (
+        "Power spectrum with Hann's window, averaged over bands, before and after levelling, and "
+        "of the profile that is used; where it meets the noise or bends down at its end, heights "
+        "are no longer those of the surface."
+    )
+
+
+def _loop(answer: Answer) -> tuple[Figure, str]:
+    states: dict[str, Any] = answer.main["states"]
+    branch = np.array(states["branch"])
+    depth = np.array(states["penetration"])
+    stress = np.array(states["mean_stress"])
+    contact = np.array(states["contact_fraction"])
+    big = float(np.abs(stress).max())
+    by, unit = (1e-6, "MPa") if big > 2e6 else (1e-3, "kPa") if big > 2e2 else (1.0, "Pa")
+    figure = new_figure(1, 2, TWO_COLUMNS, 2.5)
+    left, right = figure.axes
+    for name, colour in (("loading", _BLUE), ("unloading", _ORANGE)):
+        rows = branch == name
+        line = LINE_OF_BRANCH[name]
+        left.plot(depth[rows], by * stress[rows], ls=line, color=colour, label=name)
+        right.plot(depth[rows], contact[rows], ls=line, color=colour, label=name)
+    left.axhline(0, color="0.5", lw=0.5)
+    left.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel=rf"mean stress $\bar p$ ({unit})")
+    right.set(xlabel=r"penetration $\Delta/h_{\max}$", ylabel="contact fraction $A/A_0$")
+    left.legend(loc="best")
+    right.legend(loc="best")
+    return figure, "Mean stress (compression positive) and contact fraction over the whole loop."
+
+
+def _cut_off(answer: Answer) -> tuple[Figure, str] | None:
+    prepared = answer.prepared
+    rows = [(prepared.cut_off, answer.main["loss"])]
+    for name, _, found in answer.group("cut-off"):
+        rows.append((float(name.split("×")[1]) * prepared.cut_off, found["loss"]))
+    if len(rows) < 3:
+        return None
+    rows.sort()
+    shortest, loss = np.array(rows).T
+    figure = new_figure(1, 1, ONE_COLUMN * 1.5, 2.6)
+    (axes,) = figure.axes
+    axes.semilogx(1e6 * shortest, 1e3 * loss, "o-", color=_BLUE)
+    value = answer.loss
+    axes.errorbar(
+        [1e6 * prepared.cut_off],
+        [1e3 * value.value],
+        yerr=[1e3 * value.uncertainty],
+        fmt="s",
+        color=_ORANGE,
+        label="answer, and its interval",
+        zorder=3,
+    )
+    axes.invert_xaxis()
+    axes.set(xlabel="shortest wave kept (µm)", ylabel="loss (mJ/m²)")
+    axes.set_ylim(bottom=0)
+    _plain_log(axes)
+    axes.legend(loc="best")
+    return figure, "Finer to the right. A loss that still changes at the answer is not converged."
+
+
+def _plain_log(axes: Axes) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axes.xaxis.set_major_locator(LogLocator(base=10, subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _tables(answer: Answer) -> tuple[Figure, str] | None:
+    cycle = answer.cycle
+    gammas = [(cycle.works_of_adhesion[0], answer.main)]
+    gammas += [(float(n.split()[1]), r) for n, _, r in answer.group("work of adhesion")]
+    depths = [(cycle.max_penetrations[0], answer.main)]
+    depths += [(float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    if len(gammas) + len(depths) < 4:
+        return None
+    figure = new_figure(3, 2, TWO_COLUMNS, 4.4, sharex="col")
+    panels = np.array(figure.axes).reshape(3, 2)
+    rows = (
+        ("loss", 1e3, "loss (mJ/m²)", answer.loss),
+        ("pull_off_stress", 1e-3, "pull-off (kPa)", answer.pull_off_stress),
+        ("contact_fraction", 1.0, "largest $A/A_0$", answer.contact_fraction),
+    )
+    for line, (key, by, label, quantity) in enumerate(rows):
+        for column, points in enumerate((sorted(gammas, key=_first), sorted(depths, key=_first))):
+            axes: Axes = panels[line, column]
+            x = [point[0] for point in points]
+            y = np.array([by * point[1][key] for point in points])
+            axes.errorbar(x, y, yerr=quantity.relative * np.abs(y), fmt="o-", color=_BLUE)
+            axes.set_ylim(bottom=0)
+        panels[line, 0].set_ylabel(label)
+    panels[2, 0].set_xlabel("work of adhesion γ (J/m²)")
+    panels[2, 1].set_xlabel(r"turning point $\Delta/h_{\max}$")
+    return figure, (
+        "Bars: the relative uncertainty of the answer, taken over to the other points, where it "
+        "was not measured."
+    )
+
+
+def _first(point: tuple[float, Any]) -> float:
+    return point[0]

@@ -1,0 +1,141 @@
+"""Instrument formats, through SurfaceTopography: an optional extra.
+
+``pip install adhesis[instruments]`` brings it. It is under the MIT licence, reads line scans as
+such (Dektak, Mahr, Mitutoyo, Igor, netCDF) beside some forty formats of maps, and its conventions
+differ by format: a physical size is n steps where the file tells the distance of first and last
+point, n - 1 steps. Here the step is always taken from its positions.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ensemble.errors import InputError
+from ensemble.trace.units import METRES, unit_named
+from solver.profile import Array
+
+HINT = "pip install 'adhesis[instruments]'"
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Positions and heights (NaN: not measured) of an instrument file in m, and what was read."""
+
+    positions: Array
+    heights: Array
+    said: str
+    tip_radius: float | None
+
+
+def available() -> bool:
+    """Whether the extra is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("SurfaceTopography") is not None
+
+
+def read_scan(path: Path, row: int | None = None, channel: int | None = None) -> Scan:
+    """Read a line scan, or one row of a map, from an instrument file.
+
+    Raises
+    ------
+    InputError
+        If no reader knows the file, it is damaged, it tells no length or unit, it holds a map and
+        no row is chosen, or the chosen channel or row is not there.
+    """
+    io = _library()
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the readers' own affairs
+        try:
+            reader = io.open_topography(str(path))
+            channels = list(reader.channels)
+        except Exception as error:  # every reader has failures of its own
+            raise InputError(
+                f"{path} is no instrument format that can be read: {_one_line(error)}"
+            ) from None
+        chosen = _channel(path, channels, channel)
+        try:
+            topography = reader.topography(channel_index=chosen.index)
+            heights: Array = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan)
+            positions, heights, where = _line(path, topography, heights, row)
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"{path} cannot be read as heights: {_one_line(error)}") from None
+    if topography.unit is None or topography.physical_sizes is None:
+        raise InputError(f"{path} tells no unit of its lengths: export it as text and give --unit")
+    metres = METRES[unit_named(str(topography.unit))]
+    name = getattr(type(reader), "_name", None) or reader.format()
+    label = f"{name}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
+    return Scan(positions * metres, heights * metres, label, _tip_radius(topography))
+
+
+def _library() -> ModuleType:
+    if not available():
+        raise InputError(f"an instrument's file needs the optional extra: {HINT}")
+    # Its NuMPI would start MPI as soon as it can import mpi4py; reading a file needs no ranks.
+    hidden = "mpi4py" not in sys.modules
+    if hidden:
+        sys.modules["mpi4py"] = None  # type: ignore[assignment]
+    try:
+        import SurfaceTopography.IO as io
+    finally:
+        if hidden:
+            del sys.modules["mpi4py"]
+    module: ModuleType = io
+    return module
+
+
+def _channel(path: Path, channels: list[Any], wanted: int | None) -> Any:
+    if wanted is not None:
+        if not 0 <= wanted < len(channels):
+            raise InputError(
+                f"--channel is {wanted}: {path} has the channels 0 to {len(channels) - 1}"
+            )
+        return channels[wanted]
+    heights = [c for c in channels if "height" in str(getattr(c, "data_kind", "height")).lower()]
+    if not heights:
+        names = ", ".join(f"{c.index} {c.name}" for c in channels) or "none"
+        raise InputError(f"{path} holds no channel of heights (its channels: {names})")
+    return heights[0]
+
+
+def _line(path: Path, topography: Any, heights: Array, row: int | None) -> tuple[Array, Array, str]:
+    """Positions and heights of the line scan, or of one row of a map, in the file's unit."""
+    if heights.ndim == 1:
+        if row is not None:
+            raise InputError(f"--row is {row}: {path} holds a line, no map")
+        return np.asarray(topography.positions(), dtype=float), heights, ""
+    points, rows = heights.shape
+    if row is None and rows > 1:
+        raise InputError(
+            f"{path} holds a map of {points} × {rows} heights: --row K takes one of its "
+            f"rows, 0 to {rows - 1}, as the trace"
+        )
+    row = row or 0
+    if not 0 <= row < rows:
+        raise InputError(f"--row is {row}: {path} has the rows 0 to {rows - 1}")
+    step = topography.physical_sizes[0] / points
+    where = f", row {row} of {rows}" if rows > 1 else ""
+    return step * np.arange(points), heights[:, row], where
+
+
+def _tip_radius(topography: Any) -> float | None:
+    try:
+        told = topography.info["instrument"]["parameters"]["tip_radius"]
+        return float(told["value"]) * METRES[unit_named(str(told["unit"]))]
+    except (KeyError, TypeError, ValueError, InputError):
+        return None
+
+
+def _one_line(error: Exception) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) < 160 else text[:157] + "..."

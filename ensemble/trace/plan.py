@@ -1,0 +1,292 @@
+"""What to run for an answer, what it will cost, and what would make it cheaper."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ensemble.trace.pool import cores
+from ensemble.trace.prepare import Prepared
+from ensemble.trace.worker import Job
+from solver.material import HalfSpace
+from solver.profile import Profile
+
+# Loops beyond this many waves are compared at a coarser cut-off when a doubt is measured.
+_MOST_WAVES_OF_VARIANTS = 8000
+_SECONDS_TO_HINT = 120.0
+
+# CPU seconds of a loop by `sharp`, 40 load steps: measured from 320 waves and 6 patches (0.9 s) to
+# 20,000 waves and 8 patches (35 s); a guess within a factor of about three.
+_SECONDS, _WAVES_POWER, _MANY_PATCHES = 1.1e-3, 0.85, 20.0
+_START = 2.0  # seconds for a process to start
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Contact and cycle of the answer, in SI units; the first value of each is the answer's."""
+
+    half_space: HalfSpace
+    works_of_adhesion: tuple[float, ...]
+    max_penetrations: tuple[float, ...]
+    load_steps: int = 40
+    method: str = "auto"
+    accuracy: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Run:
+    """One loop of the plan: the answer's, or one that differs from ``reference`` in one decision.
+
+    ``group`` is the doubt or the table that it belongs to.
+    """
+
+    name: str
+    group: str
+    said: str
+    changes: dict[str, Any] = field(default_factory=dict)
+    reference: str = "answer"
+    work_of_adhesion: float | None = None
+    max_penetration: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Runs, jobs and expected cost.
+
+    Attributes
+    ----------
+    seconds : dict
+        Expected CPU seconds by run.
+    waves, patches : int
+        Of the answer's loop; the patches are expected.
+    wall : float
+        Expected seconds on this machine's cores.
+    hints : tuple of str
+    """
+
+    runs: tuple[Run, ...]
+    jobs: tuple[Job, ...]
+    seconds: dict[str, float]
+    waves: int
+    patches: int
+    processes: int
+    wall: float
+    hints: tuple[str, ...]
+
+    @property
+    def said(self) -> str:
+        """The plan in two or three lines."""
+        lines = [
+            f"plan        {self.waves} waves, about {self.patches} patches at a time: "
+            f"{len(self.runs)} loops, about {clock(sum(self.seconds.values()))} of CPU time, "
+            f"{clock(self.wall)} on {self.processes} core{'s' if self.processes > 1 else ''}"
+        ]
+        return "\n".join(lines + [f"hint        {hint}" for hint in self.hints])
+
+
+def clock(seconds: float) -> str:
+    """A duration in words, no more exact than it is known."""
+    if seconds < 90:
+        return f"{max(1, round(seconds))} s"
+    if seconds < 5400:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def make_plan(
+    prepared: Prepared, cycle: Cycle, *, quick: bool = False, processes: int | None = None
+) -> Plan:
+    """List the loops of an answer and price them; nothing is run.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    cycle : Cycle
+    quick : bool
+        The loop and its doubts alone, without the tables against γ and turning point.
+    processes : int, optional
+        Processes side by side; without it all cores at hand.
+    """
+    processes = cores() if processes is None else processes
+    runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]
+    jobs, seconds = {}, {}
+    profiles: dict[str, Profile] = {}
+    for run in runs:
+        key = repr(sorted(run.changes.items()))
+        if key not in profiles:
+            profiles[key] = prepared.profile(**run.changes)
+        job = _job(run, profiles[key], cycle)
+        jobs[run.name] = job
+        seconds[run.name] = expected_seconds(profiles[key], job)
+    base = profiles[repr([])]
+    # The cheapest first, alone, as it makes the machine code; then the longest ones.
+    first = min(runs, key=lambda run: seconds[run.name])
+    order = sorted(runs, key=lambda run: (run is not first, -seconds[run.name]))
+    wall = max(
+        seconds[first.name] + (sum(seconds.values()) - seconds[first.name]) / processes,
+        max(seconds.values()),
+    )
+    plan = Plan(
+        runs=tuple(runs),
+        jobs=tuple(jobs[run.name] for run in order),
+        seconds=seconds,
+        waves=base.highest_harmonic,
+        patches=round(expected_patches(base, cycle.half_space, cycle.works_of_adhesion[0])),
+        processes=processes,
+        wall=wall + 2 * _START,
+        hints=(),
+    )
+    return Plan(**{**plan.__dict__, "hints": _hints(prepared, plan, quick)})
+
+
+def _doubts(prepared: Prepared) -> list[Run]:
+    """The answer's loop, and one more for each decision that could have been made otherwise."""
+    cut, step = prepared.cut_off, prepared.step
+    length = prepared.filled.size * step
+    runs = [Run("answer", "answer", "the loop")]
+
+    def cut_off(factor: float) -> None:
+        runs.append(
+            Run(
+                f"cut-off × {factor:.3g}",
+                "cut-off",
+                f"waves down to {factor * cut:.3g} m",
+                {"cut_off": factor * cut},
+            )
+        )
+
+    for factor in (16.0, 8.0, 4.0, 2.0, math.sqrt(2.0)):
+        if factor * cut <= length / 4:
+            cut_off(factor)
+    if cut / math.sqrt(2.0) >= 2.5 * step:
+        cut_off(1 / math.sqrt(2.0))
+
+    # On long traces doubts about the whole are measured with fewer waves, all else being equal.
+    factor = 1.0
+    while length / (factor * cut) > _MOST_WAVES_OF_VARIANTS and 2 * factor in (2.0, 4.0, 8.0, 16.0):
+        factor *= 2
+    reference = "answer" if factor == 1 else f"cut-off × {factor:.3g}"
+
+    def variant(name: str, group: str, said: str, **changes: Any) -> None:
+        kept = {} if factor == 1 else {"cut_off": factor * cut}
+        runs.append(Run(name, group, said, kept | changes, reference))
+
+    variant("taper 10 %", "continuation", "ends faded over a tenth", part=0.1)
+    for part in (0.05, 0.1):
+        variant(
+            f"blend {part:.0%}",
+            "continuation",
+            f"the end faded over the beginning, {part:.0%}",
+            continuation="blend",
+            part=part,
+        )
+    if 2 * factor * cut <= length / 4:
+        runs.append(
+            Run(
+                "mirror",
+                "mirror",
+                "trace and mirror image, twice as long a period",
+                {"continuation": "mirror", "cut_off": 2 * factor * cut},
+                f"cut-off × {2 * factor:.3g}",
+            )
+        )
+    variant(
+        f"degree {prepared.degree + 1}", "form", "one degree more off", degree=prepared.degree + 1
+    )
+    if prepared.degree > 1:
+        less = prepared.degree - 1
+        variant(f"degree {less}", "form", "one degree less off", degree=less)
+    if prepared.spectrum.noise > 0:
+        for seed in (1, 2) if factor == 1 else (1,):
+            runs.append(
+                Run(f"noise {seed}", "noise", "as much noise once more", {"noise_seed": seed})
+            )
+    return runs
+
+
+def _tables(cycle: Cycle) -> list[Run]:
+    runs = []
+    gammas, depths = cycle.works_of_adhesion, cycle.max_penetrations
+    for gamma in gammas[1:]:
+        runs.append(
+            Run(f"γ {gamma:g}", "work of adhesion", f"γ = {gamma:g} J/m²", work_of_adhesion=gamma)
+        )
+    for depth in depths[1:]:
+        runs.append(
+            Run(f"Δ {depth:g}", "turning point", f"Δ/h_max to {depth:g}", max_penetration=depth)
+        )
+    return runs
+
+
+def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
+    gamma, depth = cycle.works_of_adhesion[0], cycle.max_penetrations[0]
+    return Job(
+        name=run.name,
+        period=profile.period,
+        coefficients=profile.coefficients,
+        young=cycle.half_space.young,
+        poisson=cycle.half_space.poisson,
+        work_of_adhesion=gamma if run.work_of_adhesion is None else run.work_of_adhesion,
+        max_penetration=depth if run.max_penetration is None else run.max_penetration,
+        load_steps=cycle.load_steps,
+        method=cycle.method,
+        accuracy=cycle.accuracy,
+    )
+
+
+# ---------------------------------------------------------------------- price
+
+
+def expected_patches(profile: Profile, half_space: HalfSpace, work_of_adhesion: float) -> float:
+    """Guess of the most patches at a time.
+
+    Waves up to the mean one stay apart as far as the energy of full contact, E*/2 Σ q|a|² per area,
+    exceeds the work of adhesion; the exponent is fitted to loops of self-affine profiles.
+    """
+    a = np.abs(profile.coefficients) ** 2
+    m = np.arange(a.size)
+    full = 0.5 * half_space.modulus * float(np.sum(m * profile.q0 * a))
+    longest = float(np.sum(m * a) / np.sum(a))
+    ratio = max(work_of_adhesion / full, 1e-3)
+    return float(np.clip(1.2 * longest * ratio**-0.7, 1.0, 4 * profile.highest_harmonic))
+
+
+def expected_seconds(profile: Profile, job: Job) -> float:
+    """Guess of the CPU seconds of one loop."""
+    patches = expected_patches(profile, HalfSpace(job.young, job.poisson), job.work_of_adhesion)
+    steps = max(job.load_steps / 40, 0.5)
+    waves: float = profile.highest_harmonic**_WAVES_POWER
+    return _SECONDS * waves * patches * (1 + patches / _MANY_PATCHES) * steps
+
+
+def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
+    if plan.wall < _SECONDS_TO_HINT:
+        return ()
+    factor = 2.0
+    while plan.wall * factor**-_WAVES_POWER > _SECONDS_TO_HINT / 2 and factor < 64:
+        factor *= 2
+    hints = [
+        f"--cut-off {factor * prepared.cut_off:.2g} ({plan.waves / factor:.0f} waves) would take "
+        f"about {clock(plan.wall * factor**-_WAVES_POWER)}"
+    ]
+    if not quick:
+        tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]
+        saved = sum(plan.seconds[name] for name in tables) / plan.processes
+        hints.append(f"--quick leaves the tables out and saves about {clock(saved)}")
+    return tuple(hints)
+
+
+def default_tables(
+    work_of_adhesion: Sequence[float], max_penetration: Sequence[float]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Values of γ and turning points to run: those given, or half and twice, one and two thirds."""
+    gammas, depths = tuple(work_of_adhesion), tuple(max_penetration)
+    if len(gammas) == 1 and gammas[0] > 0:
+        gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
+    if len(depths) == 1:
+        depths = (depths[0], round(depths[0] / 3, 6), round(2 * depths[0] / 3, 6))
+    return gammas, depths

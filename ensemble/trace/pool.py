@@ -1,0 +1,144 @@
+"""Loops side by side in processes of their own on the cores at hand; no MPI."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ensemble.trace.worker import Job
+
+Result = dict[str, Any]
+Watch = Callable[["Pool"], None]
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Pool:
+    """Runs jobs, the first one alone, so that machine code is made once and not in every process.
+
+    Attributes
+    ----------
+    done : dict
+        Result by job name; a text where the loop failed.
+    running : dict
+        By job name: when it started (monotonic seconds), and branch and penetration it has come to.
+    """
+
+    def __init__(self, jobs: Sequence[Job], processes: int) -> None:
+        self.waiting = list(jobs)
+        self.processes = max(1, min(processes, len(self.waiting)))
+        self.done: dict[str, Result | str] = {}
+        self.running: dict[str, tuple[float, str, float]] = {}
+        self._inbox: queue.Queue[tuple[int, str, Any]] = queue.Queue()
+        self._workers: list[subprocess.Popen[bytes]] = []
+        self._job_of: dict[int, Job] = {}
+
+    def run(self, watch: Watch | None = None, every: float = 1.0) -> dict[str, Result | str]:
+        """Run all jobs; ``watch`` is called every so many seconds, and when a loop is done."""
+        try:
+            self._start()
+            last = time.monotonic()
+            while len(self._job_of) > 0:
+                try:
+                    worker, kind, content = self._inbox.get(timeout=every)
+                except queue.Empty:
+                    pass
+                else:
+                    self._take(worker, kind, content)
+                    if kind == "progress" and time.monotonic() - last < every:
+                        continue
+                last = time.monotonic()
+                if watch is not None:
+                    watch(self)
+        finally:
+            self._stop()
+        return self.done
+
+    def _start(self) -> None:
+        worker = len(self._workers)
+        root = str(Path(__file__).resolve().parents[2])
+        path = os.environ.get("PYTHONPATH")
+        environment = os.environ | dict.fromkeys(_ONE_THREAD, "1")
+        environment["PYTHONPATH"] = root + (os.pathsep + path if path else "")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "ensemble.trace.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+        )
+        self._workers.append(process)
+        threading.Thread(target=self._listen, args=(worker, process), daemon=True).start()
+        self._hand_out(worker)
+
+    def _listen(self, worker: int, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdout is not None
+        while True:
+            try:
+                kind, content = pickle.load(process.stdout)
+            except (EOFError, pickle.UnpicklingError, OSError, ValueError):
+                self._inbox.put((worker, "gone", process.wait()))
+                return
+            self._inbox.put((worker, kind, content))
+
+    def _hand_out(self, worker: int) -> None:
+        if not self.waiting:
+            self._job_of.pop(worker, None)
+            return
+        job = self.waiting.pop(0)
+        self._job_of[worker] = job
+        self.running[job.name] = (time.monotonic(), "loading", 0.0)
+        stdin = self._workers[worker].stdin
+        assert stdin is not None
+        try:
+            pickle.dump(job, stdin)
+            stdin.flush()
+        except BrokenPipeError:
+            pass  # its end is on its way through the inbox
+
+    def _take(self, worker: int, kind: str, content: Any) -> None:
+        job = self._job_of.get(worker)
+        if job is None:
+            return
+        if kind == "progress":
+            self.running[job.name] = (self.running[job.name][0], *content)
+            return
+        del self.running[job.name]
+        if kind == "gone":
+            self.done[job.name] = f"its process ended with code {content}"
+            del self._job_of[worker]
+            if self.waiting and not self._job_of:
+                self._start()
+            return
+        self.done[job.name] = content
+        self._hand_out(worker)
+        while self.waiting and len(self._job_of) < self.processes:
+            self._start()
+
+    def _stop(self) -> None:
+        for process in self._workers:
+            if process.stdin is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    process.stdin.close()
+        for process in self._workers:
+            if self._job_of:
+                process.terminate()
+            try:
+                process.wait(timeout=10)
+            except subprocess.TimeoutExpired:
+                process.kill()

@@ -1,0 +1,380 @@
+"""From a trace to level heights and a cut-off: each step explicit, and on the record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from ensemble.errors import InputError
+from ensemble.trace.read import Trace
+from solver.profile import Array, Profile
+from solver.trace import (
+    Continuation,
+    TraceSpectrum,
+    band_limited,
+    form_shares,
+    one_period,
+    polynomial_form,
+    trace_spectrum,
+    trusted_wavelength,
+)
+
+MOST_DEGREE = 6
+
+# A spike stands out of the four heights on either side by so many robust standard deviations.
+_SIDE, _SPIKE = 4, 10.0
+_MOST_SPIKES = 0.01
+# A gap is interpolated up to this length: so many steps, or this share of the trace.
+_GAP_STEPS, _GAP_SHARE = 5, 0.01
+_MOST_MISSING = 0.10
+# A form stands out of the six degrees above it by this factor in mean square height.
+_FORM, _FORM_TO = 8.0, 4
+# Of the mean square height, the share of the two longest waves at which they decide alone.
+_LONG_WAVES = 0.5
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the preparation: what was done, in words and in numbers (SI)."""
+
+    name: str
+    said: str
+    numbers: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A trace ready for the loop, with everything that was decided on the way.
+
+    Attributes
+    ----------
+    trace : Trace
+    filled : array, shape (n,)
+        Heights in m without outliers and gaps, not yet level.
+    degree : int
+        Degree of the polynomial that is taken off.
+    cut_off : float
+        Shortest wavelength kept, in m.
+    limits : dict
+        Shortest wavelength that the trace can be trusted with, by what limits it, in m.
+    spectrum : TraceSpectrum
+        Of the level heights.
+    steps : tuple of Step
+    warnings : tuple of str
+    """
+
+    trace: Trace
+    filled: Array
+    gaps: Array
+    outliers: int
+    degree: int
+    cut_off: float
+    limits: dict[str, float]
+    spectrum: TraceSpectrum
+    steps: tuple[Step, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def step(self) -> float:
+        """Step in m."""
+        return self.trace.step
+
+    def level(self, degree: int | None = None) -> Array:
+        """Heights less their form, in m; of another degree on demand."""
+        return self.filled - polynomial_form(self.filled, self.degree if degree is None else degree)
+
+    def profile(
+        self,
+        *,
+        degree: int | None = None,
+        continuation: Continuation = "taper",
+        part: float = 0.05,
+        cut_off: float | None = None,
+        noise_seed: int | None = None,
+    ) -> Profile:
+        """One period of a profile made of the trace, with one decision made otherwise on demand.
+
+        ``noise_seed`` adds once more what the instrument adds: white noise of the estimated size.
+        """
+        heights = self.level(degree)
+        if noise_seed is not None:
+            noise = np.random.default_rng(noise_seed).standard_normal(heights.size)
+            heights = heights + self.spectrum.noise * noise
+        period, length = one_period(heights, self.step, continuation, part)
+        return band_limited(period, length, self.cut_off if cut_off is None else cut_off)
+
+
+def prepare_trace(
+    trace: Trace,
+    *,
+    degree: int | None = None,
+    cut_off: float | None = None,
+    tip_radius: float | None = None,
+    longest_gap: float | None = None,
+    keep_outliers: bool = False,
+    invert: bool = False,
+) -> Prepared:
+    """Fill gaps, take outliers and form off, and choose the shortest wave to keep.
+
+    Parameters
+    ----------
+    trace : Trace
+    degree : int, optional
+        Of the polynomial that is taken off, 0 … 6; without it 1 (tilt), or more where a form
+        stands out.
+    cut_off : float, optional
+        Shortest wavelength kept, in m; without it the longest of the limits that step, noise and
+        tip set (:func:`solver.trace.trusted_wavelength`).
+    tip_radius : float, optional
+        In m; without it that of the file, if it tells one.
+    longest_gap : float, optional
+        Drop-outs up to this length (m) are interpolated, longer ones refused.
+    keep_outliers : bool
+    invert : bool
+        Turn the heights over: for an instrument whose z points into the sample.
+
+    Raises
+    ------
+    InputError
+        If a gap is too long, too much is missing, or a value breaks its rule.
+    """
+    steps: list[Step] = []
+    warnings: list[str] = []
+    heights = -trace.heights if invert else trace.heights.copy()
+    if invert:
+        steps.append(Step("turned over", "heights turned over: z pointed into the sample"))
+    heights = _without_ends(heights, trace, steps)
+    count = 0
+    if not keep_outliers:
+        heights, count = _without_outliers(heights, steps, warnings)
+    filled, gaps = _filled(heights, trace, longest_gap, steps)
+    chosen = _degree(filled, degree, steps, warnings)
+    level = filled - polynomial_form(filled, chosen)
+    rms = float(np.sqrt(np.mean(level**2)))
+    steps[-1].numbers["rms_level"] = rms
+    if rms <= 1e-12 * float(np.ptp(filled)):
+        raise InputError(f"{trace.path} is flat when level: nothing is left but rounding")
+    spectrum = trace_spectrum(level, trace.step)
+    radius = trace.tip_radius if tip_radius is None else tip_radius
+    limits = trusted_wavelength(spectrum, trace.step, radius or 0.0)
+    shortest = _cut_off(trace, filled.size, cut_off, limits, radius, spectrum, steps, warnings)
+    _long_waves(spectrum, rms, warnings)
+    return Prepared(
+        trace=trace,
+        filled=filled,
+        gaps=gaps,
+        outliers=count,
+        degree=chosen,
+        cut_off=shortest,
+        limits=limits,
+        spectrum=spectrum,
+        steps=tuple(steps),
+        warnings=tuple(warnings),
+    )
+
+
+# ---------------------------------------------------------------------- gaps and outliers
+
+
+def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
+    """Cut missing heights off both ends: there is nothing to interpolate between."""
+    good = np.flatnonzero(np.isfinite(heights))
+    first, last = int(good[0]), int(good[-1]) + 1
+    lost = heights.size - (last - first)
+    if lost:
+        steps.append(
+            Step(
+                "ends",
+                f"{lost} missing heights at the ends cut off",
+                {"points": lost, "length": lost * trace.step},
+            )
+        )
+    return heights[first:last]
+
+
+def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) -> tuple[Array, int]:
+    known = np.isfinite(heights)
+    row = heights[known]
+    around = sliding_window_view(np.pad(row, _SIDE, mode="edge"), 2 * _SIDE + 1)
+    left = np.median(around[:, :_SIDE], axis=1)
+    right = np.median(around[:, _SIDE + 1 :], axis=1)
+    # Beyond both sides: the edge of a step is beyond one only.
+    rest = np.maximum(row - np.maximum(left, right), np.minimum(left, right) - row)
+    spread = 1.4826 * float(np.median(np.abs(row - (left + right) / 2)))
+    # Crests of a smooth or saw-like trace stand out by no more than its sides rise.
+    spread = max(spread, 0.15 * float(np.median(np.abs(right - left))), 1e-6 * float(np.std(row)))
+    spikes = rest > _SPIKE * spread
+    count = int(spikes.sum())
+    if not count:
+        return heights, 0
+    if count > max(3, _MOST_SPIKES * row.size):
+        warnings.append(
+            f"{count} heights stand {_SPIKE:g} standard deviations out of their surroundings: too "
+            "many for outliers, so they stay; is the surface made of steps, or the trace faulty?"
+        )
+        return heights, 0
+    found = heights.copy()
+    found[np.flatnonzero(known)[spikes]] = np.nan
+    highest = float(rest[spikes].max())
+    steps.append(
+        Step(
+            "outliers",
+            f"{count} outliers of up to {highest:.3g} m taken out, as drop-outs are",
+            {"points": count, "highest": highest},
+        )
+    )
+    return found, count
+
+
+def _filled(
+    heights: Array, trace: Trace, longest: float | None, steps: list[Step]
+) -> tuple[Array, Array]:
+    """Heights with their gaps filled by straight lines, and which those were."""
+    gaps = ~np.isfinite(heights)
+    if not gaps.any():
+        return heights, gaps
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], gaps, [False]]).astype(int)))
+    starts, ends = edges[::2], edges[1::2]
+    longest_here = float((ends - starts).max() + 1) * trace.step
+    allowed = (
+        max(_GAP_STEPS * trace.step, _GAP_SHARE * heights.size * trace.step)
+        if longest is None
+        else longest
+    )
+    if longest_here > allowed * (1 + 1e-9):
+        at = int(starts[np.argmax(ends - starts)]) * trace.step
+        raise InputError(
+            f"{trace.path} has a gap of {longest_here:.3g} m at {at:.3g} m: up to {allowed:.3g} m "
+            "is interpolated (--longest-gap)"
+        )
+    share = float(gaps.mean())
+    if share > _MOST_MISSING:
+        raise InputError(
+            f"{trace.path} lacks {share:.1%} of its heights: up to {_MOST_MISSING:.0%} may lack"
+        )
+    place = np.arange(heights.size)
+    filled = heights.copy()
+    filled[gaps] = np.interp(place[gaps], place[~gaps], heights[~gaps])
+    steps.append(
+        Step(
+            "drop-outs",
+            f"{int(gaps.sum())} heights ({share:.2%}) in {starts.size} gaps interpolated by "
+            f"straight lines, the longest over {longest_here:.3g} m",
+            {"points": int(gaps.sum()), "gaps": starts.size, "longest": longest_here},
+        )
+    )
+    return filled, gaps
+
+
+# ---------------------------------------------------------------------- form
+
+
+def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list[str]) -> int:
+    """Degree of the form, chosen or given, with its step; a form left in is warned of."""
+    if wanted is not None and not 0 <= wanted <= MOST_DEGREE:
+        raise InputError(f"--degree is {wanted}: it must lie between 0 and {MOST_DEGREE}")
+    shares = form_shares(filled)
+    stands_out = [d for d in range(2, _FORM_TO + 1) if _is_form(shares, d)]
+    found = max(stands_out, default=1)
+    degree = found if wanted is None else wanted
+    line = filled[-1] - filled[0] if degree else 0.0
+    fit = polynomial_form(filled, degree)
+    names = {0: "mean", 1: "tilt", 2: "tilt and bow"}
+    name = names.get(degree, f"form of degree {degree}")
+    bow = float(np.ptp(fit - polynomial_form(filled, min(1, degree))))
+    why = "as given"
+    if wanted is None:
+        why = (
+            "a form stands out of the roughness"
+            if found > 1
+            else "no form beyond a tilt stands out"
+        )
+    said = f"{name} taken off ({why})"
+    numbers = {"degree": degree, "rise": float(line)}
+    if bow > 0:
+        said += f": {bow:.3g} m from lowest to highest beside the tilt"
+        numbers["form_height"] = bow
+    steps.append(Step("form", said, numbers))
+    if wanted is not None and found > wanted:
+        left = float(np.sqrt(shares[wanted + 1 : found + 1].sum()))
+        warnings.append(
+            f"a form of degree {found} remains ({left:.3g} m rms, as of a curved sample or guide): "
+            f"it counts as roughness with --degree {wanted}"
+        )
+    elif degree < found + 1 <= _FORM_TO and wanted is None and _is_form(shares, found + 1):
+        warnings.append("a form of a higher degree may remain")
+    return degree
+
+
+def _is_form(shares: Array, degree: int) -> bool:
+    above = shares[degree + 1 : degree + 7]
+    return above.size > 0 and bool(shares[degree] > _FORM * above.max())
+
+
+def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> None:
+    q, power = spectrum.wave_number, spectrum.power
+    # The bands at the long end hold one wave each, q0 apart: a wave's mean square is 2 C q0/2π.
+    share = float(2 * power[:2].sum() * q[0] / (2 * np.pi) / rms**2)
+    if share > _LONG_WAVES:
+        warnings.append(
+            f"waves longer than a third of the trace hold {min(share, 1.0):.0%} of the mean square "
+            "height: they decide the loss, and one trace has only one or two of them; measure a "
+            "longer one, or several, or take the form off (--degree)"
+        )
+
+
+# ---------------------------------------------------------------------- cut-off
+
+
+def _cut_off(
+    trace: Trace,
+    points: int,
+    wanted: float | None,
+    limits: dict[str, float],
+    radius: float | None,
+    spectrum: TraceSpectrum,
+    steps: list[Step],
+    warnings: list[str],
+) -> float:
+    length = points * trace.step
+    by = max(limits, key=lambda name: limits[name])
+    shortest = limits[by]
+    reasons = {
+        "step": "five steps",
+        "noise": "below it the noise of the instrument",
+        "tip": f"what a tip of radius {radius or 0:.3g} m follows",
+    }
+    if wanted is not None:
+        if not 2.2 * trace.step <= wanted <= length / 2:
+            raise InputError(
+                f"--cut-off is {wanted:g} m: it must lie between 2.2 steps "
+                f"({2.2 * trace.step:.3g} m) and half the length ({length / 2:.3g} m)"
+            )
+        if wanted < shortest * (1 - 1e-9):
+            warnings.append(
+                f"the cut-off {wanted:.3g} m is shorter than what the trace can be trusted with, "
+                f"{shortest:.3g} m ({reasons[by]})"
+            )
+        shortest, why = wanted, "as given"
+    else:
+        why = reasons[by]
+        if shortest > length / 4:
+            raise InputError(
+                f"{trace.path} holds no roughness above its noise: waves can be trusted from "
+                f"{shortest:.3g} m on, and it is {length:.3g} m long (--cut-off to go on)"
+            )
+    noise = f"; white noise of {spectrum.noise:.3g} m rms" if spectrum.floor > 0 else ""
+    steps.append(
+        Step(
+            "cut-off",
+            f"waves shorter than {shortest:.4g} m dropped ({why}){noise}",
+            {
+                "cut_off": shortest,
+                "noise_rms": spectrum.noise,
+                **{f"limit_{k}": v for k, v in limits.items()},
+            },
+        )
+    )
+    return shortest

@@ -1,0 +1,374 @@
+"""Reading a trace: equally spaced heights in m, and what was understood of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ensemble.errors import InputError
+from ensemble.trace.instrument import available, read_scan
+from ensemble.trace.text import Table, read_table
+from ensemble.trace.units import METRES, parse_units, step_of_header, units_of_header
+from solver.profile import Array
+
+FEWEST_POINTS = 32
+MOST_POINTS = 5_000_000
+TEXT = frozenset(("txt", "csv", "tsv", "dat", "asc", "prn", "xy", "xyz", "tab", "text", "prf"))
+
+# Positions may scatter about equal steps by so much of a step, and are put on equal steps.
+_UNEVEN = 0.10
+# Without a unit, numbers are taken as metres only where nothing else is likely.
+_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES, _HIGHEST_IN_METRES = 0.02, 2e-5, 1e-3
+# What no trace of a rough surface is.
+_LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
+# A height so many times the range of the others beyond it, and of such a form, stands for none.
+_BEYOND = 5.0
+_SENTINELS = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A measured trace on equal steps.
+
+    Attributes
+    ----------
+    path : Path
+    heights : array, shape (n,)
+        In m; NaN where the instrument has none.
+    step : float
+        In m.
+    said : tuple of str
+        How the file was understood, line by line.
+    tip_radius : float or None
+        In m, where the file tells it.
+    """
+
+    path: Path
+    heights: Array
+    step: float
+    said: tuple[str, ...] = ()
+    tip_radius: float | None = None
+
+    @property
+    def points(self) -> int:
+        """Number of heights."""
+        return int(self.heights.size)
+
+    @property
+    def length(self) -> float:
+        """From the first to the last point, in m."""
+        return (self.points - 1) * self.step
+
+    @property
+    def drop_outs(self) -> int:
+        """Number of heights that are missing."""
+        return int(np.isnan(self.heights).sum())
+
+    @property
+    def height_range(self) -> float:
+        """Highest less lowest height, in m."""
+        return float(np.nanmax(self.heights) - np.nanmin(self.heights))
+
+
+def read_trace(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    step: float | None = None,
+    columns: Sequence[int] | None = None,
+    row: int | None = None,
+    channel: int | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+) -> Trace:
+    """Read a measured trace from a text or an instrument file.
+
+    Parameters
+    ----------
+    path : path
+        Text of two columns (positions, heights) or of one (heights), a .npy of that shape, or an
+        instrument's file (extra ``instruments``).
+    unit : str, optional
+        Unit of both columns of a text ("um"), or of positions and heights ("mm,um"). Without it,
+        the header must tell, or the numbers must be sure to be metres.
+    step : float, optional
+        Step in m, for heights without positions.
+    columns : two ints, optional
+        Which columns of a text are positions and heights, from 1.
+    row, channel : int, optional
+        Row of a map and channel of an instrument file, from 0.
+    delimiter, decimal : str, optional
+        Where a text can be read in two ways.
+
+    Raises
+    ------
+    InputError
+        With one sentence, if the file cannot be read or cannot be understood beyond doubt.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a directory: a trace is a file")
+    if not path.exists():
+        raise InputError(f"cannot read {path}: there is no such file")
+    if path.suffix.lower() == ".npy":
+        return _from_array(path, unit, step)
+    if _is_text(path):
+        table = read_table(path, delimiter, decimal)
+        return _from_table(path, table, unit, step, columns)
+    for name, value in (("--unit", unit), ("--step", step), ("--columns", columns)):
+        if value is not None:
+            raise InputError(f"{name} belongs to texts: an instrument's file tells its own lengths")
+    if not available():
+        # Say which of both is missing: the extra, or any sense in the file.
+        raise InputError(
+            f"{path} is no text: an instrument's file needs the optional extra, "
+            "pip install 'adhesis[instruments]'"
+        )
+    scan = read_scan(path, row, channel)
+    heights, step, said = _even(path, scan.positions, scan.heights, None)
+    return _checked(Trace(path, heights, step, (scan.said, *said), scan.tip_radius), told=True)
+
+
+def _is_text(path: Path) -> bool:
+    try:
+        with path.open("rb") as stream:
+            begin = stream.read(4096)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from None
+    if not begin.strip():
+        raise InputError(f"{path} is empty")
+    if begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return True
+    # Text formats of instruments: a header of their own, then numbers that are no two columns.
+    if begin[:8] in (b"aISO-1.0", b"aBCR-1.0", b"aISO-2.0") or begin[:7] in (
+        b"fileFor",
+        b"bISO-1.",
+    ):
+        return False
+    if path.suffix.lower().lstrip(".") in TEXT:
+        return True
+    return b"\0" not in begin and not begin.startswith((b"PK\x03\x04", b"\x89HDF", b"CDF"))
+
+
+def _from_array(path: Path, unit: str | None, step: float | None) -> Trace:
+    try:
+        table = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path} is no .npy of numbers: {error}") from None
+    if table.dtype.kind not in "fiu" or table.ndim not in (1, 2):
+        raise InputError(f"{path} holds {table.dtype} of {table.ndim} dimensions: no trace")
+    if table.ndim == 2 and 2 in table.shape:
+        columns = np.asarray(table if table.shape[0] == 2 else table.T, dtype=float)
+    elif table.ndim == 1 or 1 in table.shape:
+        columns = np.asarray(table, dtype=float).reshape(1, -1)
+    else:
+        shape = " × ".join(map(str, table.shape))
+        raise InputError(f"{path} holds {shape} numbers: a trace has one column or two")
+    lines = np.arange(1, columns.shape[1] + 1)
+    return _from_table(path, Table(columns, (), (), lines, " ", "."), unit, step, None)
+
+
+def _from_table(
+    path: Path, table: Table, unit: str | None, step: float | None, wanted: Sequence[int] | None
+) -> Trace:
+    columns, fields = table.columns, list(table.fields)
+    if wanted is not None:
+        if len(wanted) != 2 or not all(1 <= w <= len(columns) for w in wanted):
+            raise InputError(
+                f"--columns is {','.join(map(str, wanted))}: positions and heights, two of the "
+                f"{len(columns)} columns of {path}"
+            )
+        columns = columns[[w - 1 for w in wanted]]
+        fields = [tuple(row[w - 1] for w in wanted) for row in fields]
+    elif len(columns) > 2:
+        raise InputError(
+            f"{path} has {len(columns)} columns: --columns X,Z says which are positions and heights"
+        )
+    if columns.shape[1] < FEWEST_POINTS:
+        raise InputError(
+            f"{path} holds {columns.shape[1]} rows of numbers: at least {FEWEST_POINTS}"
+        )
+    if columns.shape[1] > MOST_POINTS:
+        raise InputError(f"{path} holds {columns.shape[1]} rows of numbers: at most {MOST_POINTS}")
+    said = [
+        f"text, {table.said}" if table.fields or table.header or path.suffix != ".npy" else "npy"
+    ]
+    heights, gaps = _without_sentinels(columns[-1])
+    columns = np.vstack([columns[:-1], heights])
+    (x_unit, z_unit), source = _units(path, table, fields, unit, columns, step)
+    heights = heights * METRES[z_unit]
+    positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
+    said.append(f"{positions}heights in {z_unit} ({source})")
+    if gaps:
+        said.append(gaps)
+    if len(columns) == 2:
+        if step is not None:
+            raise InputError(f"--step belongs to heights without positions: {path} has positions")
+        heights, step, more = _even(path, columns[0] * METRES[x_unit], heights, table.lines)
+        said.extend(more)
+    elif step is None:
+        step = step_of_header(table.header, table.decimal)
+        if step is None:
+            raise InputError(
+                f"{path} has heights without positions, and its header tells no step: give --step"
+            )
+        said.append(f"step {step:.6g} m (header)")
+    return _checked(Trace(path, heights, float(step), tuple(said)), told=source != "numbers")
+
+
+# ---------------------------------------------------------------------- units
+
+
+def _units(
+    path: Path,
+    table: Table,
+    fields: Sequence[Sequence[str]],
+    unit: str | None,
+    columns: Array,
+    step: float | None,
+) -> tuple[tuple[str, str], str]:
+    told = units_of_header(table.header, fields)
+    told = [*told, *told][:2] if len(columns) == 1 else told
+    if unit is not None:
+        given = parse_units(unit)
+        for name, known, wanted in zip(("positions", "heights"), told, given, strict=True):
+            if known not in (None, wanted) and not (len(columns) == 1 and name == "positions"):
+                raise InputError(
+                    f"--unit says {wanted} and the header of {path} {known} for the {name}: take "
+                    "the wrong one out"
+                )
+        return given, "--unit"
+    if told[0] is not None and told[1] is not None:
+        return (told[0], told[1]), "header"
+    if told[0] is not None or told[1] is not None:
+        known = "positions" if told[0] else "heights"
+        raise InputError(
+            f"the header of {path} tells the unit of the {known} alone: give --unit X,Z, "
+            "as in --unit mm,um"
+        )
+    if _sure_to_be_metres(columns, step):
+        return ("m", "m"), "numbers"
+    x = columns[0]
+    size = (
+        f"positions from {np.nanmin(x):g} to {np.nanmax(x):g}"
+        if len(columns) > 1
+        else (f"heights from {np.nanmin(x):g} to {np.nanmax(x):g}")
+    )
+    raise InputError(
+        f"{path} tells no unit, and {size} need not be metres: give --unit, as in --unit um"
+    )
+
+
+def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
+    heights = columns[-1][np.isfinite(columns[-1])]
+    if (
+        heights.size == 0
+        or np.percentile(heights, 99) - np.percentile(heights, 1) > _HIGHEST_IN_METRES
+    ):
+        return False
+    if len(columns) == 1:
+        return step is not None
+    x = columns[0][np.isfinite(columns[0])]
+    if x.size < 2:
+        return False
+    length = float(x.max() - x.min())
+    return length <= _LONGEST_IN_METRES and length / (x.size - 1) <= _WIDEST_STEP_IN_METRES
+
+
+# ---------------------------------------------------------------------- gaps and steps
+
+
+def _without_sentinels(heights: Array) -> tuple[Array, str]:
+    """Heights with NaN for numbers that stand for "none", and a sentence on them."""
+    good = heights[np.isfinite(heights)]
+    for value in (good.min(), good.max()) if good.size else ():
+        others = good[good != value]
+        if others.size < 2:
+            continue
+        width = max(float(np.ptp(others)), 1e-300)
+        away = min(abs(value - others.min()), abs(value - others.max()))
+        times = int(np.sum(good == value))
+        if away > _BEYOND * width and (times >= 3 or _is_sentinel(float(value))):
+            found = np.where(heights == value, np.nan, heights)
+            return found, f"{times} heights of {value:g} taken as drop-outs: far out of the range"
+    return np.where(np.isfinite(heights), heights, np.nan), ""
+
+
+def _is_sentinel(value: float) -> bool:
+    return abs(value) >= 1e20 or any(abs(abs(value) - s) <= 1.0 for s in _SENTINELS)
+
+
+def _even(
+    path: Path, x: Array, heights: Array, lines: Array | None
+) -> tuple[Array, float, list[str]]:
+    """Heights on equal steps, the step in m, and what was done for it."""
+    said: list[str] = []
+    where = "point {} of {}" if lines is None else "line {} of {}"
+
+    def place(k: int) -> str:
+        return where.format(k if lines is None else int(lines[k]), path)
+
+    if not np.all(np.isfinite(x)):
+        raise InputError(f"{place(int(np.argmin(np.isfinite(x))))} has no position")
+    steps = np.diff(x)
+    if np.all(steps < 0):
+        x, heights, steps = x[::-1], heights[::-1], -steps[::-1]
+        said.append("positions ran backwards: turned round")
+    elif np.any(steps <= 0):
+        back = int(np.argmax(steps <= 0)) + 1
+        word = "stand still" if steps[back - 1] == 0 else "turn back"
+        raise InputError(f"the positions {word} at {place(back)}: a trace goes one way")
+    middle = float(np.median(steps))
+    apart = np.rint(steps / middle).astype(int)
+    if apart.sum() > 4 * heights.size or apart.min() < 1:
+        far = int(np.argmax(np.abs(steps - middle)))
+        raise InputError(
+            f"the steps of the positions are unequal: {middle:.4g} m mostly, {steps[far]:.4g} m at "
+            f"{place(far + 1)}"
+        )
+    index = np.concatenate([[0], np.cumsum(apart)])
+    step = float((x[-1] - x[0]) / index[-1])
+    off = np.abs(x - x[0] - index * step)
+    if off.max() > _UNEVEN * step:
+        # Drift of the scanner: the number of steps is right, the places are not.
+        if np.all(apart == 1) and np.abs(steps / step - 1).max() <= _UNEVEN:
+            even = np.linspace(x[0], x[-1], x.size)
+            said.append(
+                f"unequal steps ({np.abs(steps / step - 1).max():.1%}) put on equal ones, linearly"
+            )
+            return np.interp(even, x, heights), step, said
+        far = int(np.argmax(off))
+        raise InputError(
+            f"the steps of the positions are unequal: {step:.4g} m on average, and "
+            f"{place(far)} is {off[far] / step:.2g} steps away from where it should be"
+        )
+    if index[-1] + 1 > x.size:
+        whole = np.full(index[-1] + 1, np.nan)
+        whole[index] = heights
+        said.append(f"{whole.size - x.size} positions left out: taken as drop-outs")
+        heights = whole
+    return heights, step, said
+
+
+def _checked(trace: Trace, told: bool) -> Trace:
+    """Refuse what is no trace of a rough surface in the units that were understood."""
+    good = trace.heights[np.isfinite(trace.heights)]
+    if good.size < FEWEST_POINTS:
+        raise InputError(f"{trace.path} holds {good.size} heights: at least {FEWEST_POINTS}")
+    if np.ptp(good) == 0:
+        raise InputError(f"{trace.path}: every height is {good[0]:g} m: a flat trace has no loss")
+    if not _SHORTEST <= trace.length <= _LONGEST:
+        raise InputError(
+            f"{trace.path} would be {trace.length:.3g} m long: is its unit right (--unit)?"
+        )
+    steps = np.abs(np.diff(trace.heights))
+    slope = float(np.nanmedian(steps) / trace.step)
+    if slope > _STEEPEST:
+        raise InputError(
+            f"{trace.path} would rise by {slope:.3g} times its step from point to point: are "
+            "positions and heights in the same unit (--unit X,Z)?"
+        )
+    return trace

@@ -1,0 +1,272 @@
+"""A text of one or two columns: its delimiter, its decimal sign, its header, its gaps."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ensemble.errors import InputError
+from solver.profile import Array
+
+MOST_BYTES = 200_000_000
+_SAMPLE = 400  # lines that the form of a file is judged by
+
+DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
+_COMMENT = "#%!*"
+_MISSING = frozenset(
+    ("", "nan", "-nan", "nan(ind)", "-1.#ind", "1.#qnan", "inf", "-inf", "+inf", "-", "--", "---",
+     "----", "*", "**", "***", "bad", "n/a", "na", "#n/a", "null", "none", "nil", "invalid",
+     "missing", "nd", "overflow", "underflow", "x", "?")
+)  # fmt: skip
+_NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The numbers of a text file.
+
+    Attributes
+    ----------
+    columns : array, shape (k, n)
+        NaN where a number is missing.
+    header : tuple of str
+        Lines before the numbers, without their comment signs.
+    fields : tuple of tuple of str
+        Those header lines that have as many fields as the numbers, split up.
+    lines : int array, shape (n,)
+        Line of the file that each row stands on, from 1.
+    delimiter, decimal : str
+    """
+
+    columns: Array
+    header: tuple[str, ...]
+    fields: tuple[tuple[str, ...], ...]
+    lines: Array
+    delimiter: str
+    decimal: str
+
+    @property
+    def said(self) -> str:
+        """How the numbers are written, in words."""
+        count = len(self.columns)
+        form = "one column" if count == 1 else f"{count} columns, {DELIMITERS[self.delimiter]}"
+        return form + (", decimal commas" if self.decimal == "," else "")
+
+
+def read_table(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Table:
+    """Read a text of numbers in columns, whatever its header, delimiter and decimal sign.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is no text, holds no columns of numbers, or can be read in two
+        ways; the sentence says which line, and which option would settle it.
+    """
+    lines = _lines(path)
+    sample = [line for line in lines if _looks_like_numbers(line)]
+    if not sample:
+        raise InputError(f"{path} holds no line of numbers")
+    spread = sample[:: max(1, len(sample) // _SAMPLE)]
+    delimiter, decimal = _form(path, spread, delimiter, decimal)
+    split = [_split(line, delimiter) if _looks_like_numbers(line) else None for line in lines]
+    count = Counter(len(row) for row in split if row is not None).most_common(1)[0][0]
+    start = _first_row(split, count, decimal)
+    if start is None:
+        raise InputError(f"{path} holds no rows of numbers of one length")
+    header = [line.strip().lstrip(_COMMENT).strip() for line in lines[:start]]
+    rows, places = _rows(path, lines, start, count, delimiter, decimal)
+    fields = [tuple(_split(line, delimiter, header=True)) for line in header]
+    return Table(
+        columns=np.array(rows).T.reshape(count, -1),
+        header=tuple(line for line in header if line),
+        fields=tuple(row for row in fields if len(row) == count),
+        lines=np.array(places),
+        delimiter=delimiter,
+        decimal=decimal,
+    )
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise InputError(f"{path} holds {size / 1e6:.0f} MB: at most {MOST_BYTES // 10**6} MB")
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from None
+    if not data.strip():
+        raise InputError(f"{path} is empty")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        if b"\0" in data[:100_000]:
+            raise InputError(f"{path} is neither text nor an instrument format that can be read")
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")  # one byte a sign: µ and Å are where they should be
+    return text.splitlines()
+
+
+# ---------------------------------------------------------------------- form
+
+
+def _looks_like_numbers(line: str) -> bool:
+    """Whether a line begins as a row of numbers, or of numbers and gaps, does."""
+    begin = line.strip()
+    if not begin or begin[0] in _COMMENT:
+        return False
+    found = _NUMBER.match(begin)
+    if not found:
+        return False
+    rest = begin[found.end() :]
+    return not rest or rest[0] in ";,\t |"
+
+
+def _form(
+    path: Path, sample: Sequence[str], delimiter: str | None, decimal: str | None
+) -> tuple[str, str]:
+    """Delimiter and decimal sign, given or found out."""
+    if delimiter is None:
+        delimiter = _delimiter(path, sample, decimal)
+    if decimal is None:
+        rows = [field for line in sample for field in _split(line, delimiter)]
+        comma, point = any("," in f for f in rows), any("." in f for f in rows)
+        if comma and point:
+            raise InputError(
+                f"{path} has commas and points within its numbers: give --decimal and --delimiter, "
+                "and take signs of thousands out"
+            )
+        decimal = "," if comma else "."
+    return delimiter, decimal
+
+
+def _delimiter(path: Path, sample: Sequence[str], decimal: str | None) -> str:
+    def everywhere(sign: str) -> bool:
+        return sum(sign in line.strip() for line in sample) >= 0.8 * len(sample)
+
+    for sign in (";", "\t", "|"):
+        if everywhere(sign):
+            return sign
+    spaced = everywhere(" ")
+    if not everywhere(","):
+        return " "
+    if decimal == ",":
+        return " "
+    if any("." in line for line in sample) or any(re.search(r",\s", line) for line in sample):
+        return ","
+    if spaced:
+        return " "
+    commas = Counter(line.count(",") for line in sample).most_common(1)[0][0]
+    if commas == 1:
+        if any(re.search(r"[eE][+\-]?\d+\s*,", line) for line in sample):
+            return ","
+        return _one_comma(path, sample)
+    if commas == 3:
+        raise InputError(
+            f"{path} has rows such as {sample[0].strip()!r}, which can be two numbers or four: "
+            "give --decimal"
+        )
+    return ","
+
+
+def _one_comma(path: Path, sample: Sequence[str]) -> str:
+    """Tell "12,345" as a decimal number from two whole ones."""
+    halves = [line.strip().split(",") for line in sample if line.count(",") == 1]
+    whole = [int(left) if re.fullmatch(r"[+\-]?\d+", left) else None for left, _ in halves]
+    steps = {b - a for a, b in pairwise(whole) if a is not None and b is not None}
+    if len(whole) > 3 and len(steps) == 1 and steps != {0}:
+        return ","
+    decimals = [right for _, right in halves]
+    if len({len(d) for d in decimals}) == 1 and len(decimals[0]) > 1:
+        return " "
+    if any(len(d) > 1 and d[0] == "0" for d in decimals):
+        return " "
+    raise InputError(
+        f"{path} has rows such as {sample[0].strip()!r}, which can be one number with a decimal "
+        "comma or two: give --decimal"
+    )
+
+
+def _split(line: str, delimiter: str, header: bool = False) -> list[str]:
+    line = line.strip("\r\n ") if delimiter == "\t" else line.strip()
+    if delimiter == " ":
+        return (
+            re.split(r"\s{2,}|\t", line)
+            if header and re.search(r"\s{2}|\t", line)
+            else line.split()
+        )
+    fields = [field.strip() for field in line.split(delimiter)]
+    if len(fields) > 1 and fields[-1] == "" and not header and len(fields) > 2:
+        fields.pop()  # a delimiter at the end of each row
+    return fields
+
+
+# ---------------------------------------------------------------------- numbers
+
+
+def _value(field: str, decimal: str) -> float | None:
+    """Number of a field: NaN for a gap, None for a word."""
+    plain = field.strip().strip('"').strip()
+    if plain.lower() in _MISSING:
+        return float("nan")
+    if not _NUMBER.fullmatch(plain) or (decimal == "," and "." in plain):
+        return None
+    if decimal == "." and "," in plain:
+        return None
+    try:
+        return float(plain.replace(",", ".").replace("D", "e").replace("d", "e"))
+    except ValueError:
+        return None
+
+
+def _first_row(split: Sequence[list[str] | None], count: int, decimal: str) -> int | None:
+    """Line on which the rows begin: the first of three that hold so many numbers."""
+    found = []
+    for place, row in enumerate(split):
+        good = row is not None and len(row) == count
+        if good and row is not None and all(_value(field, decimal) is not None for field in row):
+            found.append(place)
+            if len(found) == 3:
+                return found[0]
+        elif row is not None or found:
+            found = []
+    return None
+
+
+def _rows(
+    path: Path, lines: Sequence[str], start: int, count: int, delimiter: str, decimal: str
+) -> tuple[list[list[float]], list[int]]:
+    rows: list[list[float]] = []
+    places: list[int] = []
+    foreign: int | None = None
+    for place in range(start, len(lines)):
+        line = lines[place]
+        if line.strip() and line.strip()[0] in _COMMENT and line.strip().lower() not in _MISSING:
+            continue
+        if not line.strip() and count > 1:
+            continue  # of one column, an empty line is a gap: it has its place
+        fields = _split(line, delimiter)
+        if len(fields) < count and _looks_like_numbers(line):
+            fields = fields + [""] * (count - len(fields))
+        values = [_value(field, decimal) for field in fields]
+        if len(fields) != count or None in values:
+            foreign = place if foreign is None else foreign
+            continue
+        if foreign is not None:
+            raise InputError(
+                f"line {foreign + 1} of {path} is {lines[foreign].strip()[:60]!r}: within the "
+                f"numbers every line must hold {count} of them"
+            )
+        rows.append([float("nan") if v is None else v for v in values])
+        places.append(place + 1)
+    while count == 1 and rows and not lines[places[-1] - 1].strip():
+        rows.pop()
+        places.pop()
+    return rows, places

@@ -1,0 +1,163 @@
+"""Units of length: their names in files and options, and where a header tells them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from ensemble.errors import InputError
+
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "Å": 1e-10, "inch": 25.4e-3}
+
+_OTHER_NAMES = {
+    "um": "µm",
+    "μm": "µm",  # the Greek letter instead of the sign
+    "micron": "µm",
+    "microns": "µm",
+    "micrometer": "µm",
+    "micrometers": "µm",
+    "micrometre": "µm",
+    "micrometres": "µm",
+    "mikrometer": "µm",
+    "nanometer": "nm",
+    "nanometers": "nm",
+    "nanometre": "nm",
+    "nanometres": "nm",
+    "millimeter": "mm",
+    "millimeters": "mm",
+    "millimetre": "mm",
+    "millimetres": "mm",
+    "meter": "m",
+    "meters": "m",
+    "metre": "m",
+    "metres": "m",
+    "a": "Å",
+    "å": "Å",
+    "angstrom": "Å",
+    "angstroms": "Å",
+    "ångström": "Å",
+    "in": "inch",
+    "inches": "inch",
+}
+
+# In running text only words that mean nothing else; "m", "in" and "A" need brackets around them.
+_CLEAR = [n for n in (*METRES, *_OTHER_NAMES) if n.lower() not in ("m", "in", "a")]
+_WORD = "|".join(sorted(map(re.escape, _CLEAR), key=len, reverse=True))
+_IN_TEXT = re.compile(rf"(?<![^\W\d_])({_WORD})(?![^\W_])(?!\s*[/^²])", re.IGNORECASE)
+_IN_BRACKETS = re.compile(r"[(\[<{/=:]\s*(m|in|a)\s*(?=[)\]>}]|$)", re.IGNORECASE)
+
+_X = re.compile(
+    r"\b(x|pos(ition)?s?|lateral|horizontal|distances?|length|lengths|weg|abstand|länge)\b", re.I
+)
+_Z = re.compile(
+    r"\b(z|y|h|heights?|höhe|vertical|depth|profile?|amplitude|deflection|topography|data)\b", re.I
+)
+_BOTH = re.compile(r"\b(units?|einheit(en)?|unité?s?)\b", re.I)
+
+_STEP = re.compile(
+    r"\b(step|step ?size|spacing|increment|interval|sampling|pitch|dx|delta ?x|pixel ?size|"
+    r"schrittweite|punktabstand|x[- ]?scale)\b[^\d+\-.]*([+\-]?[\d.,]+(?:e[+\-]?\d+)?)"
+    r"\s*[(\[]?\s*(\w+)?",
+    re.IGNORECASE,
+)
+
+
+def unit_named(name: str) -> str:
+    """Return the unit that goes by this name ("um" is "µm").
+
+    Raises
+    ------
+    InputError
+        For a name that is no unit of length.
+    """
+    plain = name.strip()
+    for known in METRES:
+        if plain == known or plain.lower() == known.lower():
+            return known
+    if plain.lower() in _OTHER_NAMES:
+        return _OTHER_NAMES[plain.lower()]
+    raise InputError(f"{name!r} is no unit of length: it must be one of {', '.join(METRES)}")
+
+
+def parse_units(text: str) -> tuple[str, str]:
+    """Units of positions and heights of ``--unit``: "um" for both, or "mm,um"."""
+    words = text.split(",")
+    if len(words) > 2:
+        raise InputError(f"--unit is {text!r}: one unit for both columns, or two as in mm,um")
+    return unit_named(words[0]), unit_named(words[-1])
+
+
+def parse_length(text: str, option: str) -> float:
+    """Length in m of an option: a number in m, or a number and its unit as in 2.5um.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or not positive.
+    """
+    found = re.fullmatch(r"\s*([+\-]?(?:\d+\.?\d*|\.\d+)(?:e[+\-]?\d+)?)\s*(\D*)", text, re.I)
+    if not found:
+        raise InputError(f"{option} is {text!r}: it must be a length, as in 5e-6 (m) or 5um")
+    unit = found[2].strip()
+    value = float(found[1]) * (METRES[unit_named(unit)] if unit else 1.0)
+    if not 0 < value < float("inf"):
+        raise InputError(f"{option} is {text!r}: it must be a positive length")
+    return value
+
+
+def _units_in(text: str) -> list[str]:
+    plain = text.replace("_", " ")
+    if plain.strip().lower() in ("m", "in"):
+        return [unit_named(plain)]
+    names = [match[1] for match in _IN_TEXT.finditer(plain)]
+    names += [match[1] for match in _IN_BRACKETS.finditer(plain)]
+    return [unit_named(name) for name in names]
+
+
+def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> list[str | None]:
+    """Units of two columns (or of one, twice) as a header tells them; None where it does not.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Its lines.
+    fields : sequence of sequence of str
+        Those of its lines that have as many fields as the data, split up, columns in order.
+    """
+    for row in reversed(fields):
+        told = [_units_in(field) for field in row]
+        if all(len(set(units)) == 1 for units in told):
+            return [units[0] for units in told]
+    columns = len(fields[0]) if fields else 2
+    known: list[set[str]] = [set(), set()]
+    for line in header:
+        if re.search(r"[=:]\s*[-+]?[\d.,]+\s*\S*\s*$", line):
+            continue  # a length with its value ("Length: 2 mm") says nothing of the columns
+        units = set(_units_in(line))
+        if len(units) != 1:
+            continue
+        plain = re.sub(r"[_\-.]|(?<=[a-z])(?=[A-Z])", " ", line)
+        x, z, both = _X.search(plain), _Z.search(plain), _BOTH.search(plain)
+        compact = re.search(r"\b([xyz]) ?units?\b", plain.lower())
+        if compact:
+            x, z = (True, None) if compact[1] == "x" else (None, True)  # type: ignore[assignment]
+        for place, named in enumerate((x, z)):
+            if (named and not (x and z)) or (both and not (x or z)):
+                known[place] |= units
+    picked = [next(iter(units)) if len(units) == 1 else None for units in known]
+    return picked if columns > 1 else [picked[1], picked[1]]
+
+
+def step_of_header(header: Sequence[str], decimal: str) -> float | None:
+    """Step in m that a header tells with its unit; None where it does not."""
+    for line in header:
+        found = _STEP.search(line.replace("_", " "))
+        if found and found[3]:
+            try:
+                unit = unit_named(found[3])
+                value = float(found[2].replace(",", ".") if decimal == "," else found[2])
+            except (InputError, ValueError):
+                continue
+            if value > 0:
+                return value * METRES[unit]
+    return None

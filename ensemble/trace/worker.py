@@ -1,0 +1,122 @@
+"""One process that runs loops for a parent: jobs in on stdin, messages out on stdout, pickled.
+
+Started as ``python -m ensemble.trace.worker``: it neither forks nor imports the caller's script, so
+it serves a notebook as well as the command line.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_SECONDS_BETWEEN_REPORTS = 1.0
+
+
+@dataclass(frozen=True)
+class Job:
+    """One loop: everything that the solver needs, in SI units."""
+
+    name: str
+    period: float
+    coefficients: NDArray[np.complex128]
+    young: float
+    poisson: float
+    work_of_adhesion: float
+    max_penetration: float
+    load_steps: int
+    method: str
+    accuracy: float
+
+
+def main() -> None:
+    """Run jobs until the parent closes the pipe."""
+    jobs, messages = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever prints, prints to stderr: stdout is for messages alone
+
+    def send(kind: str, content: Any) -> None:
+        pickle.dump((kind, content), messages)
+        messages.flush()
+
+    while True:
+        try:
+            job: Job = pickle.load(jobs)
+        except EOFError:
+            return
+        try:
+            send("done", run(job, lambda branch, where: send("progress", (branch, where))))
+        except (RuntimeError, ValueError, ArithmeticError, MemoryError) as error:
+            send("failed", f"{type(error).__name__}: {error}")
+
+
+def run(job: Job, report: Any = None) -> dict[str, Any]:
+    """Run one loop; returns its numbers, and its states as lists."""
+    from solver.loop import run_loop
+    from solver.material import HalfSpace
+    from solver.method import Branch, ContactState
+    from solver.problem import Problem
+    from solver.profile import Profile
+    from solver.registry import make_method
+
+    last = time.monotonic()
+
+    def progress(branch: Branch, penetration: float, state: ContactState) -> None:
+        nonlocal last
+        if report is not None and time.monotonic() - last > _SECONDS_BETWEEN_REPORTS:
+            last = time.monotonic()
+            report(branch, penetration)
+
+    profile = Profile(job.period, job.coefficients)
+    problem = Problem(profile, HalfSpace(job.young, job.poisson), job.work_of_adhesion)
+    method = make_method(job.method, problem, accuracy=job.accuracy)  # type: ignore[arg-type]
+    loop = run_loop(
+        method,
+        max_penetration=job.max_penetration,
+        load_steps=job.load_steps,
+        progress=progress,
+    )
+    small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
+    return {
+        "loss": loop.loss,
+        "loss_dimensionless": loop.loss_dimensionless,
+        "loss_from_drops": loop.loss_from_drops,
+        "audit_residual": loop.audit_residual,
+        "loss_error": _number(loop, "loss_error"),
+        "races": _number(loop, "races"),
+        "energy_at_stake": _number(loop, "energy_at_stake"),
+        "pull_off_stress": loop.pull_off_stress,
+        "pull_off_penetration": loop.pull_off_penetration,
+        "contact_fraction": float(loop.contact_fraction.max()),
+        "patches": int(loop.patches.max()),
+        "jumps": len(loop.jumps),
+        "small_scale_share": small / loop.loss_from_drops if loop.loss_from_drops > 0 else 0.0,
+        "h_max": profile.h_max,
+        "h_rms": profile.h_rms,
+        "m2": profile.m2,
+        "waves": profile.highest_harmonic,
+        "period": profile.period,
+        "seconds": loop.seconds,
+        "states": {
+            "branch": loop.branch.tolist(),
+            "penetration": loop.penetration.tolist(),
+            "mean_stress": loop.mean_stress.tolist(),
+            "contact_fraction": loop.contact_fraction.tolist(),
+            "patches": loop.patches.tolist(),
+        },
+    }
+
+
+def _number(loop: Any, name: str) -> float | None:
+    """What a loop says of its own error, where it says it."""
+    value = getattr(loop, name, None)
+    return None if value is None else float(value)
+
+
+if __name__ == "__main__":
+    main()
