@@ -1,7 +1,7 @@
 """One loading-unloading loop of one profile: its losses, its jumps and its energy audit.
 
 The profile is either given as heights (one period, equally spaced, band-limited interpolation
-between them) or self-affine with random phases. Lengths in m, stresses in Pa.
+between them), a measured trace, or self-affine with random phases. Lengths in m, stresses in Pa.
 """
 
 from __future__ import annotations
@@ -25,6 +25,13 @@ from ensemble.loop.record import (
     write_json,
     write_npz,
 )
+from ensemble.trace.options import (
+    add_reading_arguments,
+    given,
+    prepared_of,
+    trace_of,
+    what_was_read,
+)
 from solver.loop import Progress, check_cycle, run_loop
 from solver.material import HalfSpace
 from solver.method import Branch, ContactState, Method
@@ -40,8 +47,11 @@ _SECONDS_BETWEEN_LINES = 5.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``adhesis loop``."""
-    shape = parser.add_argument_group("profile (either --heights or --hurst)")
+    shape = parser.add_argument_group("profile (--heights, --hurst or --trace)")
     shape.add_argument("--heights", type=Path, metavar="FILE", help=".npy or .csv: heights in m")
+    shape.add_argument(
+        "--trace", type=Path, metavar="FILE", help="a measured trace: see adhesis trace"
+    )
     shape.add_argument("--hurst", type=float, metavar="H", help="Hurst exponent, 0 < H < 1")
     shape.add_argument("--seed", type=int, metavar="K", help="seed of the phases (default 0)")
     shape.add_argument(
@@ -55,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
     shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
     shape.add_argument("--amplitudes", metavar="KIND", help="deterministic (default) or rayleigh")
+    add_reading_arguments(parser)
     contact = parser.add_argument_group("contact and cycle")
     contact.add_argument(
         "--work-of-adhesion", type=float, default=0.04, metavar="G", help="J/m² (default 0.04)"
@@ -90,7 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Run the loop and write what was asked for."""
     with _bad_input():
-        profile = _given_heights(args) if _wants_heights(args) else _self_affine(args)
+        profile = _profile(args)
         half_space = HalfSpace(args.young, args.poisson)
         problem = Problem(profile, half_space, args.work_of_adhesion)
         check_cycle(args.max_penetration, args.load_steps)
@@ -135,6 +146,22 @@ def _bad_input() -> Iterator[None]:
         raise InputError(str(error)) from None
 
 
+def _profile(args: argparse.Namespace) -> Profile:
+    """Return the profile of the one source that is given."""
+    if args.trace is None:
+        for option in given(args):
+            raise InputError(f"{option} belongs to --trace")
+        return _given_heights(args) if _wants_heights(args) else _self_affine(args)
+    if args.heights is not None or args.hurst is not None:
+        raise InputError("give one of --heights, --hurst and --trace: several are given")
+    _refuse_options_of_hurst(args, "period")
+    prepared = prepared_of(args, trace_of(args, args.trace))
+    print(what_was_read(prepared))
+    for warning in prepared.warnings:
+        print(f"WARNING     {warning}")
+    return prepared.profile()
+
+
 def _wants_heights(args: argparse.Namespace) -> bool:
     if (args.heights is None) == (args.hurst is None):
         both = "neither is" if args.hurst is None else "both are"
@@ -143,11 +170,15 @@ def _wants_heights(args: argparse.Namespace) -> bool:
         return False
     if args.period is None:
         raise InputError("--heights needs --period, the length of the period in m")
-    for name in ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes"):
+    _refuse_options_of_hurst(args)
+    return True
+
+
+def _refuse_options_of_hurst(args: argparse.Namespace, *more: str) -> None:
+    for name in ("seed", "n0", "ratio", "h_rms", "m2", "c0", "amplitudes", *more):
         if getattr(args, name) is not None:
             option = "--" + name.replace("_", "-")
             raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
-    return True
 
 
 def _given_heights(args: argparse.Namespace) -> Profile:

@@ -197,9 +197,9 @@ def _cut_off(answer: Answer) -> tuple[Figure, str] | None:
     )
     axes.invert_xaxis()
     axes.set(xlabel="shortest wave kept (µm)", ylabel="loss (mJ/m²)")
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(0, 1.1e3 * max(float(loss.max()), value.value + value.uncertainty))
     _plain_log(axes)
-    axes.legend(loc="best")
+    axes.legend(loc="lower right")
     return figure, "Finer to the right. A loss that still changes at the answer is not converged."
 
 
@@ -232,7 +232,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             x = [point[0] for point in points]
             y = np.array([by * point[1][key] for point in points])
             axes.errorbar(x, y, yerr=quantity.relative * np.abs(y), fmt="o-", color=_BLUE)
-            axes.set_ylim(bottom=0)
+            axes.set_ylim(0, 1.1 * (1 + quantity.relative) * float(y.max()))
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel("work of adhesion γ (J/m²)")
     panels[2, 1].set_xlabel(r"turning point $\Delta/h_{\max}$")

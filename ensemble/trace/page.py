@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ensemble.trace.answer import _DOUBTS, COVERAGE, Answer, Quantity
 from ensemble.trace.figures import Drawn, draw_all
+from ensemble.trace.units import length_text
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em;
@@ -34,8 +35,8 @@ def summary(answer: Answer) -> str:
         f"pull-off    {_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension",
         f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area')} at most",
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to Δ/h_max = "
-        f"{answer.cycle.max_penetrations[0]:g} with h_max = {loop['h_max']:.4g} m; {loop['waves']} "
-        f"waves, {loop['patches']} patches, {loop['jumps']} jumps, "
+        f"{answer.cycle.max_penetrations[0]:g} with h_max = {length_text(loop['h_max'], 4)}; "
+        f"{loop['waves']} waves, {loop['patches']} patches, {loop['jumps']} jumps, "
         f"audit {loop['audit_residual']:.0e}",
         "doubts      "
         + ", ".join(f"{name} {share:.1%}" for name, share in answer.loss.doubts.items())
@@ -62,7 +63,8 @@ def _value(quantity: Quantity, by: float, unit: str) -> str:
     while digits < 6 and half * 10**digits < 9.5:
         digits += 1
     digits = max(digits - 1, 0)
-    return f"{value:.{digits}f} ± {half:.{digits}f} {unit} (± {quantity.relative:.0%})"
+    unit = f" {unit}" if unit else ""
+    return f"{value:.{digits}f} ± {half:.{digits}f}{unit} (± {quantity.relative:.0%})"
 
 
 def _blocks(answer: Answer) -> list[Block]:
@@ -80,8 +82,8 @@ def _blocks(answer: Answer) -> list[Block]:
             f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area, pull-off at a mean "
             f"tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
             f"most **{_value(answer.contact_fraction, 1.0, '')}**: one loop to Δ/h_max = "
-            f"{cycle.max_penetrations[0]:g} (h_max = {loop['h_max']:.4g} m) and off again, with "
-            f"γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} Pa, "
+            f"{cycle.max_penetrations[0]:g} (h_max = {length_text(loop['h_max'], 4)}) and off "
+            f"again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} Pa, "
             f"ν = {half_space.poisson:g}.",
         ),
         *(("warning", warning) for warning in answer.warnings),
@@ -91,8 +93,10 @@ def _blocks(answer: Answer) -> list[Block]:
             [
                 [f"`{trace.path.name}`: " + "; ".join(trace.said)],
                 [
-                    f"{trace.points} points, step {trace.step:.5g} m, length {trace.length:.5g} m, "
-                    f"range of heights {trace.height_range:.4g} m, {trace.drop_outs} drop-outs"
+                    f"{trace.points} points, step {length_text(trace.step, 5)}, "
+                    f"length {length_text(trace.length, 5)}, "
+                    f"range of heights {length_text(trace.height_range, 4)}, "
+                    f"{trace.drop_outs} drop-outs"
                 ],
             ],
         ),

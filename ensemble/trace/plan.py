@@ -11,6 +11,7 @@ import numpy as np
 
 from ensemble.trace.pool import cores
 from ensemble.trace.prepare import Prepared
+from ensemble.trace.units import length_text
 from ensemble.trace.worker import Job
 from solver.material import HalfSpace
 from solver.profile import Profile
@@ -154,7 +155,7 @@ def _doubts(prepared: Prepared) -> list[Run]:
             Run(
                 f"cut-off × {factor:.3g}",
                 "cut-off",
-                f"waves down to {factor * cut:.3g} m",
+                f"waves down to {length_text(factor * cut)}",
                 {"cut_off": factor * cut},
             )
         )
@@ -270,8 +271,8 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
     while plan.wall * factor**-_WAVES_POWER > _SECONDS_TO_HINT / 2 and factor < 64:
         factor *= 2
     hints = [
-        f"--cut-off {factor * prepared.cut_off:.2g} ({plan.waves / factor:.0f} waves) would take "
-        f"about {clock(plan.wall * factor**-_WAVES_POWER)}"
+        f"--cut-off {factor * prepared.cut_off * 1e6:.2g}um ({plan.waves / factor:.0f} waves) "
+        f"would take about {clock(plan.wall * factor**-_WAVES_POWER)}"
     ]
     if not quick:
         tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]

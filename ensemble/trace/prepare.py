@@ -9,6 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ensemble.errors import InputError
 from ensemble.trace.read import Trace
+from ensemble.trace.units import length_text
 from solver.profile import Array, Profile
 from solver.trace import (
     Continuation,
@@ -187,7 +188,7 @@ def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
         steps.append(
             Step(
                 "ends",
-                f"{lost} missing heights at the ends cut off",
+                f"cut off where heights are missing: {lost}",
                 {"points": lost, "length": lost * trace.step},
             )
         )
@@ -221,7 +222,7 @@ def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) ->
     steps.append(
         Step(
             "outliers",
-            f"{count} outliers of up to {highest:.3g} m taken out, as drop-outs are",
+            f"{count} outliers of up to {length_text(highest)} taken out, as drop-outs are",
             {"points": count, "highest": highest},
         )
     )
@@ -246,7 +247,8 @@ def _filled(
     if longest_here > allowed * (1 + 1e-9):
         at = int(starts[np.argmax(ends - starts)]) * trace.step
         raise InputError(
-            f"{trace.path} has a gap of {longest_here:.3g} m at {at:.3g} m: up to {allowed:.3g} m "
+            f"{trace.path} has a gap of {length_text(longest_here)} at {length_text(at)}: "
+            f"up to {length_text(allowed)} "
             "is interpolated (--longest-gap)"
         )
     share = float(gaps.mean())
@@ -261,7 +263,7 @@ def _filled(
         Step(
             "drop-outs",
             f"{int(gaps.sum())} heights ({share:.2%}) in {starts.size} gaps interpolated by "
-            f"straight lines, the longest over {longest_here:.3g} m",
+            f"straight lines, the longest over {length_text(longest_here)}",
             {"points": int(gaps.sum()), "gaps": starts.size, "longest": longest_here},
         )
     )
@@ -294,14 +296,14 @@ def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list
     said = f"{name} taken off ({why})"
     numbers = {"degree": degree, "rise": float(line)}
     if bow > 0:
-        said += f": {bow:.3g} m from lowest to highest beside the tilt"
+        said += f": {length_text(bow)} from lowest to highest beside the tilt"
         numbers["form_height"] = bow
     steps.append(Step("form", said, numbers))
     if wanted is not None and found > wanted:
         left = float(np.sqrt(shares[wanted + 1 : found + 1].sum()))
         warnings.append(
-            f"a form of degree {found} remains ({left:.3g} m rms, as of a curved sample or guide): "
-            f"it counts as roughness with --degree {wanted}"
+            f"a form of degree {found} remains ({length_text(left)} rms, as of a curved sample "
+            f"or guide): it counts as roughness with --degree {wanted}"
         )
     elif degree < found + 1 <= _FORM_TO and wanted is None and _is_form(shares, found + 1):
         warnings.append("a form of a higher degree may remain")
@@ -344,18 +346,18 @@ def _cut_off(
     reasons = {
         "step": "five steps",
         "noise": "below it the noise of the instrument",
-        "tip": f"what a tip of radius {radius or 0:.3g} m follows",
+        "tip": f"what a tip of radius {length_text(radius or 0)} follows",
     }
     if wanted is not None:
         if not 2.2 * trace.step <= wanted <= length / 2:
             raise InputError(
-                f"--cut-off is {wanted:g} m: it must lie between 2.2 steps "
-                f"({2.2 * trace.step:.3g} m) and half the length ({length / 2:.3g} m)"
+                f"--cut-off is {length_text(wanted)}: it must lie between 2.2 steps "
+                f"({length_text(2.2 * trace.step)}) and half the length ({length_text(length / 2)})"
             )
         if wanted < shortest * (1 - 1e-9):
             warnings.append(
-                f"the cut-off {wanted:.3g} m is shorter than what the trace can be trusted with, "
-                f"{shortest:.3g} m ({reasons[by]})"
+                f"the cut-off {length_text(wanted)} is shorter than what the trace can be trusted "
+                f"with, {length_text(shortest)} ({reasons[by]})"
             )
         shortest, why = wanted, "as given"
     else:
@@ -363,13 +365,14 @@ def _cut_off(
         if shortest > length / 4:
             raise InputError(
                 f"{trace.path} holds no roughness above its noise: waves can be trusted from "
-                f"{shortest:.3g} m on, and it is {length:.3g} m long (--cut-off to go on)"
+                f"{length_text(shortest)} on, and it is {length_text(length)} long "
+                "(--cut-off to go on)"
             )
-    noise = f"; white noise of {spectrum.noise:.3g} m rms" if spectrum.floor > 0 else ""
+    noise = f"; white noise of {length_text(spectrum.noise)} rms" if spectrum.floor > 0 else ""
     steps.append(
         Step(
             "cut-off",
-            f"waves shorter than {shortest:.4g} m dropped ({why}){noise}",
+            f"waves shorter than {length_text(shortest, 4)} dropped ({why}){noise}",
             {
                 "cut_off": shortest,
                 "noise_rms": spectrum.noise,

@@ -24,6 +24,7 @@ _MISSING = frozenset(
      "----", "*", "**", "***", "bad", "n/a", "na", "#n/a", "null", "none", "nil", "invalid",
      "missing", "nd", "overflow", "underflow", "x", "?")
 )  # fmt: skip
+_FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-]*")  # of a line: perhaps several, with commas
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 
 
@@ -81,7 +82,8 @@ def read_table(path: Path, delimiter: str | None = None, decimal: str | None = N
         raise InputError(f"{path} holds no rows of numbers of one length")
     header = [line.strip().lstrip(_COMMENT).strip() for line in lines[:start]]
     rows, places = _rows(path, lines, start, count, delimiter, decimal)
-    fields = [tuple(_split(line, delimiter, header=True)) for line in header]
+    # Of one column, a line of the header is a name as a whole.
+    fields = [(line,) if count == 1 else tuple(_split(line, delimiter, True)) for line in header]
     return Table(
         columns=np.array(rows).T.reshape(count, -1),
         header=tuple(line for line in header if line),
@@ -122,11 +124,7 @@ def _looks_like_numbers(line: str) -> bool:
     begin = line.strip()
     if not begin or begin[0] in _COMMENT:
         return False
-    found = _NUMBER.match(begin)
-    if not found:
-        return False
-    rest = begin[found.end() :]
-    return not rest or rest[0] in ";,\t |"
+    return bool(_FIRST.fullmatch(re.split(r"[;\t |]", begin, maxsplit=1)[0]))
 
 
 def _form(
@@ -252,7 +250,7 @@ def _rows(
             continue
         if not line.strip() and count > 1:
             continue  # of one column, an empty line is a gap: it has its place
-        fields = _split(line, delimiter)
+        fields = _split(line, delimiter) or [""]
         if len(fields) < count and _looks_like_numbers(line):
             fields = fields + [""] * (count - len(fields))
         values = [_value(field, decimal) for field in fields]

@@ -54,6 +54,10 @@ _Z = re.compile(
 )
 _BOTH = re.compile(r"\b(units?|einheit(en)?|unité?s?)\b", re.I)
 
+_VALUE = re.compile(
+    rf"\d\s*[(\[]?\s*({_WORD})(?![^\W_])", re.IGNORECASE
+)  # "0.5 µm" names no column
+
 _STEP = re.compile(
     r"\b(step|step ?size|spacing|increment|interval|sampling|pitch|dx|delta ?x|pixel ?size|"
     r"schrittweite|punktabstand|x[- ]?scale)\b[^\d+\-.]*([+\-]?[\d.,]+(?:e[+\-]?\d+)?)"
@@ -105,6 +109,14 @@ def parse_length(text: str, option: str) -> float:
     return value
 
 
+def length_text(metres: float, digits: int = 3) -> str:
+    """Return a length in the unit that it reads best in: "5 µm"."""
+    for unit in ("m", "mm", "µm"):
+        if abs(metres) >= METRES[unit]:
+            return f"{metres / METRES[unit]:.{digits}g} {unit}"
+    return f"{metres / METRES['nm']:.{digits}g} nm"
+
+
 def _units_in(text: str) -> list[str]:
     plain = text.replace("_", " ")
     if plain.strip().lower() in ("m", "in"):
@@ -124,10 +136,15 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
     fields : sequence of sequence of str
         Those of its lines that have as many fields as the data, split up, columns in order.
     """
-    for row in reversed(fields):
+    names = [row for row in fields if not any(_VALUE.search(field) for field in row)]
+    for row in reversed(names):
         told = [_units_in(field) for field in row]
         if all(len(set(units)) == 1 for units in told):
             return [units[0] for units in told]
+    for row in reversed(names):
+        told = [_units_in(field) for field in row]
+        if any(told) and not any(re.search(r"[\d:=]", field) for field in row):
+            return [units[0] if len(set(units)) == 1 else None for units in told]
     columns = len(fields[0]) if fields else 2
     known: list[set[str]] = [set(), set()]
     for line in header:

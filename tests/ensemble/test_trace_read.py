@@ -1,0 +1,280 @@
+"""Reading a trace: the same heights from every kind of text, or one sentence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ensemble.command.main import main
+from ensemble.errors import InputError
+from ensemble.trace.read import Trace, read_trace
+from ensemble.trace.units import length_text, parse_length
+
+N, STEP = 200, 0.5e-6
+X = STEP * np.arange(N)
+Z = 1e-7 * np.sin(2 * np.pi * X / 20e-6) + 2e-8 * np.cos(2 * np.pi * X / 3.1e-6)
+
+Change = Callable[[list[str]], list[str]]
+
+
+def rows(
+    delimiter: str, decimal: str, x: float = 1e6, z: float = 1e6, form: str = ".5f"
+) -> list[str]:
+    """Positions and heights as lines, in units of 1/x and 1/z metres."""
+    lines = [f"{a * x:{form}}\0{b * z:{form}}" for a, b in zip(X, Z, strict=True)]
+    return [line.replace(".", decimal).replace("\0", delimiter) for line in lines]
+
+
+def read(tmp_path: Path, lines: list[str], name: str = "t.txt", **options: object) -> Trace:
+    path = tmp_path / name
+    path.write_bytes("\n".join(lines).encode())
+    return read_trace(path, **options)  # type: ignore[arg-type]
+
+
+def assert_right(trace: Trace, tolerance: float = 1e-11) -> None:
+    assert trace.points == N
+    assert trace.step == pytest.approx(STEP, rel=1e-6)
+    assert trace.length == pytest.approx(X[-1], rel=1e-6)
+    np.testing.assert_allclose(trace.heights, Z, atol=tolerance)
+
+
+UM = "x (µm);z (µm)"
+TEXTS: dict[str, list[str]] = {
+    "csv": ["x [um],z [um]", *rows(",", ".")],
+    "comment header": ["# Position / µm   Height / µm", *rows("  ", ".")],
+    "tabs": ["Distance (mm)\tHeight (nm)", *rows("\t", ".", 1e3, 1e9, ".7f")],
+    "semicolons and decimal commas": [UM, *rows(";", ",")],
+    "tabs and decimal commas": ["Weg [mm]\tHöhe [µm]", *rows("\t", ",", 1e3, 1e6, ".7f")],
+    "spaces and decimal commas": ["x_um  z_um", *rows(" ", ",")],
+    "units on a line of their own": ["Position;Profile", "mm;µm", *rows(";", ".", 1e3, 1e6, ".7f")],
+    "units as keys": ["X-Unit: mm", "Z-Unit: um", "Points: 200", *rows(",", ".", 1e3, 1e6, ".7f")],
+    "one unit for both": ["% Units: micrometers", "% Scan length: 0.1 mm", *rows(" ", ".")],
+    "an instrument's preamble": [
+        "Stylus profiler;;",
+        "Date;2024-03-01 10:30 PM",
+        "Stylus radius;2.5",
+        "Scan length, mm;0.0995",
+        "",
+        "Lateral(µm);Raw(µm)",
+        *rows(";", "."),
+        "",
+        "End of file",
+    ],
+    "scientific, in metres, untold": rows(" ", ".", 1, 1, ".9e"),
+    "quoted": ['"x (µm)","z (µm)"', *(re.sub(r"([^,]+)", r"\1", r) for r in rows(",", "."))],
+    "trailing delimiter": ["x (µm);z (µm)", *(row + ";" for row in rows(";", "."))],
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_every_usual_text_gives_the_same_heights(kind: str, tmp_path: Path) -> None:
+    assert_right(read(tmp_path, TEXTS[kind]))
+
+
+def test_encodings_and_line_ends(tmp_path: Path) -> None:
+    text = "\r\n".join(["x (µm);z (µm)", *rows(";", ",")])
+    for encoding in ("utf-8-sig", "utf-16", "latin-1"):
+        path = tmp_path / f"{encoding}.csv"
+        path.write_bytes(text.encode(encoding))
+        assert_right(read_trace(path))
+
+
+def test_units_by_option(tmp_path: Path) -> None:
+    assert_right(read(tmp_path, rows(" ", "."), unit="um"))
+    assert_right(read(tmp_path, rows(",", ".", 1e3, 1e9, ".7f"), unit="mm,nm"))
+    assert_right(read(tmp_path, ["x (um),z (um)", *rows(",", ".")], unit="µm"))
+
+
+def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path) -> None:
+    heights = [f"{z * 1e6:.6f}" for z in Z]
+    assert_right(read(tmp_path, ["Height (µm)", *heights], step=STEP))
+    assert_right(read(tmp_path, ["# dx = 0.5 um", "# z (um)", *heights]))
+    assert_right(read(tmp_path, ["Spacing 0.0005 mm", "Z [µm]", *heights]))
+    commas = [z.replace(".", ",") for z in heights]
+    assert_right(read(tmp_path, ["Schrittweite: 0,5 µm", "Höhe (µm)", *commas]))
+    with pytest.raises(InputError, match="give --step"):
+        read(tmp_path, ["Height (µm)", *heights])
+
+
+def test_columns_are_chosen_where_there_are_more(tmp_path: Path) -> None:
+    lines = [f"{k},{row}" for k, row in enumerate(rows(",", "."))]
+    with pytest.raises(InputError, match=r"3 columns: --columns"):
+        read(tmp_path, ["n,x (um),z (um)", *lines])
+    assert_right(read(tmp_path, ["n,x (um),z (um)", *lines], columns=(2, 3)))
+
+
+def test_npy_of_one_column_and_of_two(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.column_stack([X, Z]))
+    assert_right(read_trace(tmp_path / "a.npy"))
+    np.save(tmp_path / "b.npy", 1e6 * Z)
+    assert_right(read_trace(tmp_path / "b.npy", unit="um", step=STEP))
+
+
+@pytest.mark.parametrize("gap", ["", "NaN", "---", "BAD", "-9999", "1e38"])
+def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -> None:
+    lines = rows(";", ".")
+    for k in (20, 21, 77):
+        lines[k] = lines[k].split(";")[0] + ";" + gap
+    trace = read(tmp_path, [UM, *lines])
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(trace.heights)), [20, 21, 77])
+    assert trace.drop_outs == 3
+    good = ~np.isnan(trace.heights)
+    np.testing.assert_allclose(trace.heights[good], Z[good], atol=1e-11)
+
+
+def test_rows_left_out_are_gaps(tmp_path: Path) -> None:
+    lines = rows(";", ".")
+    trace = read(tmp_path, [UM, *lines[:50], *lines[53:]])
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(trace.heights)), [50, 51, 52])
+
+
+def test_empty_lines_of_one_column_keep_their_place(tmp_path: Path) -> None:
+    heights = [f"{z * 1e6:.6f}" for z in Z]
+    heights[30] = ""
+    trace = read(tmp_path, ["z (um)", *heights, ""], step=STEP)
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [30]
+    assert trace.points == N
+
+
+def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
+    trace = read(tmp_path, [UM, *rows(";", ".")[::-1]])
+    assert_right(trace)
+    assert any("backwards" in said for said in trace.said)
+    uneven = X + 0.2 * STEP * np.sin(np.arange(N) / 20)  # a scanner that drifts
+    slow = 1e-7 * np.sin(2 * np.pi * uneven / 20e-6)
+    lines = [f"{a * 1e6:.6f} {b * 1e6:.6f}" for a, b in zip(uneven, slow, strict=True)]
+    trace = read(tmp_path, lines, unit="um")
+    assert any("unequal steps" in said for said in trace.said)
+    even = np.linspace(uneven[0], uneven[-1], N)
+    np.testing.assert_allclose(trace.heights, 1e-7 * np.sin(2 * np.pi * even / 20e-6), atol=1e-9)
+
+
+SPIKED = [*rows(" ", ".")[:60], "25.0 0.1", *rows(" ", ".")[60:]]
+REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
+    "no unit": (rows(" ", "."), {}, "tells no unit.*--unit um"),
+    "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "tells no unit"),
+    "a unit of one column": (["x (mm),z", *rows(",", ".")], {}, "of the positions alone"),
+    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "--unit says mm and the hea"),
+    "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
+    "kilometres": ([UM.replace("µm", "m"), *rows(";", ".")], {}, "m long: is its unit right"),
+    "heights in mm, positions in µm": (rows(" ", "."), {"unit": "um,mm"}, "in the same unit"),
+    "words within": ([UM, *rows(";", ".")[:50], "pause", *rows(";", ".")[50:]], {}, "line 52 of"),
+    "turning back": (SPIKED, {"unit": "um"}, "positions turn back at line 61"),
+    "twice the same place": (
+        ["x (um) z (um)", "0.0 1.0", "0.0 1.0", *rows(" ", ".")[1:]],
+        {"unit": "um"},
+        "stand still",
+    ),
+    "unequal steps": (
+        [f"{k**1.5:.4f} {z * 1e6:.5f}" for k, z in enumerate(Z)],
+        {"unit": "um"},
+        "steps of the positions are unequal",
+    ),
+    "no position": (
+        [UM, *rows(";", ".")[:9], ";1.0", *rows(";", ".")[9:]],
+        {},
+        "line 11.*no posit",
+    ),
+    "points of thousands": (
+        [f"1.{k:03d},5;0,1" for k in range(99)],
+        {"unit": "um"},
+        "commas and po",
+    ),
+    "one number or two": (
+        [f"{k % 7},{k % 3}" for k in range(99)],
+        {"unit": "um"},
+        "give --decimal",
+    ),
+    "four numbers or two": (
+        [f"{k},5,1,{k % 3}" for k in range(99)],
+        {"unit": "um"},
+        "give --decimal",
+    ),
+    "no numbers": (["a trace", "of words"], {}, "no line of numbers"),
+    "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),
+    "flat": ([f"{k} 1.0" for k in range(99)], {"unit": "um"}, "flat trace has no loss"),
+    "no heights": ([f"{k} NaN" for k in range(99)], {"unit": "um"}, "holds 0 heights"),
+    "empty": ([""], {}, "is empty"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_is_in_doubt_is_refused_in_one_sentence(kind: str, tmp_path: Path) -> None:
+    lines, options, words = REFUSED[kind]
+    with pytest.raises(InputError, match=words) as refusal:
+        read(tmp_path, lines, **options)
+    assert "\n" not in str(refusal.value)
+
+
+def test_refusals_of_files(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_trace(tmp_path / "none.txt")
+    with pytest.raises(InputError, match="is a directory"):
+        read_trace(tmp_path)
+    (tmp_path / "a.npy").write_bytes(b"not an array")
+    with pytest.raises(InputError, match=r"no \.npy of numbers"):
+        read_trace(tmp_path / "a.npy")
+    np.save(tmp_path / "b.npy", np.zeros((9, 9)))
+    with pytest.raises(InputError, match="9 × 9 numbers"):
+        read_trace(tmp_path / "b.npy")
+    (tmp_path / "c.txt").write_bytes(b"\x00\x01\x02" * 100)
+    with pytest.raises(InputError, match="neither text nor"):
+        read_trace(tmp_path / "c.txt")
+
+
+def test_lengths_of_options() -> None:
+    assert parse_length("2.5um", "--x") == pytest.approx(2.5e-6)
+    assert parse_length("1e-6", "--x") == 1e-6
+    assert length_text(5e-6) == "5 µm"
+    assert length_text(2e-3) == "2 mm"
+    for text in ("-1um", "5 parsec", "um", "nan", "0"):
+        with pytest.raises(InputError):
+            parse_length(text, "--x")
+
+
+CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--plan"], "tells no unit"),
+        (["--plan", "--unit", "um", "--columns", "1"], "--columns"),
+        (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
+        (["--plan", "--unit", "um", "--degree", "9"], "--degree is 9"),
+        (["--plan", "--unit", "um", "--max-penetration", "1.5"], "max_penetration is 1.5"),
+        (["--plan", "--unit", "um", "--max-penetration", "deep"], "--max-penetration is 'deep'"),
+        (["--plan", "--unit", "um", "--step", "1um"], "--step belongs to heights without"),
+        (["--plan", "--unit", "um", "--method", "magic"], "method is 'magic'"),
+        (["--unit", "um"], "give --to"),
+        (["--plan", "--unit", "um", "--processes", "0"], "--processes is 0"),
+        (["--plan", "--unit", "um", "--young", "-1"], "young is -1"),
+        (["--plan", "--unit", "um", "--work-of-adhesion", "-1"], "work_of_adhesion is -1"),
+    ],
+)
+def test_the_command_refuses_with_one_sentence_and_code_2(
+    words: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.txt"
+    path.write_text("\n".join(rows(" ", ".")))
+    assert main(["trace", str(path), *CONTACT, *words]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert len(error.splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == [path]
+
+
+def test_a_plan_is_said_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.txt"
+    path.write_text("\n".join([UM, *rows(";", ",")]))
+    assert main(["trace", str(path), *CONTACT, "--plan", "--tip-radius", "2um"]) == 0
+    said = capsys.readouterr().out
+    for words in ("200 points, step 500 nm", "decimal commas", "positions in µm", "plan ", "waves"):
+        assert words in said
+    assert sorted(tmp_path.iterdir()) == [path]
