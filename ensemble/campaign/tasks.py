@@ -39,6 +39,11 @@ class Task:
     realisation: int
     seed: int
 
+    @property
+    def cell(self) -> tuple[float, ...]:
+        """Where the task stands on the axes of the sweep: all realisations of a cell share it."""
+        return (self.hurst, self.work_of_adhesion)
+
     def __str__(self) -> str:
         return (
             f"H = {self.hurst:g}, γ = {self.work_of_adhesion:g} J/m², "

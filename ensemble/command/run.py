@@ -106,6 +106,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     from ensemble.run.progress import duration
     from ensemble.run.ranks import together
     from ensemble.run.session import Options, run_campaign
+    from ensemble.task.doubt import bound
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
@@ -136,6 +137,11 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
         )
         if summary.failed:
             say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
+        if summary.doubtful:
+            say(
+                f"{summary.doubtful} losses are doubtful: their own checks are off by more than "
+                f"{100 * bound(campaign.solver.accuracy):g} % (adhesis status {path})"
+            )
         if summary.stopped:
             say(
                 f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "

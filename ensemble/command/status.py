@@ -27,13 +27,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Print the status; returns 0."""
     from ensemble.results.status import as_text, read_status
+    from ensemble.run.lock import holder
 
     if args.watch:
         if args.json:
             raise InputError("--watch and --json cannot be given together")
         return _watch(args.file, _interval(args.interval))
-    status = read_status(args.file)
-    print(json.dumps(status, indent=1, ensure_ascii=False) if args.json else as_text(status))
+    status = read_status(args.file) | {"run": holder(args.file)}
+    if args.json:
+        print(json.dumps(status, indent=1, ensure_ascii=False))
+    else:
+        print(as_text(status, _life(status)))
     return 0
 
 
@@ -50,18 +54,20 @@ def _interval(text: str) -> float:
 def _watch(path: Path | str, interval: float) -> int:
     """Show the status again and again: in place on a terminal, else one after the other."""
     from ensemble.results.status import as_text, read_status
+    from ensemble.run.lock import holder
 
     live = _live() if sys.stdout.isatty() else None
     first: tuple[float, int] | None = None
     try:
         while True:
-            status = read_status(path)
+            status = read_status(path) | {"run": holder(path)}
             now = time.monotonic()
             finished = status["done"] + status["failed"]
             # A campaign that grew, or rows that are computed again, begin a new measurement.
             if first is None or finished < first[1]:
                 first = (now, finished)
-            text = as_text(status, _pace(status, now - first[0], finished - first[1]))
+            pace = _pace(status, now - first[0], finished - first[1])
+            text = as_text(status, pace + _life(status))
             if live is None:
                 print(text, flush=True)
             else:
@@ -74,6 +80,17 @@ def _watch(path: Path | str, interval: float) -> int:
     finally:
         if live is not None:
             live.stop()
+
+
+def _life(status: dict[str, Any]) -> str:
+    """Return whether a run is at work, and how old the last row is, as a line of its own."""
+    from ensemble.run.lock import described
+    from ensemble.run.progress import duration
+
+    run, last = status["run"], status["last_row"]
+    text = "no run is writing" if run is None else f"a run is writing ({described(run)})"
+    age = "" if last is None else f"; last row {duration(max(0.0, time.time() - last))} ago"
+    return f"\n{text}{age}"
 
 
 def _live() -> Any:

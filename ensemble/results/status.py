@@ -5,6 +5,7 @@ Never loads MPI and reads a few bytes a task: it works on a login node, and whil
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED, PENDING
+from ensemble.task.doubt import doubtful
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
@@ -29,7 +31,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``; ``seconds`` per done task (``mean``,
         ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each H and γ with
         its counts, its mean time and its mean loss with standard error (J/m², and W~);
-        ``failures``, one dict for each failed task.
+        ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
+        checks say that it is wrong (:mod:`ensemble.task.doubt`), the worst first; ``last_row``,
+        when the file was last written to (as ``time.time()`` counts), None before the first row.
 
     Raises
     ------
@@ -37,8 +41,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         If the file is not a sound results file.
     """
     with Results(path) as results:
+        accuracy = results.campaign.solver.accuracy
         state = results.status()
-        names = (*_TASK, "wall_time", "loss", "loss_dimensionless")
+        names = (*_TASK, "wall_time", "loss", "loss_dimensionless", "audit_residual")
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
@@ -59,9 +64,26 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "done": int(np.sum(state == DONE)),
         "failed": len(failed),
         "seconds": _times(times) if times.size else None,
+        "doubtful": _doubtful(state, column, accuracy),
+        "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "groups": _groups(state, column),
         "failures": failures,
     }
+
+
+def _doubtful(
+    state: NDArray[np.uint8], column: dict[str, NDArray[Any]], accuracy: float
+) -> list[dict[str, Any]]:
+    wrong = doubtful(accuracy, column["loss"], column["audit_residual"])
+    rows = np.flatnonzero(wrong & (state == DONE))
+    rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
+    return [
+        {
+            "row": row,
+            **{name: column[name][row].item() for name in (*_TASK, "loss", "audit_residual")},
+        }
+        for row in rows.tolist()
+    ]
 
 
 def _times(times: NDArray[np.float64]) -> dict[str, float]:
@@ -128,6 +150,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if len(groups) <= _MOST_GROUPS_SHOWN:
         lines += ["", "    H  γ in J/m²     done  pending  failed    mean s  loss W~"]
         lines += [_group_line(group) for group in groups]
+    if status["doubtful"]:
+        lines += ["", *_doubt_lines(status["doubtful"])]
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"])]
     return "\n".join(lines)
@@ -143,6 +167,19 @@ def _group_line(group: dict[str, Any]) -> str:
         + (f"  {loss:.4g}" if loss is not None else "")
         + (f" ± {error:.2g}" if error is not None else "")
     ).rstrip()
+
+
+def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
+    lines = [f"{len(doubts)} losses are doubtful: loop integral and sum of drops differ"]
+    for d in doubts[:_MOST_FAILURES_SHOWN]:
+        lines.append(
+            f"  row {d['row']}: H = {d['hurst']:g}, γ = {d['work_of_adhesion']:g} J/m², "
+            f"realisation {d['realisation']}, seed {d['seed']}: audit residual "
+            f"{100 * d['audit_residual']:.2g} %"
+        )
+    if len(doubts) > _MOST_FAILURES_SHOWN:
+        lines.append(f"  … and {len(doubts) - _MOST_FAILURES_SHOWN} more (--json lists all)")
+    return lines
 
 
 def _failure_lines(failures: list[dict[str, Any]]) -> list[str]:

@@ -15,9 +15,10 @@ import os
 import socket
 import sys
 import time
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from ensemble.errors import InputError
 
@@ -155,11 +156,44 @@ class RunLock:
         os.pwrite(self._descriptor, json.dumps(card).encode(), 0)
 
     def _holder(self) -> str:
-        try:
-            card = json.loads(self.path.read_text())
-            return (
-                f" (host {card['host']}, process {card['pid']}, "
-                f"{card['ranks']} ranks, since {card['since']})"
-            )
-        except (OSError, ValueError, KeyError, TypeError):
-            return ""
+        card = _card(self.path)
+        return f" ({described(card)})" if card else ""
+
+
+def holder(results: Path | str) -> dict[str, Any] | None:
+    """Tell which run writes to a results file now: host, pid, ranks, since; None if none does.
+
+    Takes nothing that a run would wait for longer than a moment. Where the file system has no locks
+    nothing is known, and None is returned.
+    """
+    path = Path(results)
+    path = path.with_name(f"{path.name}.lock")
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.lockf(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB, 1, _RUN)
+    except OSError as error:
+        return None if error.errno in _UNSUPPORTED else _card(path) or {}
+    finally:
+        os.close(descriptor)
+    return None
+
+
+def described(card: Mapping[str, Any]) -> str:
+    """Return in words which run holds a lock."""
+    if not card:
+        return "of which nothing more is known"
+    return (
+        f"host {card['host']}, process {card['pid']}, {card['ranks']} ranks, since {card['since']}"
+    )
+
+
+def _card(path: Path) -> dict[str, Any] | None:
+    """Read what the holder of a lock has written into it."""
+    try:
+        card = json.loads(path.read_text())
+        return {name: card[name] for name in ("host", "pid", "ranks", "since")}
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

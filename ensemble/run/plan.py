@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -23,7 +23,8 @@ from ensemble.run.lock import RunLock
 from ensemble.task.compute import check_task
 from ensemble.versions import versions
 
-Group = tuple[float, float]
+Group = tuple[float, ...]
+_MOST_SHOWN = 10
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,28 @@ class Selection:
     hurst: tuple[float, ...] = ()
     work_of_adhesion: tuple[float, ...] = ()
     realisation: tuple[int, ...] = ()
+
+    def check(self, tasks: Sequence[Task]) -> None:
+        """Refuse values that the campaign does not have.
+
+        Raises
+        ------
+        InputError
+        """
+        for option, name, chosen in (
+            ("--hurst", "hurst", self.hurst),
+            ("--work-of-adhesion", "work_of_adhesion", self.work_of_adhesion),
+            ("--realisation", "realisation", self.realisation),
+        ):
+            known = {getattr(task, name) for task in tasks}
+            for value in chosen:
+                if value not in known:
+                    values = ", ".join(f"{v:g}" for v in sorted(known)[:_MOST_SHOWN])
+                    more = ", …" if len(known) > _MOST_SHOWN else ""
+                    raise InputError(
+                        f"{option} is {value:g}: this campaign has no such task, "
+                        f"only {values}{more}"
+                    )
 
     def takes(self, task: Task, status: int) -> bool:
         """Whether a row is selected."""
@@ -111,6 +134,8 @@ def prepare(
     InputError
     """
     tasks = campaign.tasks()
+    if redo is not None:
+        redo.check(tasks)
     for task in {t.hurst: t for t in reversed(tasks)}.values():
         check(campaign, task)
     _check_path(path)
@@ -168,7 +193,7 @@ def _plan(results: Results) -> Plan:
     times: dict[Group, tuple[float, int]] = {}
     seconds = results.column("wall_time").tolist()
     for row in np.flatnonzero(status == DONE).tolist():
-        group = (tasks[row].hurst, tasks[row].work_of_adhesion)
+        group = tasks[row].cell
         sum_before, count = times.get(group, (0.0, 0))
         times[group] = (sum_before + seconds[row], count + 1)
     return Plan(
@@ -180,6 +205,6 @@ def _plan(results: Results) -> Plan:
     )
 
 
-def prior(hurst: float, work_of_adhesion: float) -> float:
+def prior(task: Task) -> float:
     """Relative time of a loop before any is measured: weak adhesion and roughness take more."""
-    return (2.0 - hurst) / math.sqrt(work_of_adhesion + 1e-3)
+    return (2.0 - task.hurst) / math.sqrt(task.work_of_adhesion + 1e-3)

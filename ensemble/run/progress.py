@@ -35,6 +35,7 @@ class Counts:
     done_before: int
     done: int = 0
     failed: int = 0
+    doubtful: int = 0
 
 
 class ProgressLine:
@@ -63,6 +64,7 @@ class ProgressLine:
         self._interval = _LINE_INTERVALS[0]
         self._next = self._started
         self._failures_shown = 0
+        self._doubts_shown = 0
         if self._stream.isatty():
             from rich.console import Console
             from rich.live import Live
@@ -89,6 +91,12 @@ class ProgressLine:
         elif self._failures_shown == _MOST_FAILURES_SHOWN:
             self.say("further failures are counted here and listed by `adhesis status`")
         self._failures_shown += 1
+
+    def doubt(self, what: str) -> None:
+        """Tell of a loss whose own checks say that it is wrong: the first ones each."""
+        if self._doubts_shown < _MOST_FAILURES_SHOWN:
+            self.say(f"doubtful loss: {what}")
+        self._doubts_shown += 1
 
     def say(self, text: str) -> None:
         """Write a line of its own."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,8 +23,27 @@ from ensemble.run.progress import Counts, ProgressLine
 from ensemble.run.ranks import MpiChannel, together
 from ensemble.run.schedule import Schedule
 from ensemble.task.compute import check_task, run_task
+from ensemble.task.doubt import doubtful
 from ensemble.task.row import Row
 from solver.loop import Progress
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the master is told of a row that was written elsewhere.
+
+    Attributes
+    ----------
+    loss : float
+        In J/m².
+    audit_residual : float
+    doubtful : bool
+        See :mod:`ensemble.task.doubt`.
+    """
+
+    loss: float
+    audit_residual: float
+    doubtful: bool
 
 
 class RowWriter(Protocol):
@@ -94,6 +113,9 @@ class Summary:
 
     Attributes
     ----------
+    doubtful : int
+        Losses, of those computed now, whose own checks say that they are wrong
+        (:mod:`ensemble.task.doubt`).
     stopped : str or None
         Why it stopped before the last task.
     """
@@ -104,6 +126,7 @@ class Summary:
     computed: int
     failed_now: int
     seconds: float
+    doubtful: int
     stopped: str | None
 
     @property
@@ -200,9 +223,7 @@ class _Session:
         self._engine = engine
         self._started = time.monotonic()
         self._counts = Counts(total=len(plan.tasks), done_before=plan.done)
-        self._groups: Mapping[int, Group] = {
-            row: (plan.tasks[row].hurst, plan.tasks[row].work_of_adhesion) for row in plan.rows
-        }
+        self._groups: Mapping[int, Group] = {row: plan.tasks[row].cell for row in plan.rows}
         self._limits = Limits(
             stop=self._stop,
             time_left=self._time_left,
@@ -229,9 +250,7 @@ class _Session:
         workers = channel.size - 1
 
         def collect(outcome: Outcome) -> None:
-            if not own_rows:
-                self._write(outcome)
-            self._count(outcome, progress)
+            self._count(outcome if own_rows else self._write(outcome), progress)
 
         progress = ProgressLine(
             self._counts, lambda: self._estimate(schedule, master.in_flight, workers)
@@ -256,6 +275,7 @@ class _Session:
             computed=self._counts.done,
             failed_now=self._counts.failed,
             seconds=time.monotonic() - self._started,
+            doubtful=self._counts.doubtful,
             stopped=stopped if done + failed < len(self._plan.tasks) else None,
         )
 
@@ -275,19 +295,32 @@ class _Session:
             self._writer.write_result(outcome.task, outcome.result, outcome.rank)
         else:
             self._writer.write_failure(outcome.task, outcome.error, outcome.seconds, outcome.rank)
-        return replace(outcome, result=None)
+        return replace(outcome, result=self._told(outcome.result))
+
+    def _told(self, row: Row | None) -> Told | None:
+        if row is None:
+            return None
+        loss, residual = float(row["loss"]), float(row["audit_residual"])
+        wrong = doubtful(self._campaign.solver.accuracy, loss, residual, row.get("loss_error", 0.0))
+        return Told(loss, residual, bool(wrong))
 
     def _count(self, outcome: Outcome, progress: ProgressLine) -> None:
         if outcome.error is None:
             self._counts.done += 1
+            told: Told = outcome.result
+            if told.doubtful:
+                self._counts.doubtful += 1
+                what = str(self._plan.tasks[outcome.task])
+                progress.doubt(f"{what}: audit residual {100 * told.audit_residual:.2g} %")
         else:
             self._counts.failed += 1
             progress.failure(str(self._plan.tasks[outcome.task]), outcome.error)
         progress.tick()
 
     def _schedule(self) -> Schedule:
-        groups = sorted({*self._groups.values(), *self._plan.times})
-        schedule = Schedule(self._plan.rows, self._groups, {g: prior(*g) for g in groups})
+        priors: dict[Hashable, float] = {task.cell: prior(task) for task in self._plan.tasks}
+        rounds = {row: self._plan.tasks[row].realisation for row in self._plan.rows}
+        schedule = Schedule(self._plan.rows, self._groups, priors, rounds)
         for group, (seconds, count) in self._plan.times.items():
             schedule.measured(group, seconds, count)
         return schedule

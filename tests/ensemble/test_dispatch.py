@@ -191,6 +191,20 @@ def test_the_longest_tasks_go_first_once_they_are_known():
     assert [schedule.take(), schedule.take(), schedule.take()] == [3, 1, None]
 
 
+def test_rounds_go_one_after_the_other_and_the_longest_first_within():
+    """An interrupted campaign keeps averages over about as many realisations in every cell."""
+    group_of = {i: "short" if i < 10 else "long" for i in range(20)}
+    round_of = {i: i % 10 for i in range(20)}
+    schedule = Schedule(range(20), group_of, {"short": 1.0, "long": 5.0}, round_of)
+    assert [schedule.take() for _ in range(4)] == [10, 0, 11, 1]
+    schedule.measured("short", 9.0)
+    schedule.measured("long", 2.0)
+    assert [schedule.take() for _ in range(4)] == [2, 12, 3, 13]
+    assert schedule.take(time_left=5.0) == 14  # the first round that has one that fits
+    schedule.add([0, 10])  # tasks that come later stand where their round stands
+    assert [schedule.take() for _ in range(4)] == [0, 10, 4, 5]
+
+
 def test_a_signal_to_one_worker_stops_all():
     channel, collected, reason, schedule = simulate(5, [10.0] * 50, signal_at=15.0)
     assert reason == "SIGUSR1 received"
@@ -198,6 +212,32 @@ def test_a_signal_to_one_worker_stops_all():
     assert channel.now < 15.5
     assert len(channel.answered) == 10
     assert schedule.waiting == 40
+
+
+class StopsAtTheDoor(SimulatedRanks):
+    """Worker 1 is told to stop just as it is dismissed."""
+
+    def send(self, to, message, *, urgent=False):
+        """Let the signal come before the dismissal."""
+        if message[0] == "dismissed" and to == 1:
+            heapq.heappush(self._ends, (self.now, to, ("stop", "SIGUSR1 received")))
+        super().send(to, message, urgent=urgent)
+
+
+def test_a_stop_that_arrives_while_workers_are_dismissed_is_told():
+    _, collected, reason, _ = simulate(
+        *(2, [10.0] * 20),
+        limits=lambda c: Limits(time_left=lambda: 25 - c.now),
+        kind=StopsAtTheDoor,
+    )
+    assert 0 < len(collected) < 20
+    assert reason == "SIGUSR1 received"  # and not that no time was left
+
+
+def test_a_stop_that_arrives_when_all_is_done_stops_nothing():
+    _, collected, reason, _ = simulate(2, [10.0] * 20, kind=StopsAtTheDoor)
+    assert len(collected) == 20
+    assert reason is None
 
 
 def test_workers_that_do_not_answer_a_stop_are_not_waited_for():

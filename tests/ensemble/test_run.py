@@ -154,6 +154,45 @@ def test_done_tasks_can_be_computed_again_too(tmp_path):
     assert sorted(log.read_text().split()) == ["0.8:0.01:0", "0.8:0.04:0"]
 
 
+def test_rows_that_do_not_exist_cannot_be_computed_again(tmp_path):
+    _, out = run(tmp_path)
+    before = out.read_bytes()
+    for words, sentence in (
+        (
+            ("--redo", "failed", "--hurst", "0.75"),
+            "--hurst is 0.75: this campaign has no such task",
+        ),
+        (("--redo", "all", "--realisation", "9"), "only 0, 1"),
+        (("--redo", "all", "--work-of-adhesion", "4"), "only 0.01, 0.04"),
+    ):
+        process, _ = run(tmp_path, *words)
+        assert process.returncode == 2
+        assert sentence in process.stderr
+        assert len(process.stderr.splitlines()) == 1
+    assert out.read_bytes() == before
+
+
+def test_an_interrupted_campaign_has_every_cell_about_as_often(tmp_path):
+    log = tmp_path / "log"
+    process, _ = run(tmp_path, fake=f"log={log}", realisations="3")
+    assert process.returncode == 0
+    order = [int(line.rsplit(":", 1)[1]) for line in log.read_text().split()]
+    assert order == [0] * 4 + [1] * 4 + [2] * 4
+
+
+def test_a_doubtful_loss_is_said(tmp_path):
+    process, out = run(tmp_path, fake="doubt=0.7:*:1")
+    assert process.returncode == 0
+    told = "doubtful loss: H = 0.7, γ = 0.01 J/m², realisation 1: audit residual 19 %"
+    assert told in process.stderr
+    assert "2 losses are doubtful: their own checks are off by more than 1 %" in process.stderr
+    text = adhesis("status", out).stdout
+    assert "2 losses are doubtful" in text
+    assert "realisation 1" in text
+    status = json.loads(adhesis("status", out, "--json").stdout)
+    assert [d["row"] for d in status["doubtful"]] == [1, 3]
+
+
 def test_too_many_failures_stop_the_run(tmp_path):
     process, out = run(tmp_path, "--max-failures", "3", fake="fail=*:*:*")
     assert process.returncode == 1
@@ -238,9 +277,15 @@ def test_two_runs_on_one_file(tmp_path):
     assert f"is being written by another run (host {os.uname().nodename}" in second.stderr
     status = json.loads(adhesis("status", out, "--json").stdout)
     assert status["done"] + status["pending"] == 8
+    assert status["run"]["pid"] == first.pid
+    assert 0 <= time.time() - status["last_row"] < 10
+    assert f"a run is writing (host {os.uname().nodename}" in adhesis("status", out).stdout
     first.send_signal(signal.SIGTERM)
     first.communicate(timeout=20)
     assert first.returncode == 75
+    ended = adhesis("status", out).stdout
+    assert "no run is writing; last row " in ended
+    assert json.loads(adhesis("status", out, "--json").stdout)["run"] is None
 
 
 def test_processes_of_another_mpi_are_told(tmp_path, monkeypatch):

@@ -22,8 +22,8 @@ from ensemble.results import schema
 from ensemble.results.layout import create
 from ensemble.results.read import Results
 from ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
-from ensemble.results.write import Writer
-from ensemble.run.lock import RunLock
+from ensemble.results.write import Writer, _RowWriter
+from ensemble.run.lock import RunLock, holder
 from ensemble.task.dataset import KEPT
 from ensemble.task.row import RESULT_DATASETS
 from tests.support.campaign_support import ROOT, campaign_text
@@ -201,6 +201,71 @@ def test_rows_written_before_a_kill_are_whole(path, campaign):
             np.testing.assert_array_equal(curve, fake_result(campaign, task)["unloading_energy"])
 
 
+def cuts(before: bytes, after: bytes):
+    """What the file may be while it goes from one content to the next: range by range."""
+    one, two = (np.frombuffer(b, np.uint8) for b in (before, after))
+    changed = np.flatnonzero(one != two)
+    if not changed.size:
+        return
+    ranges = np.split(changed, np.flatnonzero(np.diff(changed) > 200) + 1)
+    for order in (ranges, ranges[::-1]):
+        now = one.copy()
+        for part in order:
+            now[part] = two[part]
+            yield now.tobytes()
+
+
+def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
+    """Each write is recorded; a kill after each, and within each flush, must not cost a row.
+
+    A killed process leaves behind what it has handed to the system: the file as it is then.
+    """
+    small = {"hurst": "[0.8]", "realisations": "1", "load_steps": "1", "jumps": "1"}
+    campaign = parse_campaign(campaign_text(**small) + "field_penetrations = []\n")
+    tasks, path = campaign.tasks(), tmp_path / "r.h5"
+    create(path, campaign)
+    first = fake_result(campaign, tasks[0])
+    second = first | {"loss": 2.0, "loading_energy": first["loading_energy"] + 1}
+    moments = [path.read_bytes()]
+
+    def recorded(method):
+        def wrapper(*args):
+            method(*args)
+            moments.append(path.read_bytes())
+
+        return wrapper
+
+    monkeypatch.setattr(_RowWriter, "write", recorded(_RowWriter.write))
+    monkeypatch.setattr(Writer, "_flush", recorded(Writer._flush))
+    with Writer(path) as writer:
+        writer.write_result(0, first)
+        writer.write_failure(1, "ValueError: no", 2.5)
+        writer.reset([0, 1])
+        writer.write_result(0, second)
+        writer.write_result(1, fake_result(campaign, tasks[1]))
+    copy, seen, states = tmp_path / "copy.h5", set(), set()
+    for before, after in itertools.pairwise(moments):
+        for content in cuts(before, after):
+            if content in seen:
+                continue
+            seen.add(content)
+            copy.write_bytes(content)
+            with Results(copy) as results:
+                status = results.status()
+                states.add(tuple(status[:2].tolist()))
+                if status[0] == DONE:
+                    kept = results.column("loss")[0]
+                    whole = {first["loss"]: first, 2.0: second}[kept]
+                    for dataset in RESULT_DATASETS:
+                        value = np.asarray(whole[dataset.name], dataset.dtype)
+                        assert results.column(dataset.name)[0].tobytes() == value.tobytes()
+                if status[1] == FAILED:
+                    assert results.errors(np.array([1])) == ["ValueError: no"]
+                    assert results.column("wall_time")[1] == 2.5
+    assert len(seen) > 20
+    assert states == {(0, 0), (1, 0), (1, 2), (0, 2)} | {(1, 1)}
+
+
 # ---------------------------------------------------------------- files that are refused
 
 
@@ -315,7 +380,7 @@ def test_many_tasks_take_little_time_and_memory(tmp_path):
 HOLD_LOCK = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
-from ensemble.run.lock import RunLock
+from ensemble.run.lock import RunLock, holder
 from ensemble.task.dataset import KEPT
 from ensemble.task.row import RESULT_DATASETS
 RunLock(sys.argv[1]).acquire(4, 0.0)
@@ -338,6 +403,77 @@ def test_one_run_a_file_and_a_killed_one_holds_nothing(tmp_path):
     lock.acquire(1, 2.0)
     lock.release()
     assert not list(tmp_path.iterdir())
+
+
+def holding(path, *, join=False):
+    """Start a process that holds the lock, or joins it, until it is killed."""
+    code = HOLD_LOCK.replace(".acquire(4, 0.0)", ".join()") if join else HOLD_LOCK
+    holder = subprocess.Popen(
+        [sys.executable, "-c", code, str(path), str(ROOT)], stdout=subprocess.PIPE, text=True
+    )
+    assert holder.stdout.readline() == "held\n"
+    return holder
+
+
+def fail_while_holding(path, error, then=lambda: None):
+    with RunLock(path) as lock:
+        lock.acquire(1, 2.0)
+        then()
+        raise error
+
+
+def test_the_lock_stays_after_a_failure_so_that_ranks_that_still_write_are_met(tmp_path):
+    path = tmp_path / "r.h5"
+    orphans = []
+    with pytest.raises(RuntimeError):
+        fail_while_holding(
+            path,
+            RuntimeError("the run failed"),
+            lambda: orphans.append(holding(path, join=True)),
+        )
+    try:
+        with pytest.raises(InputError, match="ranks of an earlier run"):
+            RunLock(path).acquire(1, 0.2)
+    finally:
+        orphans[0].kill()
+        orphans[0].wait()
+    # Bad input is met before any rank writes: nothing stays behind.
+    with pytest.raises(InputError, match="bad"):
+        fail_while_holding(path, InputError("bad"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_lock_file_that_is_replaced_while_a_run_waits_is_not_taken_for_the_lock(
+    tmp_path, monkeypatch
+):
+    """Between opening and locking, its holder removes the file and another run makes its own."""
+    path = tmp_path / "r.h5"
+    real, holders = os.open, []
+
+    def opened_too_early(name, *rest):
+        descriptor = real(name, *rest)
+        if not holders:
+            os.unlink(name)
+            holders.append(holding(path))
+        return descriptor
+
+    monkeypatch.setattr("ensemble.run.lock.os.open", opened_too_early)
+    try:
+        with pytest.raises(InputError, match="another run"):
+            RunLock(path).acquire(1, 0.2)
+    finally:
+        holders[0].kill()
+        holders[0].wait()
+
+
+def test_who_holds_a_results_file_is_known_without_waiting_for_it(tmp_path):
+    path = tmp_path / "r.h5"
+    assert holder(path) is None
+    process = holding(path)
+    assert holder(path)["pid"] == process.pid
+    process.kill()
+    process.wait()
+    assert holder(path) is None  # its file is still there
 
 
 def test_ranks_that_outlive_their_launcher_are_waited_for(tmp_path):

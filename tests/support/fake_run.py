@@ -2,7 +2,8 @@
 
 BEHAVIOUR is a list of words, tasks given as H:γ:realisation with ``*`` for any:
 ``step=SECONDS`` time of a load step, ``fail=TASK`` raise, ``hang=TASK`` never reach the next load
-step, ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's,
+step, ``deaf=TASK`` take 0.3 s without looking up, ``doubt=TASK`` a loss whose audit is 19 % off,
+``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's,
 ``serial=1`` as if HDF5 had no MPI, ``full=BYTES`` no file may be written beyond so many bytes.
 """
 
@@ -45,7 +46,8 @@ def fake_result(campaign: Campaign, task: Task) -> Row:
         drawn = rng.random(shape) if dataset.dtype == "f8" else rng.integers(0, 2, shape)
         if keep or dataset.dims[0] != KEPT:
             values[dataset.name] = np.asarray(drawn, dataset.dtype)
-    return {k: v if v.ndim else v.item() for k, v in values.items()}
+    row = {k: v if v.ndim else v.item() for k, v in values.items()}
+    return row | {"audit_residual": 1e-4 * row["audit_residual"]}
 
 
 def fake_engine(behaviour: str) -> Engine:
@@ -60,13 +62,17 @@ def fake_engine(behaviour: str) -> Engine:
         broken = broken or matches(settings.get("crash"), task)
         while matches(settings.get("hang"), task):
             time.sleep(0.01)
+        if matches(settings.get("deaf"), task):
+            time.sleep(0.3)
+            return fake_result(campaign, task)
         for _ in range(campaign.cycle.load_steps):
             time.sleep(float(settings.get("step", 0)))
             if progress is not None:
                 progress("loading", 0.0, None)
         if matches(settings.get("fail"), task):
             raise FloatingPointError("the sum of γ diverged")
-        return fake_result(campaign, task)
+        row = fake_result(campaign, task)
+        return row | {"audit_residual": 0.19} if matches(settings.get("doubt"), task) else row
 
     class FakeWriter(Writer):
         """A writer on a disk that fills, or with an error of its own."""
