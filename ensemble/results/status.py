@@ -43,7 +43,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy
         state = results.status()
-        names = (*_TASK, "wall_time", "loss", "loss_dimensionless", "audit_residual")
+        names = (*_TASK, "wall_time", "loss", "loss_dimensionless", "audit_residual", "loss_error")
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
@@ -74,13 +74,16 @@ def read_status(path: Path | str) -> dict[str, Any]:
 def _doubtful(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]], accuracy: float
 ) -> list[dict[str, Any]]:
-    wrong = doubtful(accuracy, column["loss"], column["audit_residual"])
+    wrong = doubtful(accuracy, column["loss"], column["audit_residual"], column["loss_error"])
     rows = np.flatnonzero(wrong & (state == DONE))
     rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
     return [
         {
             "row": row,
-            **{name: column[name][row].item() for name in (*_TASK, "loss", "audit_residual")},
+            **{
+                name: column[name][row].item()
+                for name in (*_TASK, "loss", "audit_residual", "loss_error")
+            },
         }
         for row in rows.tolist()
     ]
@@ -170,12 +173,13 @@ def _group_line(group: dict[str, Any]) -> str:
 
 
 def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
-    lines = [f"{len(doubts)} losses are doubtful: loop integral and sum of drops differ"]
+    lines = [f"{len(doubts)} losses are doubtful: their own checks say that they are off"]
     for d in doubts[:_MOST_FAILURES_SHOWN]:
         lines.append(
             f"  row {d['row']}: H = {d['hurst']:g}, γ = {d['work_of_adhesion']:g} J/m², "
             f"realisation {d['realisation']}, seed {d['seed']}: audit residual "
-            f"{100 * d['audit_residual']:.2g} %"
+            f"{100 * d['audit_residual']:.2g} %, "
+            f"estimated error {100 * d['loss_error'] / (abs(d['loss']) or 1):.2g} %"
         )
     if len(doubts) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(doubts) - _MOST_FAILURES_SHOWN} more (--json lists all)")

@@ -34,7 +34,7 @@ class Told:
 
     Attributes
     ----------
-    loss : float
+    loss, loss_error : float
         In J/m².
     audit_residual : float
     doubtful : bool
@@ -43,6 +43,7 @@ class Told:
 
     loss: float
     audit_residual: float
+    loss_error: float
     doubtful: bool
 
 
@@ -301,8 +302,9 @@ class _Session:
         if row is None:
             return None
         loss, residual = float(row["loss"]), float(row["audit_residual"])
-        wrong = doubtful(self._campaign.solver.accuracy, loss, residual, row.get("loss_error", 0.0))
-        return Told(loss, residual, bool(wrong))
+        error = float(row["loss_error"])
+        wrong = doubtful(self._campaign.solver.accuracy, loss, residual, error)
+        return Told(loss, residual, error, bool(wrong))
 
     def _count(self, outcome: Outcome, progress: ProgressLine) -> None:
         if outcome.error is None:
@@ -311,7 +313,11 @@ class _Session:
             if told.doubtful:
                 self._counts.doubtful += 1
                 what = str(self._plan.tasks[outcome.task])
-                progress.doubt(f"{what}: audit residual {100 * told.audit_residual:.2g} %")
+                share = 100 * told.loss_error / (abs(told.loss) or 1.0)
+                progress.doubt(
+                    f"{what}: audit residual {100 * told.audit_residual:.2g} %, "
+                    f"estimated error {share:.2g} %"
+                )
         else:
             self._counts.failed += 1
             progress.failure(str(self._plan.tasks[outcome.task]), outcome.error)

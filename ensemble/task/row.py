@@ -114,6 +114,18 @@ NUMBERS = (
         lambda loop: loop.audit_residual,
     ),
     _task(
+        *("loss_error", FLOAT, "J m-2", "estimated numerical error of the loss"),
+        lambda loop: loop.loss_error,
+    ),
+    _task(
+        *("races", COUNT, "1", "jumps that another rule of descent would have ended elsewhere"),
+        lambda loop: loop.races,
+    ),
+    _task(
+        *("energy_at_stake", FLOAT, "J m-2", "energy between the ends of those jumps"),
+        lambda loop: loop.energy_at_stake,
+    ),
+    _task(
         *("pull_off_penetration", FLOAT, "1", "penetration/h_max where the last contact is lost"),
         lambda loop: loop.pull_off_penetration,
     ),

@@ -51,6 +51,7 @@ def test_curves_end_in_zeros_after_detachment():
     np.testing.assert_array_equal(unloading[: n + 3], np.arange(n + 3, 2 * n + 6))
     assert not unloading[n + 3 :].any()
     assert row["audit_residual"] == 0.25
+    assert (row["loss_error"], row["races"], row["energy_at_stake"]) == (0.02, 0, 0.0)
 
 
 def test_curves_are_cut_where_the_axis_ends():
