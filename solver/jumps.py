@@ -36,7 +36,7 @@ SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
 
 @dataclass(frozen=True)
 class Jump:
-    """One jump at fixed separation.
+    """One jump, at fixed separation (or what else is prescribed).
 
     Attributes
     ----------
@@ -44,7 +44,8 @@ class Jump:
     separation : float
         s at which stability is lost, in m.
     energy_drop : float
-        U before minus U after, per unit nominal area, in J/m²; not negative.
+        U before minus U after (the potential W, where the separation is not fixed), per unit
+        nominal area, in J/m²; not negative.
     kind : JumpKind
     patches_before, patches_after : int
     contact_before, contact_after : float
@@ -85,7 +86,7 @@ class Jump:
         raced: bool = False,
         at_stake: float = 0.0,
     ) -> Jump:
-        """Jump from one contact state to another at the same separation.
+        """Jump from one contact state to another, what is prescribed being the same.
 
         A drop that rounding and the field's error have made negative counts as zero.
 
@@ -102,7 +103,7 @@ class Jump:
         return cls(
             branch=branch,
             separation=before.separation,
-            energy_drop=max(0.0, (before.energy - after.energy) / period),
+            energy_drop=max(0.0, (before.potential - after.potential) / period),
             kind=kind,
             patches_before=before.patches,
             patches_after=after.patches,

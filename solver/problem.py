@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from solver.control import Control
 from solver.material import HalfSpace
 from solver.profile import Profile
+from solver.state import ContactState
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +23,8 @@ class Problem:
     half_space : HalfSpace
     work_of_adhesion : float
         γ in J/m², finite, not negative (γ = 0 is contact without adhesion).
+    control : Control
+        What holds the half-space; a fixed separation by default.
 
     Raises
     ------
@@ -36,6 +40,7 @@ class Problem:
     profile: Profile
     half_space: HalfSpace
     work_of_adhesion: float
+    control: Control = field(default_factory=Control)
 
     def __post_init__(self) -> None:
         gamma = self.work_of_adhesion
@@ -62,6 +67,20 @@ class Problem:
     def separation(self, penetration: float) -> float:
         """Separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""
         return self.profile.h_max * (1.0 - penetration)
+
+    def prescribed(self, drive: float) -> float:
+        """What is prescribed (x of :mod:`solver.control`) where a path is at ``drive``.
+
+        Parameters
+        ----------
+        drive : float
+            Δ/h_max at fixed separation, u_tot/h_max for a stiffness, p̄ in Pa for a load.
+        """
+        return -drive if self.control.is_load else self.separation(drive)
+
+    def prescribed_in(self, state: ContactState) -> float:
+        """What is prescribed (x of :mod:`solver.control`) in a state: in m, for a load in Pa."""
+        return self.control.prescribed(state.separation, state.mean_stress)
 
     def penetration(self, separation: float) -> float:
         """Penetration Δ~ = 1 - s/h_max at the separation s in m."""

@@ -26,7 +26,10 @@ class ContactState:
     contact_fraction : float
         A/A0.
     stiffness : float
-        dp̄/ds along the branch in Pa/m where the method knows it, else NaN.
+        dp̄/ds along the branch in Pa/m where the method knows it, else NaN; under another control
+        than a fixed separation dY/dx (:mod:`solver.control`).
+    hold_energy : float
+        What the control adds to U, in J/m per period; 0 at fixed separation.
     internal : object
         What the method needs to go on from here; nobody else reads it.
 
@@ -42,6 +45,7 @@ class ContactState:
     adhesion_energy: float
     contact_fraction: float
     stiffness: float = float("nan")
+    hold_energy: float = 0.0
     internal: Any = field(default=None, repr=False)
 
     @property
@@ -53,3 +57,8 @@ class ContactState:
     def energy(self) -> float:
         """U = elastic + adhesion energy of one period, in J/m."""
         return self.elastic_energy + self.adhesion_energy
+
+    @property
+    def potential(self) -> float:
+        """W of :mod:`solver.control` in J/m: what is minimal under the control; U if s is fixed."""
+        return self.energy + self.hold_energy

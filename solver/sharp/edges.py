@@ -40,6 +40,10 @@ class Counters:
     descent_steps: int = 0
 
 
+class FullContact(Exception):
+    """The last gap of the period closes: no state of gaps is left."""
+
+
 @dataclass(frozen=True, eq=False)
 class Point:
     """A stable equilibrium on a branch.
@@ -173,6 +177,8 @@ class EdgeMechanics:
         ------
         RuntimeError
             If the descent does not end.
+        FullContact
+            If the last gap closes, as it may where the separation is not fixed.
         """
         left = _DESCENT_LIMIT
         kinds = _ANY
@@ -189,6 +195,10 @@ class EdgeMechanics:
                 rest = self.without_small(gaps)
                 if rest is not None:
                     return rest
+                if self.law.hold.give > 0 and len(gaps) == 1:
+                    length, _ = self.widths(gaps)
+                    if length[0] < self.smallest:
+                        raise FullContact
             if ended == RESTING:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.

@@ -237,6 +237,11 @@ class GapField:
         """∂p/∂d at fixed edges; negative."""
         return -2 * np.pi / float(self.solution.resistance)
 
+    @property
+    def separation_by_prescribed(self) -> float:
+        """∂(q0 s)/∂d at fixed edges."""
+        return -float(self.solution.unit_mean) * self.pressure_by_prescribed / (2 * np.pi)
+
     @cached_property
     def opening_by_prescribed(self) -> Array:
         """∂C/∂d at fixed edges, shape (L, 2)."""

@@ -38,10 +38,10 @@ class Resolution:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a path goes: q0 s, the same in m without rounding, and on which branch."""
+    """Where a path goes: d, the same in m or Pa without rounding, and on which branch."""
 
     at: float
-    separation: float
+    prescribed: float
     branch: Branch
 
 
@@ -108,7 +108,7 @@ class Follower:
                     touched, clearance = self.nucleation.located(trail, self.resolution.jump)
                     if touched is not None:
                         return self._touch(trace, *touched, target.branch)
-                    look, trail = reached.at - clearance / _FASTEST_CLOSING, [reached]
+                    look, trail = reached.at - clearance / self._closing(reached), [reached]
             small = self.edges.without_small(reached.field.gaps)
             if small is not None:
                 last = self.states.of_point(reached)
@@ -117,11 +117,21 @@ class Follower:
                 return reached.at, after
             point, wanted = reached, 2 * abs(step)
             if point.at == target.at:
-                trace.states.append(self.states.of_point(point, target.separation))
+                exact = target.prescribed if self.states.problem.control.is_fixed else None
+                trace.states.append(self.states.of_point(point, exact))
             elif error > 1:
                 trace.states.append(self.states.of_point(point))
                 shown = point
         return target.at, point
+
+    def _closing(self, point: Point) -> float:
+        """How fast a gap may close locally, in units of d."""
+        if self.states.problem.control.is_fixed:
+            return _FASTEST_CLOSING
+        # d(q0 s)/dd along the branch, from d = share q0 s - give p and dY/dd
+        share, give = self.edges.law.hold
+        mean = 1 + give * point.slope if share else point.slope
+        return _FASTEST_CLOSING * max(1.0, abs(mean))
 
     def _touch(
         self, trace: Trace, point: Point, touches: list[Touch], branch: Branch
@@ -157,5 +167,7 @@ class Follower:
         """Error of the trapezoidal rule since the last state shown, in units of what is allowed."""
         span = abs(point.at - shown.at)
         # p = q0 h_max is σ~ = 1
-        scale = max(abs(point.field.pressure), _QUIET * self.resolution.scale)
+        load = self.states.problem.control.is_load
+        conjugate = point.field.separation - self.resolution.scale if load else point.field.pressure
+        scale = max(abs(conjugate), _QUIET * self.resolution.scale)
         return float(span * abs(point.slope - shown.slope) / 12 / (self.resolution.bend * scale))

@@ -46,7 +46,9 @@ class Jumps:
             if grown is None or self._same(grown.field.gaps, point.field.gaps):
                 break
             point = grown
-        after = self.states.detached(at) if point is None else self.states.of_point(point)
+        after = self.states.after_loss(before, at)
+        if point is not None:
+            after = self.states.of_point(point)
         trace.jumps.append(self.states.jump(before, after, branch))
         trace.states.append(after)
         return point

@@ -9,19 +9,27 @@ down to the wanted resolution of a jump, and the edges then descend in energy at
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from solver.jumps import Branch
-from solver.method import ContactState, Fields, Method, MethodReport, Opening, Path
+from solver.method import (
+    ContactState,
+    Fields,
+    Method,
+    MethodReport,
+    Opening,
+    Path,
+    PathError,
+)
 from solver.problem import Problem
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point
 from solver.sharp.follow import Follower, Resolution, Target
 from solver.sharp.jump import Jumps
 from solver.sharp.output import fields_of, openings_of
 from solver.sharp.source import StressSource
-from solver.sharp.states import States, Trace
+from solver.sharp.states import States, Trace, hold_of
 from solver.sharp.touch import Nucleation
 
 _RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
@@ -81,14 +89,14 @@ class SharpMethod(Method):
         tolerance = float(np.clip(_FIELD_ACCURACY * accuracy, 1e-14, 1e-5))
         source = StressSource(profile, tolerance)
         critical = 4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus))
-        self.edges = EdgeMechanics(source, critical, tolerance)
+        self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
+        self.states = States(problem, source, self.edges.count)
         self.resolution = Resolution(
             jump=_RESOLUTION * accuracy * h_max,
             bend=float(_BEND * np.sqrt(min(1.0, accuracy / 1e-3))),
             scale=h_max,
         )
         self.nucleation = Nucleation(problem, self.edges)
-        self.states = States(problem, source, self.edges.count)
         self.jumps = Jumps(self.edges, self.nucleation, self.states)
         self.follower = Follower(
             self.edges, self.nucleation, self.states, self.jumps, self.resolution
@@ -110,68 +118,88 @@ class SharpMethod(Method):
         """Stress, displacement and gap of ``state`` on n nodes, by quadrature over the gaps."""
         field = None
         if state.patches:
-            field = self.edges.field(state.internal, state.separation * self.q0)
+            field = self.edges.field(state.internal, self.states.place(state))
         return fields_of(self.problem, field, state.separation, n)
 
     def openings(self, state: ContactState) -> list[Opening]:
         """Openings of all gaps from their series."""
         if not state.patches:
             return []
-        return openings_of(self.edges.field(state.internal, state.separation * self.q0), self.q0)
+        return openings_of(self.edges.field(state.internal, self.states.place(state)), self.q0)
 
-    def follow(self, state: ContactState, separation: float) -> Path:
+    def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the quasi-static path; see the contract."""
-        branch: Branch = "loading" if separation <= state.separation else "unloading"
+        branch: Branch = "unloading"
+        if prescribed <= self.problem.prescribed_in(state):
+            branch = "loading"
+        target = Target(self.states.at(prescribed), prescribed, branch)
         if self.problem.work_of_adhesion == 0:
-            return self._follow_reversibly(state, separation)
-        trace = self._trace(state, Target(separation * self.q0, separation, branch))
+            return self._follow_reversibly(state, target)
+        try:
+            trace = self._trace(state, target)
+        except FullContact:
+            raise PathError(self._full_contact(prescribed)) from None
         return Path(tuple(trace.states), tuple(trace.jumps))
 
     def _trace(self, state: ContactState, target: Target) -> Trace:
         """States and jumps from ``state`` to the target."""
         trace = Trace()
-        at = state.separation * self.q0
+        control = self.problem.control
+        at = self.states.place(state)
+        # the separation of a state at the target, where it is known without rounding
+        exact = target.prescribed if control.is_fixed else None
         point: Point | None
         if not state.patches:
-            first, highest = self.nucleation.first_touch()
+            touch, highest = self.nucleation.first_touch()
+            first = 0.0 if control.is_load else touch
             if target.branch == "unloading" or target.at > first:
-                trace.states.append(self.detached(target.separation))
+                apart = state.separation if control.is_load else target.prescribed
+                trace.states.append(self.detached(apart))
                 return trace
             at = first
-            before = self.states.detached(at)
+            before = self.states.detached(touch)
             trace.states.append(before)
             point = self.jumps.run(trace, before, np.empty((0, 2)), at, target.branch, highest)
         else:
             gaps = state.internal
             point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
             if point is None:
-                before = self.states.of_field(self.edges.field(gaps, at), at)
+                before = self.states.of_field(self.edges.field(gaps, at))
                 trace.states.append(before)
                 point = self.jumps.run(trace, before, gaps, at, target.branch)
             elif at == target.at:
-                trace.states.append(self.states.of_point(point, target.separation))
+                trace.states.append(self.states.of_point(point, exact))
         while point is not None and at != target.at:
             at, point = self.follower.run(trace, point, target)
-        if point is None and at != target.at:
-            trace.states.append(self.detached(target.separation))
+        if point is None and at != target.at and not control.is_load:
+            trace.states.append(self.detached(target.prescribed))
         return trace
 
-    def _follow_reversibly(self, state: ContactState, separation: float) -> Path:
-        """Without adhesion the state at a separation is unique, and nothing jumps.
+    def _full_contact(self, prescribed: float) -> str:
+        where = f"before a mean stress of {-prescribed:g} Pa"
+        if not self.problem.control.is_load:
+            where = f"before u_tot/h_max = {self.problem.penetration(prescribed):g}"
+        return f"the contact runs into full contact {where}: no state with a gap carries that"
+
+    def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
+        """Without adhesion the state is unique, and nothing jumps.
 
         On loading patches appear, grow and merge smoothly. Unloading goes back through the states
         of loading; a state that is missing is loaded to from a lighter one.
         """
-        target = Target(separation * self.q0, separation, "loading")
-        if separation <= state.separation:
+        place = self.problem.prescribed_in
+        if target.branch == "loading":
             states = self._trace(state, target).states
             self._loaded += states
             return Path(tuple(states), ())
-        lighter = [s for s in self._loaded if s.separation >= separation]
-        back = [s for s in self._loaded if state.separation < s.separation < separation]
-        first = self.detached(max(separation, self.problem.profile.h_max))
-        start = min(lighter, key=lambda s: s.separation, default=first)
-        if start.separation > separation:
-            start = self._trace(start, target).states[-1]
-        back.reverse()  # states at one separation come in the order opposite to loading
-        return Path((*sorted(back, key=lambda s: s.separation), start), ())
+        lighter = [s for s in self._loaded if place(s) >= target.prescribed]
+        back = [s for s in self._loaded if place(state) < place(s) < target.prescribed]
+        h_max = self.problem.profile.h_max
+        first = self.detached(
+            h_max if self.problem.control.is_load else max(target.prescribed, h_max)
+        )
+        start = min(lighter, key=place, default=first)
+        if place(start) > target.prescribed:
+            start = self._trace(start, replace(target, branch="loading")).states[-1]
+        back.reverse()  # states at one place come in the order opposite to loading
+        return Path((*sorted(back, key=place), start), ())

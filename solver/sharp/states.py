@@ -10,7 +10,7 @@ from solver.jumps import Branch, Jump
 from solver.method import ContactState
 from solver.problem import Problem
 from solver.sharp.edges import Counters, Point
-from solver.sharp.field import GapField
+from solver.sharp.field import GapField, Hold
 from solver.sharp.opening import work_of_gaps
 from solver.sharp.source import StressSource
 
@@ -21,6 +21,14 @@ class Trace:
 
     states: list[ContactState] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
+
+
+def hold_of(problem: Problem) -> Hold:
+    """The control of a problem in the units of the field."""
+    if problem.control.is_load:
+        return Hold(0.0, 1.0)
+    give = 0.5 * problem.half_space.modulus * problem.profile.q0 / problem.control.stiffness
+    return Hold(1.0, give)
 
 
 class States:
@@ -43,24 +51,56 @@ class States:
         h = np.abs(profile.coefficients * self.q0) ** 2
         self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
 
-    def detached(self, at: float) -> ContactState:
-        """State without contact at q0 s = ``at``."""
-        return ContactState(at / self.q0, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+    def at(self, prescribed: float) -> float:
+        """What is prescribed, in the units of the field: of a separation or u_tot q0 times it."""
+        if self.problem.control.is_load:
+            return prescribed / self._half
+        return prescribed * self.q0
+
+    def place(self, state: ContactState) -> float:
+        """What is prescribed in a state, in the units of the field."""
+        return self.at(self.problem.prescribed_in(state))
+
+    def detached(self, separation: float) -> ContactState:
+        """State without contact at q0 s = ``separation``."""
+        return ContactState(separation / self.q0, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def _per_prescribed(self) -> float:
+        """dY/dx in SI units where dY/dd is 1."""
+        per = self._half * self.q0
+        return 1 / per if self.problem.control.is_load else per
+
+    def after_loss(self, before: ContactState, at: float) -> ContactState:
+        """State without contact that ``before`` leaves behind at d = ``at``.
+
+        Under a load nothing holds it: the loop is closed at the separation of the loss.
+        """
+        if self.problem.control.is_load:
+            return self.detached(before.separation * self.q0)
+        return self.detached(at)
+
+    def _hold_energy(self, separation: float, mean_stress: float) -> float:
+        profile, control = self.problem.profile, self.problem.control
+        return control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """State of a point of a branch; ``separation`` (m) where it is known without rounding."""
-        return self.of_field(point.field, point.at, point.slope, separation)
+        return self.of_field(point.field, point.slope, separation)
 
     def of_field(
         self,
         gap_field: GapField,
-        at: float,
         slope: float = float("nan"),
         separation: float | None = None,
     ) -> ContactState:
-        """State of a field at q0 s = ``at``, dp/d(q0 s) = ``slope``."""
+        """State of a field with dY/dd = ``slope``; ``separation`` (m) as in :meth:`of_point`."""
         self.count.energies += 1
         half = self._half
+        at = gap_field.separation
+        if separation is None:
+            separation = at / self.q0
+        mean_stress = gap_field.pressure * half
         gaps = gap_field.gaps
         left = np.append(gaps[-1, 1] - 2 * np.pi, gaps[:-1, 1])  # of the patch before each gap
         right = gaps[:, 0]
@@ -71,27 +111,33 @@ class States:
             self._full_energy + 0.5 * work_of_gaps(gap_field) - np.pi * at * gap_field.pressure
         )
         return ContactState(
-            separation=at / self.q0 if separation is None else separation,
+            separation=separation,
             edges=patches[np.argsort(patches[:, 0])],
-            mean_stress=gap_field.pressure * half,
+            mean_stress=mean_stress,
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
             contact_fraction=float((right - left).sum() / (2 * np.pi)),
-            stiffness=slope * half * self.q0,
+            stiffness=slope * self._per_prescribed,
+            hold_energy=self._hold_energy(separation, mean_stress),
             internal=gaps,
         )
 
     def shifted(self, state: ContactState, gap_field: GapField, at: float) -> ContactState:
-        """State at q0 s = ``at`` with the edges of ``state``: p is linear in s, U quadratic."""
-        way = at - gap_field.separation
+        """State at d = ``at`` with the edges of ``state``: p is linear in s, U quadratic."""
+        way = at - gap_field.prescribed
         pressure = gap_field.pressure + gap_field.pressure_by_prescribed * way
-        work = -np.pi * way * (gap_field.pressure + pressure)
+        apart = at
+        if not self.problem.control.is_fixed:
+            apart = gap_field.separation + gap_field.separation_by_prescribed * way
+        work = -np.pi * (apart - gap_field.separation) * (gap_field.pressure + pressure)
+        separation, mean_stress = apart / self.q0, pressure * self._half
         return replace(
             state,
-            separation=at / self.q0,
-            mean_stress=pressure * self._half,
+            separation=separation,
+            mean_stress=mean_stress,
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             stiffness=float("nan"),
+            hold_energy=self._hold_energy(separation, mean_stress),
         )
 
     def jump(self, before: ContactState, after: ContactState, branch: Branch) -> Jump:
