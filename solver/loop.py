@@ -15,6 +15,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.control import Control
 from solver.jumps import Branch, Jump
 from solver.method import ContactState, Method, MethodReport, Path, PathError
 from solver.problem import Problem
@@ -34,8 +35,11 @@ class LoopResult:
     Attributes
     ----------
     problem : Problem
+    turning_point : float
+        What was asked for at the turning point: Δ/h_max, u_tot/h_max where a stiffness holds the
+        half-space, p̄ in Pa under a load.
     max_penetration : float
-        Δ/h_max at the turning point, as asked for.
+        Δ/h_max at the turning point: as asked for, or where the control does not fix it, as found.
     load_steps : int
         Equal steps of the loading branch.
     branch : array of str, shape (states,)
@@ -56,7 +60,7 @@ class LoopResult:
         In J/m, per period.
     jumps : tuple of Jump
     loss : float
-        ∮ p̄ dΔ in J/m² of nominal area, over all states (:func:`integral`).
+        ∮ p̄ dΔ in J/m² of nominal area, over all states (:func:`integral`; :mod:`solver.control`).
     loss_dimensionless : float
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
     loss_from_drops : float
@@ -74,6 +78,7 @@ class LoopResult:
     """
 
     problem: Problem = field(repr=False)
+    turning_point: float
     max_penetration: float
     load_steps: int
     branch: NDArray[np.str_]
@@ -150,33 +155,42 @@ class LoopResult:
         return np.flatnonzero(chosen & self.load_step if load_steps_only else chosen)
 
 
-def integral(separation: Array, mean_stress: Array, stiffness: Array) -> float:
-    """∫ p̄ ds over the states, in J/m²: trapezoidal rule, end-corrected where dp̄/ds is known.
+def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:
+    """∫ Y dx over the states, in J/m²: trapezoidal rule, end-corrected where dY/dx is known.
 
-    The correction h²/12 (p̄'_0 - p̄'_1) raises the order from two to four on smooth pieces; it is
-    left out where a stiffness is NaN.
+    At fixed separation that is ∫ p̄ ds. The correction h²/12 (Y'_0 - Y'_1) raises the order from two
+    to four on smooth pieces; it is left out where a stiffness is NaN.
 
     Parameters
     ----------
-    separation, mean_stress, stiffness : array, shape (states,)
-        In m, Pa and Pa/m, in the order of the path.
+    prescribed, conjugate, stiffness : array, shape (states,)
+        x, Y and dY/dx (:mod:`solver.control`; m, Pa and Pa/m, or Pa, m and m/Pa), in the order of
+        the path.
     """
-    bend = -np.diff(stiffness) * np.diff(separation) ** 2 / 12
-    return float(np.trapezoid(mean_stress, separation)) + float(np.nansum(bend))
+    bend = -np.diff(stiffness) * np.diff(prescribed) ** 2 / 12
+    return float(np.trapezoid(conjugate, prescribed)) + float(np.nansum(bend))
 
 
-def check_cycle(max_penetration: float, load_steps: int) -> None:
+def check_cycle(turning_point: float, load_steps: int, control: Control | None = None) -> None:
     """Refuse a cycle that cannot be run.
 
     Raises
     ------
     ValueError
-        Unless 0 < max_penetration < 1 and load_steps is a whole number of at least 1.
+        Unless the turning point is positive and finite and, at fixed separation, below 1, and
+        load_steps is a whole number of at least 1.
     """
-    if not (np.isfinite(max_penetration) and 0 < max_penetration < 1):
+    control = control or Control()
+    sound = bool(np.isfinite(turning_point)) and turning_point > 0
+    if control.is_fixed and not (sound and turning_point < 1):
         raise ValueError(
-            f"max_penetration is {max_penetration!r}: it must lie between 0 and 1, both excluded "
+            f"max_penetration is {turning_point!r}: it must lie between 0 and 1, both excluded "
             "(in units of h_max; at 1 the mean gap would be zero, and no such state exists)"
+        )
+    if not sound:
+        name, unit = ("max_stress", "Pa") if control.is_load else ("max_penetration", "h_max")
+        raise ValueError(
+            f"{name} is {turning_point!r}: it must be positive and finite, in units of {unit}"
         )
     if load_steps != int(load_steps) or load_steps < 1:
         raise ValueError(f"load_steps is {load_steps!r}: it must be a whole number of at least 1")
@@ -225,18 +239,21 @@ class Record:
 def run_loop(
     method: Method,
     *,
-    max_penetration: float,
+    max_penetration: float | None = None,
+    max_stress: float | None = None,
     load_steps: int,
     progress: Progress | None = None,
     on_state: Callable[[Branch, ContactState], None] | None = None,
 ) -> LoopResult:
-    """Load from first touch to ``max_penetration``, then unload until detached.
+    """Load from first touch to the turning point, then unload until detached.
 
     Parameters
     ----------
     method : Method
     max_penetration : float
-        Δ~max = Δ/h_max, 0 < Δ~max < 1.
+        Δ~max = Δ/h_max, 0 < Δ~max < 1; where a stiffness holds the half-space u_tot/h_max.
+    max_stress : float
+        Under a load, instead: p̄ in Pa, positive.
     load_steps : int
         Equal steps of the loading branch; unloading goes on with the same step.
     progress : callable, optional
@@ -256,28 +273,48 @@ def run_loop(
     ----------
     docs/theory.md, "3. The loop"
     """
-    check_cycle(max_penetration, load_steps)
+    turning_point = _turning_point(method.problem, max_penetration, max_stress)
+    check_cycle(turning_point, load_steps, method.problem.control)
     started = process_time()
     record = Record(on_state)
-    for branch, index, state in _steps(method, record, max_penetration, load_steps):
+    for branch, index, state in _steps(method, record, turning_point, load_steps):
         if progress is not None:
-            progress(branch, max_penetration * index / load_steps, state)
-    return _result(method, record, max_penetration, load_steps, started)
+            progress(branch, turning_point * index / load_steps, state)
+    return _result(method, record, turning_point, load_steps, started)
+
+
+def _turning_point(
+    problem: Problem, max_penetration: float | None, max_stress: float | None
+) -> float:
+    """The turning point that belongs to the control.
+
+    Raises
+    ------
+    ValueError
+        If the other one is given, or none.
+    """
+    wanted, other = ("max_penetration", max_penetration), ("max_stress", max_stress)
+    if problem.control.is_load:
+        wanted, other = other, wanted
+    if wanted[1] is None or other[1] is not None:
+        held = "a load" if problem.control.is_load else "a separation or a stiffness"
+        raise ValueError(f"a path under {held} turns at {wanted[0]}: give that, and no {other[0]}")
+    return wanted[1]
 
 
 def _steps(
-    method: Method, record: Record, max_penetration: float, load_steps: int
+    method: Method, record: Record, turning_point: float, load_steps: int
 ) -> Iterator[tuple[Branch, int, ContactState]]:
     """Go through the load steps of a loop; gives branch, place on the axis and state of each."""
     problem = method.problem
 
-    def separation(index: int) -> float:
-        return problem.separation(max_penetration * index / load_steps)
+    def prescribed(index: int) -> float:
+        return problem.prescribed(turning_point * index / load_steps)
 
     state = method.detached(problem.profile.h_max)
     record.visit("loading", False, state)
     for i in range(load_steps + 1):
-        state = record.extend("loading", method.follow(state, separation(i)))
+        state = record.extend("loading", method.follow(state, prescribed(i)))
         yield "loading", i, state
     # The turning point belongs to both branches: it starts the unloading curve.
     record.visit("unloading", True, state)
@@ -285,22 +322,32 @@ def _steps(
     while state.patches:
         i -= 1
         if load_steps - i > _MAX_UNLOADING_STROKES * load_steps:
-            raise PathError(f"still in contact at Δ/h_max = {max_penetration * i / load_steps}")
-        state = record.extend("unloading", method.follow(state, separation(i)))
+            raise PathError(f"still in contact at {turning_point * i / load_steps:g}")
+        state = record.extend("unloading", method.follow(state, prescribed(i)))
         yield "unloading", i, state
 
 
 def _result(
-    method: Method, record: Record, max_penetration: float, load_steps: int, started: float
+    method: Method, record: Record, turning_point: float, load_steps: int, started: float
 ) -> LoopResult:
     """The loop of a record; ``started`` is the CPU time at which it was begun, in s."""
     problem = method.problem
     separation = record.column("separation")
     mean_stress = record.column("mean_stress")
-    loss = -integral(separation, mean_stress, record.column("stiffness"))  # dΔ = -ds
+    control, h_max = problem.control, problem.profile.h_max
+    loss = -integral(
+        control.prescribed(separation, mean_stress),
+        control.conjugate(separation, mean_stress, h_max),
+        record.column("stiffness"),
+    )
+    max_penetration = turning_point
+    if not control.is_fixed:
+        turn = record.branches.index("unloading")
+        max_penetration = problem.penetration(separation[turn])
     drops = float(sum(jump.energy_drop for jump in record.jumps))
     return LoopResult(
         problem=problem,
+        turning_point=turning_point,
         max_penetration=max_penetration,
         load_steps=load_steps,
         branch=np.array(record.branches),
