@@ -16,8 +16,8 @@ load           -p̄                     s - h_max = -Δ  U - λ p̄ Δ
 
 At equilibrium dW/dx = -λ Y, so over a closed loop the loss is -∮ Y dx (which is ∮ p̄ dΔ), and it is
 the sum of the drops of W at the jumps, which happen at fixed x. Under a load the solid falls off
-once contact is lost; the loop is closed where that happens, and W = U there: the load's own work
-afterwards is no loss of the contact.
+once contact is lost, and its work from there on has no bound; the loop is closed at the separation
+of the loss, where the drop is U. That may be negative: it is what the load has still to bring up.
 """
 
 from __future__ import annotations

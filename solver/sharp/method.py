@@ -33,6 +33,7 @@ from solver.sharp.states import States, Trace, hold_of
 from solver.sharp.touch import Nucleation
 
 _RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
+_NOISE = 1e-13  # of h_max: no jump is located more finely
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
 _BEND = 1.5e-4  # largest relative error of the trapezoidal rule over one step
 
@@ -91,8 +92,10 @@ class SharpMethod(Method):
         critical = 4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus))
         self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
         self.states = States(problem, source, self.edges.count)
+        # Under a load s goes like a square root before a fold, and where contact is lost it counts.
+        late = accuracy if problem.control.is_load else 1.0
         self.resolution = Resolution(
-            jump=_RESOLUTION * accuracy * h_max,
+            jump=max(_RESOLUTION * accuracy * late, _NOISE) * h_max,
             bend=float(_BEND * np.sqrt(min(1.0, accuracy / 1e-3))),
             scale=h_max,
         )

@@ -142,4 +142,8 @@ class States:
 
     def jump(self, before: ContactState, after: ContactState, branch: Branch) -> Jump:
         """Jump between two states."""
-        return Jump.between(before, after, branch, self.period)
+        jump = Jump.between(before, after, branch, self.period)
+        if self.problem.control.is_load and not after.patches:
+            # The load's own work is not counted, which may leave less than nothing.
+            jump = replace(jump, energy_drop=before.energy / self.period)
+        return jump

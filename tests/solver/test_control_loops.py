@@ -1,0 +1,104 @@
+"""Loops under every control: the single wave against its closed form, rough profiles by audit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile, single_wave
+from solver.control import Control
+from solver.loop import LoopResult
+from solver.method import PathError
+from solver.profile import Profile
+from solver.references.single_wave import SingleWave
+
+AMPLITUDE, PERIOD = 1e-6, 1e-3
+HALF_SPACE = HalfSpace(1e6, 0.0)
+STIFFNESSES = [100.0, 1.0, 0.1, 0.0]  # in p*/A
+
+
+def wave_of(alpha: float) -> SingleWave:
+    return SingleWave.with_alpha(alpha, AMPLITUDE, PERIOD, 1e6, "arc")
+
+
+def loop_of(
+    profile: Profile, work_of_adhesion: float, stiffness: float, turn: float, **options: float
+) -> LoopResult:
+    """Loop by sharp to the turning point in units of h_max, under a load of σ~ = 1."""
+    problem = Problem(profile, HALF_SPACE, work_of_adhesion, Control(stiffness))
+    method = make_method("sharp", problem, accuracy=options.get("accuracy", 1e-3))
+    if stiffness == 0:
+        return run_loop(method, max_stress=turn * problem.stress_scale, load_steps=6)
+    return run_loop(method, max_penetration=turn, load_steps=6)
+
+
+@pytest.mark.parametrize("relative", STIFFNESSES)
+def test_wave_loses_what_the_closed_form_says(relative):
+    wave = wave_of(0.2)
+    stiffness = relative * wave.full_contact_stress / AMPLITUDE
+    exact = wave.loop_under(stiffness)
+    profile = single_wave(AMPLITUDE, PERIOD)
+    loop = loop_of(profile, wave.work_of_adhesion, stiffness, 0.1, accuracy=1e-6)
+    bound = 1e-5 if stiffness == 0 else 1e-6  # under a load s goes like a square root at the end
+    assert loop.loss == pytest.approx(exact.loss, rel=bound)
+    assert loop.loss_from_drops == pytest.approx(exact.loss, rel=bound)
+    assert [j.kind for j in loop.jumps] == ["snap-in", "pull-off"]
+    # beside a fold s goes like a square root of what is prescribed
+    assert loop.jumps[-1].separation == pytest.approx(exact.fold_separation, rel=2e-5)
+    if stiffness == 0:
+        assert loop.pull_off_stress == pytest.approx(-exact.fold_mean_stress, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def rough() -> Profile:
+    return self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)
+
+
+@pytest.mark.parametrize("relative", [30.0, 1.0, 0.0])
+def test_rough_loops_are_audited_under_every_control(rough, relative):
+    unit = Problem(rough, HALF_SPACE, 0.0).stress_scale / rough.h_max
+    loop = loop_of(rough, 0.01, relative * unit, 0.4)
+    assert len(loop.jumps) > 5
+    assert abs(loop.audit_residual) < 1e-4
+    lost = loop.jumps[-1:] if relative == 0 else ()  # under a load it is U, of either sign
+    assert min(j.energy_drop for j in loop.jumps if j not in lost) >= 0
+
+
+def test_a_stiff_machine_gives_the_loop_at_fixed_separation(rough):
+    unit = Problem(rough, HALF_SPACE, 0.0).stress_scale / rough.h_max
+    fixed = loop_of(rough, 0.01, np.inf, 0.6)
+    stiff = loop_of(rough, 0.01, 1e7 * unit, 0.6)
+    assert stiff.loss == pytest.approx(fixed.loss, rel=1e-4)
+    assert [j.kind for j in stiff.jumps] == [j.kind for j in fixed.jumps]
+    soft = [loop_of(rough, 0.01, k * unit, 0.6).loss for k in (10.0, 1.0)]
+    assert fixed.loss < soft[0] < soft[1]
+
+
+@pytest.mark.parametrize("relative", [1.0, 0.0])
+def test_mirror_shift_and_scale_change_nothing(rough, relative):
+    unit = Problem(rough, HALF_SPACE, 0.0).stress_scale / rough.h_max
+    here = loop_of(rough, 0.01, relative * unit, 0.4)
+    same = 1e-5 if relative == 0 else 1e-6
+    for other in (rough.mirrored(), rough.shifted(0.3 * PERIOD)):
+        assert loop_of(other, 0.01, relative * unit, 0.4).loss == pytest.approx(here.loss, rel=same)
+    # lengths a hundredfold: γ/(E* λ) and k λ/E* stay
+    large = loop_of(rough.scaled(100, 100), 1.0, relative * unit / 100, 0.4)
+    assert large.loss_dimensionless == pytest.approx(here.loss_dimensionless, rel=same)
+
+
+def test_a_load_that_no_state_carries_ends_in_a_sentence():
+    """With α = 0.6 a wave runs from first touch to full contact."""
+    with pytest.raises(PathError, match=r"runs into full contact before a mean stress of \S+ Pa"):
+        loop_of(single_wave(AMPLITUDE, PERIOD), wave_of(0.6).work_of_adhesion, 0.0, 0.1)
+
+
+@pytest.mark.parametrize("stiffness", [np.inf, 1e9, 0.0])
+def test_the_turning_point_must_be_that_of_the_control(rough, stiffness):
+    method = make_method("sharp", Problem(rough, HALF_SPACE, 0.01, Control(stiffness)))
+    wrong = {"max_penetration": 0.5} if stiffness == 0 else {"max_stress": 10.0}
+    with pytest.raises(ValueError, match="turns at max_"):
+        run_loop(method, load_steps=2, **wrong)
+    for bad in (0.0, -1.0, np.inf, np.nan):
+        right = {"max_stress": bad} if stiffness == 0 else {"max_penetration": bad}
+        with pytest.raises(ValueError, match="max_"):
+            run_loop(method, load_steps=2, **right)
