@@ -104,8 +104,8 @@ def _blocks(answer: Answer) -> list[Block]:
         ("list", [[f"**{step.name}**: {step.said}"] for step in prepared.steps]),
         (
             "p",
-            "One period: both ends fade to the mean height over 5 % of the length (Tukey's "
-            "window).",
+            "One period: the last 5 % of the trace fade out over the first 5 %, which fade in, "
+            "with weights whose squares add up to one.",
         ),
         ("figure", "trace"),
         ("figure", "spectrum"),

@@ -176,13 +176,13 @@ def _doubts(prepared: Prepared) -> list[Run]:
         kept = {} if factor == 1 else {"cut_off": factor * cut}
         runs.append(Run(name, group, said, kept | changes, reference))
 
-    variant("taper 10 %", "continuation", "ends faded over a tenth", part=0.1)
+    variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
     for part in (0.05, 0.1):
         variant(
-            f"blend {part:.0%}",
+            f"taper {100 * part:.0f} %",
             "continuation",
-            f"the end faded over the beginning, {part:.0%}",
-            continuation="blend",
+            f"both ends faded to the mean over {100 * part:.0f} %",
+            continuation="taper",
             part=part,
         )
     if 2 * factor * cut <= length / 4:
@@ -198,7 +198,7 @@ def _doubts(prepared: Prepared) -> list[Run]:
     variant(
         f"degree {prepared.degree + 1}", "form", "one degree more off", degree=prepared.degree + 1
     )
-    if prepared.degree > 1:
+    if prepared.degree > 1 and not prepared.form_is_sure:
         less = prepared.degree - 1
         variant(f"degree {less}", "form", "one degree less off", degree=less)
     if prepared.spectrum.noise > 0:

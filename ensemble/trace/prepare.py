@@ -31,7 +31,9 @@ _MOST_SPIKES = 0.01
 _GAP_STEPS, _GAP_SHARE = 5, 0.01
 _MOST_MISSING = 0.10
 # A form stands out of the six degrees above it by this factor in mean square height.
-_FORM, _FORM_TO = 8.0, 4
+_FORM, _SURE_FORM, _FORM_TO = 8.0, 30.0, 4
+# A trace whose rms height is no more than so many times its noise is nothing but noise.
+_ALL_NOISE = 1.1
 # Of the mean square height, the share of the two longest waves at which they decide alone.
 _LONG_WAVES = 0.5
 
@@ -56,6 +58,8 @@ class Prepared:
         Heights in m without outliers and gaps, not yet level.
     degree : int
         Degree of the polynomial that is taken off.
+    form_is_sure : bool
+        Whether a form of that degree stands out so far that less of it is no alternative.
     cut_off : float
         Shortest wavelength kept, in m.
     limits : dict
@@ -71,6 +75,7 @@ class Prepared:
     gaps: Array
     outliers: int
     degree: int
+    form_is_sure: bool
     cut_off: float
     limits: dict[str, float]
     spectrum: TraceSpectrum
@@ -90,7 +95,7 @@ class Prepared:
         self,
         *,
         degree: int | None = None,
-        continuation: Continuation = "taper",
+        continuation: Continuation = "blend",
         part: float = 0.05,
         cut_off: float | None = None,
         noise_seed: int | None = None,
@@ -160,7 +165,7 @@ def prepare_trace(
     spectrum = trace_spectrum(level, trace.step)
     radius = trace.tip_radius if tip_radius is None else tip_radius
     limits = trusted_wavelength(spectrum, trace.step, radius or 0.0)
-    shortest = _cut_off(trace, filled.size, cut_off, limits, radius, spectrum, steps, warnings)
+    shortest = _cut_off(trace, filled.size, rms, cut_off, limits, radius, spectrum, steps, warnings)
     _long_waves(spectrum, rms, warnings)
     return Prepared(
         trace=trace,
@@ -168,6 +173,7 @@ def prepare_trace(
         gaps=gaps,
         outliers=count,
         degree=chosen,
+        form_is_sure=_prominence(form_shares(filled), chosen) > _SURE_FORM,
         cut_off=shortest,
         limits=limits,
         spectrum=spectrum,
@@ -311,8 +317,13 @@ def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list
 
 
 def _is_form(shares: Array, degree: int) -> bool:
+    return _prominence(shares, degree) > _FORM
+
+
+def _prominence(shares: Array, degree: int) -> float:
+    """Mean square height of a degree over the most of the six degrees above it."""
     above = shares[degree + 1 : degree + 7]
-    return above.size > 0 and bool(shares[degree] > _FORM * above.max())
+    return float(shares[degree] / above.max()) if above.size and above.max() > 0 else 0.0
 
 
 def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> None:
@@ -333,6 +344,7 @@ def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> Non
 def _cut_off(
     trace: Trace,
     points: int,
+    rms: float,
     wanted: float | None,
     limits: dict[str, float],
     radius: float | None,
@@ -362,9 +374,10 @@ def _cut_off(
         shortest, why = wanted, "as given"
     else:
         why = reasons[by]
-        if shortest > length / 4:
+        if shortest > length / 4 or rms < _ALL_NOISE * spectrum.noise:
             raise InputError(
-                f"{trace.path} holds no roughness above its noise: waves can be trusted from "
+                f"{trace.path} holds no roughness above its noise: of {length_text(rms)} rms "
+                f"{length_text(spectrum.noise)} are noise, waves can be trusted from "
                 f"{length_text(shortest)} on, and it is {length_text(length)} long "
                 "(--cut-off to go on)"
             )

@@ -24,8 +24,9 @@ _UNEVEN = 0.10
 _LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES, _HIGHEST_IN_METRES = 0.02, 2e-5, 1e-3
 # What no trace of a rough surface is.
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
-# A height so many times the range of the others beyond it, and of such a form, stands for none.
-_BEYOND = 5.0
+# A height so many times the range of the others beyond it, and there several times, stands for
+# none; a number that instruments write for it need not be so far out.
+_BEYOND, _BEYOND_KNOWN = 5.0, 0.2
 _SENTINELS = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 
 
@@ -291,7 +292,8 @@ def _without_sentinels(heights: Array) -> tuple[Array, str]:
         width = max(float(np.ptp(others)), 1e-300)
         away = min(abs(value - others.min()), abs(value - others.max()))
         times = int(np.sum(good == value))
-        if away > _BEYOND * width and (times >= 3 or _is_sentinel(float(value))):
+        known = _is_sentinel(float(value))
+        if away > (_BEYOND_KNOWN if known else _BEYOND) * width and (times >= 3 or known):
             found = np.where(heights == value, np.nan, heights)
             return found, f"{times} heights of {value:g} taken as drop-outs: far out of the range"
     return np.where(np.isfinite(heights), heights, np.nan), ""

@@ -1,0 +1,100 @@
+"""Instrument files: the right heights from each format that the extra reads, or one sentence."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ensemble.trace.instrument as instrument
+import ensemble.trace.read as read
+from ensemble.command.main import main
+from ensemble.errors import InputError
+from ensemble.trace.read import read_trace
+from tests.support import instrument_files
+
+pytestmark = pytest.mark.skipif(
+    not instrument.available(), reason="the optional extra adhesis[instruments] is not installed"
+)
+
+N, STEP = 150, 0.4e-6
+X = STEP * np.arange(N)
+Z = 2e-7 * np.sin(2 * np.pi * X / 17e-6) + 3e-8 * np.cos(2 * np.pi * X / 2.9e-6)
+
+
+@pytest.mark.parametrize("name", instrument_files.WRITERS)
+def test_every_format_gives_the_same_heights(name: str, tmp_path: Path) -> None:
+    """The step above all: the formats count points or steps, from nought or from one."""
+    path = tmp_path / name
+    instrument_files.WRITERS[name](path, STEP, Z)
+    trace = read_trace(path)
+    assert trace.points == N
+    assert trace.step == pytest.approx(STEP, rel=1e-6)
+    np.testing.assert_allclose(trace.heights, Z, atol=1e-10)
+    assert trace.said
+
+
+@pytest.mark.parametrize("name", ["mahr.qep", "row.x3p", "row.sdf", "row.sur"])
+def test_points_not_measured_are_drop_outs(name: str, tmp_path: Path) -> None:
+    heights = Z.copy()
+    heights[[40, 41]] = np.nan
+    instrument_files.WRITERS[name](tmp_path / name, STEP, heights)
+    trace = read_trace(tmp_path / name)
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41]
+
+
+def test_the_tip_radius_of_the_file_is_known(tmp_path: Path) -> None:
+    instrument_files.mahr(tmp_path / "a.qep", STEP, Z, tip_radius=5e-6)
+    assert read_trace(tmp_path / "a.qep").tip_radius == pytest.approx(5e-6)
+
+
+def test_a_map_needs_a_row(tmp_path: Path) -> None:
+    path = tmp_path / "map.sdf"
+    instrument_files.sdf(path, STEP, Z, rows=4)
+    with pytest.raises(InputError, match=r"150 × 4 heights: --row K takes one .* 0 to 3"):
+        read_trace(path)
+    np.testing.assert_allclose(read_trace(path, row=3).heights, Z, atol=1e-12)
+    with pytest.raises(InputError, match="has the rows 0 to 3"):
+        read_trace(path, row=4)
+    with pytest.raises(InputError, match="--channel is 2"):
+        read_trace(path, row=0, channel=2)
+
+
+@pytest.mark.parametrize("name", instrument_files.WRITERS)
+def test_half_a_file_is_one_sentence_and_code_2(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / name
+    instrument_files.WRITERS[name](path, STEP, Z)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    words = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5", "--plan"]
+    assert main(["trace", str(path), *words]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_units_of_texts_do_not_belong_to_instruments(tmp_path: Path) -> None:
+    instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
+    with pytest.raises(InputError, match="--unit belongs to texts"):
+        read_trace(tmp_path / "a.qep", unit="um")
+
+
+def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
+    monkeypatch.setattr(read, "available", lambda: False)
+    with pytest.raises(InputError, match=r"pip install 'adhesis\[instruments\]'"):
+        read_trace(tmp_path / "a.qep")
+
+
+def test_reading_starts_no_mpi(tmp_path: Path) -> None:
+    import subprocess
+
+    instrument_files.sdf(tmp_path / "a.sdf", STEP, Z)
+    code = (
+        "import sys\nfrom ensemble.trace.read import read_trace\n"
+        f"read_trace({str(tmp_path / 'a.sdf')!r})\nassert 'mpi4py.MPI' not in sys.modules\n"
+        "assert 'SurfaceTopography' in sys.modules\nimport mpi4py"
+    )
+    root = Path(__file__).parents[2]
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=root)

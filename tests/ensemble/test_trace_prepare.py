@@ -1,0 +1,139 @@
+"""Preparing a trace: each step does what it says, says what it does, and refuses the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ensemble.errors import InputError
+from ensemble.trace.prepare import Prepared, prepare_trace
+from ensemble.trace.read import Trace
+from solver.profile import self_affine_profile
+
+N, STEP = 1600, 1e-6
+X = STEP * np.arange(N)
+PROFILE = self_affine_profile(0.8, period=N * STEP, n0=5, ratio=32, seed=5, h_rms=1e-6)
+Z = PROFILE.at(X)
+PLACE = 2 * X / X[-1] - 1
+
+
+def prepared(heights: np.ndarray, **options: object) -> Prepared:
+    return prepare_trace(Trace(Path("t.txt"), heights, STEP), **options)  # type: ignore[arg-type]
+
+
+def said(found: Prepared, name: str) -> str:
+    return " ".join(step.said for step in found.steps if step.name == name)
+
+
+def test_a_tilt_goes_and_a_clean_trace_stays() -> None:
+    found = prepared(Z + 3e-3 * X)
+    assert found.degree == 1
+    assert found.warnings == ()
+    np.testing.assert_allclose(found.level(), prepared(Z).level(), atol=1e-17)
+    assert found.outliers == 0
+    assert not found.gaps.any()
+
+
+def test_a_radius_of_curvature_is_taken_off_and_said() -> None:
+    """A cylinder of 0.1 m: 3.2 µm from the middle to the ends."""
+    found = prepared(Z + 3e-3 * X - (X - X.mean()) ** 2 / (2 * 0.1))
+    assert found.degree == 2
+    assert "bow" in said(found, "form")
+    assert "stands out" in said(found, "form")
+    np.testing.assert_allclose(found.level(), prepared(Z, degree=2).level(), atol=1e-15)
+    # 1.9 mm of bow as well: nothing of it is left.
+    huge = prepared(Z - 1.9e-3 * PLACE**2)
+    np.testing.assert_allclose(huge.level(), prepared(Z, degree=2).level(), atol=1e-13)
+
+
+def test_a_form_that_stays_by_order_is_warned_of() -> None:
+    found = prepared(Z + 3e-6 * PLACE**2, degree=1)
+    assert found.degree == 1
+    assert any("a form of degree 2 remains" in warning for warning in found.warnings)
+    with pytest.raises(InputError, match="--degree is 7"):
+        prepared(Z, degree=7)
+
+
+def test_drop_outs_are_interpolated_up_to_a_length() -> None:
+    heights = Z.copy()
+    heights[100] = heights[200:204] = np.nan
+    found = prepared(heights)
+    assert np.flatnonzero(found.gaps).tolist() == [100, 200, 201, 202, 203]
+    assert found.filled[100] == pytest.approx((Z[99] + Z[101]) / 2)
+    assert "5 heights" in said(found, "drop-outs")
+    assert "2 gaps" in said(found, "drop-outs")
+    heights[300:400] = np.nan
+    with pytest.raises(InputError, match=r"gap of 101 µm at 300 µm: up to 16 µm is interpolated"):
+        prepared(heights)
+    assert prepared(heights, longest_gap=110e-6).gaps.sum() == 105
+    heights = Z.copy()
+    heights[1:-1:6] = np.nan
+    with pytest.raises(InputError, match=r"lacks 16\.\d% of its heights"):
+        prepared(heights)
+
+
+def test_missing_ends_are_cut_off() -> None:
+    heights = Z.copy()
+    heights[:7] = heights[-3:] = np.nan
+    found = prepared(heights)
+    assert found.filled.size == N - 10
+    assert "10" in said(found, "ends")
+
+
+def test_dust_is_taken_out_and_crests_are_not() -> None:
+    heights = Z.copy()
+    heights[[333, 700, 701]] += 15e-6
+    heights[900] -= 10e-6
+    found = prepared(heights)
+    assert found.outliers == 4
+    assert np.flatnonzero(found.gaps).tolist() == [333, 700, 701, 900]
+    assert np.abs(found.filled - Z).max() < 2e-7
+    assert prepared(heights, keep_outliers=True).outliers == 0
+    # Sharp crests of a saw, and edges of steps, are the surface's own.
+    saw = 1e-6 * np.abs((X / 50e-6) % 2 - 1)
+    assert prepared(saw).outliers == 0
+    steps = 1e-6 * np.sign(np.sin(2 * np.pi * X / 80e-6 + 0.1))
+    assert prepared(steps + 1e-9 * np.random.default_rng(0).standard_normal(N)).outliers == 0
+    spiky = Z + 20e-6 * (np.random.default_rng(0).random(N) < 0.04)
+    many = prepared(spiky)
+    assert many.outliers == 0
+    assert any("too many for outliers" in warning for warning in many.warnings)
+
+
+def test_the_cut_off_is_proposed_given_or_refused() -> None:
+    assert prepared(Z).cut_off == pytest.approx(5e-6)
+    assert "five steps" in said(prepared(Z), "cut-off")
+    noisy = prepared(Z + 3e-8 * np.random.default_rng(2).standard_normal(N))
+    assert noisy.cut_off > 6e-6
+    assert "noise" in said(noisy, "cut-off")
+    blunt = prepared(Z, tip_radius=100e-6)
+    assert blunt.cut_off > 10e-6
+    assert "tip of radius 100 µm" in said(blunt, "cut-off")
+    assert any("shorter than what" in w for w in prepared(Z, cut_off=3e-6).warnings)
+    for cut_off in (1e-6, 1e-3):
+        with pytest.raises(InputError, match="--cut-off is"):
+            prepared(Z, cut_off=cut_off)
+    with pytest.raises(InputError, match="no roughness above its noise"):
+        prepared(1e-9 * np.random.default_rng(0).standard_normal(N))
+
+
+def test_long_waves_that_decide_alone_are_warned_of() -> None:
+    found = prepared(Z + 4e-6 * np.sin(2 * np.pi * X / X[-1]), degree=1)
+    assert any("waves longer than a third" in warning for warning in found.warnings)
+    assert not any("waves longer" in warning for warning in prepared(Z).warnings)
+
+
+def test_heights_can_be_turned_over() -> None:
+    np.testing.assert_allclose(prepared(Z, invert=True).level(), -prepared(Z).level(), atol=1e-18)
+
+
+def test_the_profile_is_the_trace() -> None:
+    """Within the trace, away from what is blended, and up to the waves that are cut off."""
+    found = prepared(Z + 2e-3 * X)
+    x = X[200:1400]
+    used = found.profile().at(x)
+    level = found.level()[200:1400]
+    np.testing.assert_allclose(used - used.mean(), level - level.mean(), atol=2e-8)
+    assert found.profile(continuation="mirror").period == pytest.approx(2 * X[-1])
