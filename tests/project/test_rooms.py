@@ -30,7 +30,7 @@ HDF5 = {
     "ensemble.doctor.probe",
     "ensemble.versions",
 }
-COMPILED = {"solver.compiled", "solver.grid.kernels", "ensemble.bench.measure"}
+COMPILED = {"solver.compiled", "ensemble.bench.measure"}
 FIGURES = {
     "ensemble.bench.figure",
     "ensemble.report.figures.catalogue",
