@@ -22,7 +22,7 @@ _BANDS_PER_OCTAVE = 4
 
 # Half as high a spectrum in the last quarter of the band as in the one before is roughness (its
 # power falls at least as 1/q: 0.7); equal heights are white noise.
-_FLAT = 0.85
+_FLAT = 0.8
 
 
 def polynomial_form(heights: Array, degree: int) -> Array:
@@ -175,7 +175,9 @@ def _white_floor(power: Array) -> float:
     if power.size < 32:
         return 0.0
     before, after = float(power[half:last].mean()), float(power[last:-1].mean())
-    return min(before, after) if after > _FLAT * before else 0.0
+    scatter = 2 * np.sqrt(2 / (power.size - last))  # of their ratio; to err here costs nothing:
+    # roughness taken for noise is cut off where the step cuts it off anyway.
+    return min(before, after) if after > (_FLAT - scatter) * before else 0.0
 
 
 def trusted_wavelength(spectrum: TraceSpectrum, step: float, tip_radius: float) -> dict[str, float]:

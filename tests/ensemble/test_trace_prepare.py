@@ -97,7 +97,7 @@ def test_dust_is_taken_out_and_crests_are_not() -> None:
     steps = 1e-6 * np.sign(np.sin(2 * np.pi * X / 80e-6 + 0.1))
     assert prepared(steps + 1e-9 * np.random.default_rng(0).standard_normal(N)).outliers == 0
     spiky = Z + 20e-6 * (np.random.default_rng(0).random(N) < 0.04)
-    many = prepared(spiky)
+    many = prepared(spiky, cut_off=20e-6)
     assert many.outliers == 0
     assert any("too many for outliers" in warning for warning in many.warnings)
 
