@@ -407,7 +407,7 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
 
 
 @compiled
-def _periodic(x: float) -> float:
+def periodic(x: float) -> float:
     """1/sin²(x/2) - 4/x², x = Δθ: what the own gap feels of its periodic images."""
     if abs(x) < 0.2:
         y = x * x
@@ -417,7 +417,7 @@ def _periodic(x: float) -> float:
 
 
 @compiled
-def _mapped(alpha: float, x: float) -> float:
+def mapped(alpha: float, x: float) -> float:
     """4 [α²/sinh²(αx) - 1/x²], x = Δη: the own gap's kernel beyond a straight crack in η."""
     y = alpha * x
     if abs(y) < 0.3:
@@ -446,31 +446,50 @@ def _assemble(
     beyond = np.empty((gaps, 2, fields))
     matrix = np.empty((n, n))
     for k in range(gaps):
-        kind = kinds[k]
-        m = rules.counts[kind]
-        s = np.empty((m, fields))
-        ends = np.empty((2, fields))
-        gap_moments(table[k], panels, s, ends)
-        for field in range(fields):
-            low = 0.0
-            high = 0.0
-            sign = 1.0
-            for j in range(m):
-                high += s[j, field]
-                low += sign * s[j, field]
-                sign = -sign
-            beyond[k, 0, field] = ends[0, field] - low
-            beyond[k, 1, field] = ends[1, field] - high
         own = slice(offset[k], offset[k + 1])
-        rule = slice(rules.start[kind], rules.start[kind] + m)
-        square = slice(rules.square[kind], rules.square[kind] + m * m)
-        _own_gap(
-            table[k], rules.eta[rule], rules.w[rule], rules.b[square].reshape(m, m),
-            rules.modes[square].reshape(m, m), s, theta[own], weight[own], slope[k], rhs[own],
-            matrix[own, own],
+        one_gap(
+            table[k], kinds[k], rules, panels, theta[own], weight[own], slope[k], rhs[own],
+            beyond[k], matrix[own, own],
         )  # fmt: skip
     _between_gaps(theta, weight, offset, matrix)
     return theta, weight, slope, matrix, rhs, beyond
+
+
+@compiled
+def one_gap(
+    gap: Array,
+    kind: int,
+    rules: Rules,
+    panels: Panels,
+    theta: Array,
+    weight: Array,
+    slope: Array,
+    rhs: Array,
+    beyond: Array,
+    matrix: Array,
+) -> None:
+    """Nodes, loads and diagonal block of one gap, and what its higher modes add at the ends."""
+    fields = beyond.shape[1]
+    m = rules.counts[kind]
+    s = np.empty((m, fields))
+    ends = np.empty((2, fields))
+    gap_moments(gap, panels, s, ends)
+    for field in range(fields):
+        low = 0.0
+        high = 0.0
+        sign = 1.0
+        for j in range(m):
+            high += s[j, field]
+            low += sign * s[j, field]
+            sign = -sign
+        beyond[0, field] = ends[0, field] - low
+        beyond[1, field] = ends[1, field] - high
+    rule = slice(rules.start[kind], rules.start[kind] + m)
+    square = slice(rules.square[kind], rules.square[kind] + m * m)
+    _own_gap(
+        gap, rules.eta[rule], rules.w[rule], rules.b[square].reshape(m, m),
+        rules.modes[square].reshape(m, m), s, theta, weight, slope, rhs, matrix,
+    )  # fmt: skip
 
 
 @compiled
@@ -502,8 +521,8 @@ def _own_gap(
             rhs[i, 2 * field] = w[i] * total
     for i in range(m):
         for j in range(i + 1):
-            far = weight[i] * weight[j] * _periodic(theta[i] - theta[j])
-            near = w[i] * w[j] * _mapped(gap[ALPHA], eta[i] - eta[j])
+            far = weight[i] * weight[j] * periodic(theta[i] - theta[j])
+            near = w[i] * w[j] * mapped(gap[ALPHA], eta[i] - eta[j])
             matrix[i, j] = b[i, j] - (near + far) / (4 * np.pi)
             matrix[j, i] = matrix[i, j]
 
@@ -602,8 +621,8 @@ def _singular_loads(
                 strength = weight[i] * point / slope[k, side]
                 if own:
                     place = start[kinds[k]] + i - base
-                    mapped = _mapped(table[k, ALPHA], eta[place] - (2 * side - 1))
-                    extra = w[place] * point * mapped + strength * _periodic(theta[i] - edge)
+                    bent = mapped(table[k, ALPHA], eta[place] - (2 * side - 1))
+                    extra = w[place] * point * bent + strength * periodic(theta[i] - edge)
                 else:
                     half = sine[i] * edge_cosine[side] - cosine[i] * edge_sine[side]
                     extra = strength / (half * half)

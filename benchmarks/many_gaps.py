@@ -1,0 +1,90 @@
+"""What a field of many gaps costs: on the tree of gaps, and by the dense factor.
+
+    python benchmarks/many_gaps.py --gaps 30 100 300 1000 3000
+
+Random gaps and patches (log-normal widths, spread 0.7) over the paper's spectrum. Best of a few
+repetitions, in CPU time; the exponent is that between one number of gaps and the next. A step is
+Newton's of all edges, with its stability, beyond the field.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from solver.profile import Array, self_affine_profile
+from solver.sharp.coordinate import map_gaps
+from solver.sharp.far import solve_many
+from solver.sharp.field import FIXED, RULES, choose_kinds, solve_plain
+from solver.sharp.source import StressSource
+from solver.sharp.yielding import newton_many
+
+
+def random_gaps(count: int, contact: float, spread: float = 0.7, seed: int = 1) -> Array:
+    """Ends of ``count`` gaps, shape (count, 2), the patches covering ``contact`` of the period."""
+    random = np.random.default_rng(seed)
+    widths = np.exp(spread * random.standard_normal((count, 2)))
+    widths *= 2 * np.pi * np.array([1 - contact, contact]) / widths.sum(axis=0)
+    ends = 0.1 + np.cumsum(widths.ravel())
+    return np.concatenate([[0.1], ends[:-1]]).reshape(-1, 2)
+
+
+def _best(work: Callable[[], Any], repetitions: int) -> tuple[float, Any]:
+    times = []
+    for _ in range(repetitions):
+        started = process_time()
+        result = work()
+        times.append(process_time() - started)
+    return min(times), result
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--gaps", type=int, nargs="+", default=[30, 100, 300, 1000, 3000])
+    parser.add_argument("--contact", type=float, default=0.3)
+    parser.add_argument("--tolerance", type=float, default=1e-5)
+    parser.add_argument("--dense", type=int, default=300, help="most gaps for the dense factor")
+    parser.add_argument("--repetitions", type=int, default=5)
+    given = parser.parse_args()
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
+    source = StressSource(profile, given.tolerance)
+    separation, digits = 0.5 * profile.h_max * profile.q0, -np.log(given.tolerance)
+    print(f"contact {given.contact}, tolerance {given.tolerance}; times in ms")
+    print("  gaps  unknowns    field   per gap (µs)  exponent     step    dense  difference")
+    before = (0, 0.0)
+    for count in given.gaps:
+        gaps = random_gaps(count, given.contact)
+        kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
+        arguments = (gaps, separation, FIXED, kinds, digits, 2, RULES, source.panels)
+        solve_many(*arguments)
+        time, (of, parts) = _best(lambda a=arguments: solve_many(*a), given.repetitions)
+        still = np.zeros(2 * count)
+        newton_many(of, parts, still, still, FIXED, RULES)
+        step, _ = _best(
+            lambda o=of, p=parts, z=still: newton_many(o, p, z, z, FIXED, RULES), given.repetitions
+        )
+        exponent = ""
+        if before[0]:
+            exponent = f"{np.log(time / before[1]) / np.log(count / before[0]):.2f}"
+        before = (count, time)
+        dense = difference = "-"
+        if count <= given.dense:
+            plain = (gaps, separation, FIXED, kinds, 1, RULES, source.panels)
+            solve_plain(*plain)
+            dense_time, solution = _best(lambda a=plain: solve_plain(*a), 2)
+            dense = f"{1e3 * dense_time:.2f}"
+            opening = solution[-1]
+            difference = f"{np.abs(of.opening - opening).max() / np.abs(opening).max():.0e}"
+        print(
+            f"{count:6d} {len(of.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
+            f"{exponent:>9s} {1e3 * step:8.2f} {dense:>8s} {difference:>11s}"
+        )
+
+
+if __name__ == "__main__":
+    main()
