@@ -37,7 +37,7 @@ from ensemble.results.schema import DONE, file_size
 from ensemble.results.write import Writer
 from ensemble.run.ranks import world
 from ensemble.run.session import Engine, run_campaign
-from ensemble.task.compute import check_task, run_task
+from ensemble.task.compute import check_task, methods_of, run_task
 from ensemble.task.dataset import KEPT, row_shape, sizes_of
 from ensemble.task.fields import field_plan
 from ensemble.task.row import RESULT_DATASETS, Row, row_scales
@@ -90,7 +90,14 @@ def measured(times: Times, pretend: float | None) -> Engine:
 
     compute = run_task if pretend is None else do_nothing(pretend)
     check = check_task if pretend is None else lambda *_: None
-    return Engine(compute=compute, check=check, writer=TimedWriter, watch=watch)
+    methods = methods_of if pretend is None else lambda *_: ()
+    return Engine(
+        compute=compute,
+        check=check,
+        writer=TimedWriter,
+        watch=watch,
+        methods=methods,
+    )
 
 
 def do_nothing(seconds: float) -> Callable[..., Row]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
-_PACKAGES = ("adhesis", "numpy", "scipy", "numba", "pyfftw", "h5py", "mpi4py")
+_PACKAGES = ("adhesis", "numpy", "scipy", "numba", "llvmlite", "pyfftw", "h5py", "mpi4py")
 
 
 def versions() -> dict[str, str]:
@@ -18,6 +18,10 @@ def versions() -> dict[str, str]:
         "commit": commit(),
         "python": platform.python_version(),
         "numpy": _package("numpy"),
+        "scipy": _package("scipy"),
+        "numba": _package("numba"),
+        "llvmlite": _package("llvmlite"),
+        "processor": _processor(),
         "mpi": _mpi(),
         "hdf5": _hdf5(),
         "fftw": _fftw(),
@@ -83,6 +87,12 @@ def _mpi() -> str:
     if mpi is None or not mpi.Is_initialized():
         return "none"
     return _short(mpi.Get_library_version())
+
+
+def _processor() -> str:
+    from llvmlite import binding
+
+    return str(binding.get_host_cpu_name())
 
 
 def _hdf5() -> str:

@@ -21,10 +21,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
-_USES_THE_COMPILER = re.compile(
-    r"^\s*(from solver\.compiled import|import solver\.compiled|from solver import .*\bcompiled\b)",
-    re.MULTILINE,
-)
+_KERNEL = re.compile(r"^@compiled(_\w+)?\s*$", re.MULTILINE)
 
 
 def kernel_modules(package: Path = _PACKAGE) -> list[Path]:
@@ -35,7 +32,7 @@ def kernel_modules(package: Path = _PACKAGE) -> list[Path]:
     return [
         path
         for path in sorted(package.rglob("*.py"))
-        if path == package / "compiled.py" or _USES_THE_COMPILER.search(path.read_text("utf-8"))
+        if path == package / "compiled.py" or _KERNEL.search(path.read_text("utf-8"))
     ]
 
 
@@ -96,16 +93,20 @@ class CodeFiles:
         if users is not None:
             self._places.append(users / name)
         # where new files go, the preferred place first
-        self._targets = self._places if to_installation else self._places[:0:-1]
+        self._targets = self._places if to_installation else self._places[1:]
+        self._to_installation = to_installation
         self._warned = False
 
     def read(self, file: str) -> bytes | None:
-        """Content of a file, or None."""
+        """Content of a file, or None; what goes to the installation is copied there."""
         for place in self._places:
             try:
-                return (place / file).read_bytes()
+                content = (place / file).read_bytes()
             except OSError:
                 continue
+            if self._to_installation and place != self._places[0]:
+                self.write(file, content)
+            return content
         return None
 
     def find(self, file: str) -> Path | None:

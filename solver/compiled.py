@@ -90,8 +90,12 @@ def settings() -> dict[str, str]:
         "numpy": ".".join(np.__version__.split(".")[:2]),
         "machine": binding.get_process_triple(),
         "features": str(features),
-        **{name.lower(): str(getattr(config, name, "")) for name in _SETTINGS},
+        **{name.lower(): _plain(getattr(config, name, "")) for name in _SETTINGS},
     }
+
+
+def _plain(value: Any) -> str:
+    return str(int(value)) if isinstance(value, int) else str(value)
 
 
 @cache
@@ -166,33 +170,49 @@ class Compilation(event.Listener):
     ----------
     functions : int
         Compiled so far, each signature for itself.
-    seconds : float
-        Wall time.
+    seconds, cpu_seconds : float
+        Wall time, and CPU time of this process, without what is under way.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with this each time a function is begun.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, tell: Callable[[Compilation], None] = lambda seen: None) -> None:
         self.functions = 0
         self.seconds = 0.0
+        self.cpu_seconds = 0.0
+        self._tell = tell
         self._depth = 0
-        self._since = 0.0
+        self._since = (0.0, 0.0)
+
+    @property
+    def under_way(self) -> float:
+        """Wall time since the compiler was last called, in s; 0 if it is not at work."""
+        return time.perf_counter() - self._since[0] if self._depth else 0.0
 
     def on_start(self, _: Any) -> None:
         """One more; a function compiles those that it calls."""
         if self._depth == 0:
-            self._since = time.perf_counter()
+            self._since = time.perf_counter(), time.process_time()
         self._depth += 1
+        self._tell(self)
 
     def on_end(self, _: Any) -> None:
         """One is ready."""
         self._depth -= 1
         self.functions += 1
         if self._depth == 0:
-            self.seconds += time.perf_counter() - self._since
+            self.seconds += time.perf_counter() - self._since[0]
+            self.cpu_seconds += time.process_time() - self._since[1]
 
 
 @contextmanager
-def watch_compilation() -> Iterator[Compilation]:
-    """Count what is compiled while this lasts."""
-    compilation = Compilation()
+def watch_compilation(
+    tell: Callable[[Compilation], None] = lambda seen: None,
+) -> Iterator[Compilation]:
+    """Count what is compiled while this lasts; see :class:`Compilation`."""
+    compilation = Compilation(tell)
     with event.install_listener("numba:compile", compilation):
         yield compilation

@@ -256,6 +256,21 @@ if [ -z "$why_serial" ]; then
 fi
 required "Python packages: the rest of requirements.lock" pip install --quiet $(grep -Ev '^(#|h5py==)' requirements.lock)
 
+# Needs nothing of h5py, and takes the other core while that is built.
+compile_kernels() {
+    rm -f .setup/warm.log
+    PYTHONPATH=$root OPENBLAS_NUM_THREADS=1 "$venv/bin/python" -c '
+import sys
+from ensemble.command.main import main
+sys.exit(main(["warm"]))' >.setup/warm.log 2>&1
+}
+if step "compiling the solver for this processor (once)" compile_kernels; then
+    say "$(tail -n 1 .setup/warm.log)"
+else
+    cat .setup/warm.log >>"$log"
+    warn "the solver is not compiled yet (see .setup/warm.log); the first loop does it"
+fi
+
 if [ -n "$build" ]; then
     printf 'setup: h5py ... '
     if wait "$build"; then

@@ -16,14 +16,13 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass
 from time import process_time
-from typing import Any, Literal
-
-from numba.core import event
+from typing import Literal
 
 from ensemble.bench.scenes import WARM_UP, Scene
 from ensemble.bench.tamaas import tamaas_loop
 from solver.loop import LoopResult, run_loop
 from solver.registry import MethodName, make_method
+from solver.warm import watch_compilation
 
 Measured = Literal["grid", "sharp", "tamaas"]
 
@@ -145,8 +144,7 @@ def measure_here(run: Run, *, limited: bool = False) -> Measurement:
     before = peak_megabytes()
     if limited:
         _limit(run.seconds)
-    compilation: Any = event.TimingListener()  # type: ignore[no-untyped-call]
-    with event.install_listener("numba:compile", compilation):
+    with watch_compilation() as compilation:
         started = process_time()
         loop = _loop(run.method, run.scene, run.setting, run.load_steps)
         seconds = process_time() - started
@@ -160,7 +158,7 @@ def measure_here(run: Run, *, limited: bool = False) -> Measurement:
         solutions=int(asdict(loop.method)[_SOLUTIONS[run.method]]),
         jumps=len(loop.jumps),
         patches=int(loop.patches.max()),
-        compiled=compilation.done,
+        compiled=compilation.functions > 0,
     )
 
 

@@ -21,6 +21,7 @@ COMMANDS: dict[str, str] = {
     "trace": "a measured trace to its loss, with what is doubtful about it",
     "validate": "the exact references: error against bound",
     "bench": "speed against error of each method",
+    "warm": "compile both methods now, for all users of this installation",
     "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",
 }
 BAD_INPUT = 2

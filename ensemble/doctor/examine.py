@@ -80,6 +80,7 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     found = alone.reports[0] if alone.reports else {}
     texts = found.get("versions") or installed()
     checks.append(_libraries(alone, texts))
+    checks.append(_compiled())
 
     mpi_loads = bool(found.get("mpi_loads"))
     mpirun = launcher()
@@ -197,6 +198,23 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
         f"{name}: {texts[name]}" for name in ("hdf5", "fftw") if not texts[name][:1].isdigit()
     ]
     return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
+
+
+def _compiled() -> Check:
+    """Whether the compiler loads, and where its code lies."""
+    try:
+        from solver import warm
+    except (ImportError, RuntimeError, OSError) as error:
+        return Check("compiled code", False, f"does not load: {last_lines(str(error))}")
+    told = warm.settings()
+    kind = f"for {warm.processor()}, numba {told['numba']}, optimised at level {told['opt']}"
+    places = {method: warm.compiled_in(method) for method in warm.COMPILED_METHODS}
+    missing = " and ".join(method for method, place in places.items() if place is None)
+    if missing:
+        text = f"{missing} not yet ({kind}); the first loop does it, or adhesis warm"
+        return Check("compiled code", False, text, needed=False)
+    kept = " and ".join(sorted({str(place) for place in places.values()}))
+    return Check("compiled code", True, f"{kept} ({kind})")
 
 
 def _ranks(probe: _Probe, mpirun: str) -> Check:

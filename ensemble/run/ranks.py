@@ -96,15 +96,40 @@ def together(comm: Any, function: Callable[[], T]) -> T:
             answer = (True, function())
         except InputError as error:
             answer = (False, str(error))
-    # A rank that waits in a broadcast burns a core, which rank 0 may need for its work.
-    arrived = comm.Ibarrier()
-    while not arrived.Test():
-        time.sleep(_PAUSE)
+    wait_for_all(comm)
     good, value = comm.bcast(answer)
     if not good:
         raise InputError(value)
     result: T = value
     return result
+
+
+def wait_for_all(comm: Any) -> None:
+    """Return when every rank has come here; a rank that waits in a barrier would burn a core."""
+    arrived = comm.Ibarrier()
+    while not arrived.Test():
+        time.sleep(_PAUSE)
+
+
+def one_a_node_first(comm: Any, function: Callable[[bool], T]) -> T:
+    """Run a function on one rank of each node, and then on the others.
+
+    Parameters
+    ----------
+    comm : MPI communicator or None
+    function : callable
+        Called with whether this is the first rank of its node.
+    """
+    if comm is None:
+        return function(True)
+    from mpi4py import MPI
+
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    first: bool = node.rank == 0
+    result = function(True) if first else None
+    wait_for_all(node)
+    node.Free()
+    return function(False) if result is None else result
 
 
 class MpiChannel:

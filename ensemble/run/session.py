@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,9 +20,9 @@ from ensemble.run.interrupt import StopSignals
 from ensemble.run.lock import RunLock
 from ensemble.run.plan import Group, Plan, Selection, prepare, prior
 from ensemble.run.progress import Counts, ProgressLine
-from ensemble.run.ranks import MpiChannel, together
+from ensemble.run.ranks import MpiChannel, one_a_node_first, together
 from ensemble.run.schedule import Schedule
-from ensemble.task.compute import check_task, run_task
+from ensemble.task.compute import check_task, methods_of, run_task
 from ensemble.task.doubt import doubtful
 from ensemble.task.row import Row
 from solver.loop import Progress
@@ -77,6 +77,8 @@ class Engine:
         Whether each rank writes the rows that it computed, as parallel HDF5 allows.
     watch : callable
         Makes what stands around a rank's loop of handing out or working.
+    methods : callable
+        The methods that tasks are computed by: they are compiled before the first task.
     """
 
     compute: Callable[[Campaign, Task, Progress | None], Row] = run_task
@@ -84,6 +86,7 @@ class Engine:
     writer: Callable[[Path, Any], RowWriter] = Writer
     all_write: bool = bool(h5py.get_config().mpi)
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
+    methods: Callable[[Campaign, Iterable[Task]], Collection[str]] = methods_of
 
 
 @dataclass(frozen=True)
@@ -186,6 +189,8 @@ def run_campaign(
                 check=engine.check,
             ),
         )
+        if plan.rows:
+            _warm_up(comm, engine.methods(campaign, [plan.tasks[row] for row in plan.rows]), say)
         own_rows = comm is not None and engine.all_write
         if own_rows and rank > 0:
             lock.join()
@@ -202,6 +207,20 @@ def run_campaign(
                 session.worker(MpiChannel(comm), own_rows)
                 stopped = None
     return together(comm, lambda: session.summary(stopped))
+
+
+def _warm_up(comm: Any, methods: Collection[str], say: Callable[[str], None]) -> None:
+    """Compile on one rank of each node, and load that on the others, before the first task."""
+    if not methods:
+        return
+    from ensemble.warm import warm_up  # brings the compiler in
+
+    def prepare_rank(first: bool) -> bool:
+        heard = first and (comm is None or comm.rank == 0)
+        warm_up(methods, say if heard else lambda text: None)
+        return True
+
+    one_a_node_first(comm, prepare_rank)
 
 
 class _Session:

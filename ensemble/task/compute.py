@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import Task
@@ -61,6 +62,12 @@ def _make_method(campaign: Campaign, task: Task) -> Method:
         accuracy=campaign.solver.accuracy,
         nodes_per_wave=campaign.solver.nodes_per_wave,
     )
+
+
+def methods_of(campaign: Campaign, tasks: Iterable[Task]) -> set[str]:
+    """Return the names of the methods that compute these tasks."""
+    of_adhesion = {task.work_of_adhesion: task for task in tasks}
+    return {_make_method(campaign, task).name for task in of_adhesion.values()}
 
 
 def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -> Row:

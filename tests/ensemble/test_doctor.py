@@ -13,6 +13,8 @@ import pytest
 from ensemble import versions
 from ensemble.doctor import examine as doctor
 from ensemble.run import launch
+from solver import warm
+from solver.code_cache import CodeFiles
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
@@ -113,5 +115,24 @@ def test_versions_are_texts_and_do_not_start_mpi() -> None:
 def test_a_results_file_tells_the_versions_that_doctor_tells(findings: dict[str, Any]) -> None:
     written, told = versions.versions(), findings["versions"]
     assert written["adhesis_version"] == told["adhesis"]
-    for name in ("python", "numpy", "hdf5", "fftw"):
+    for name in ("python", "numpy", "scipy", "numba", "llvmlite", "hdf5", "fftw"):
         assert written[name] == told[name]
+    (check,) = [check for check in findings["checks"] if check["name"] == "compiled code"]
+    assert f"for {written['processor']}, numba {written['numba']}" in check["text"]
+
+
+def test_doctor_tells_whether_code_is_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = CodeFiles("key")
+    monkeypatch.setattr(warm, "code_files", lambda to_installation=False: files)
+    monkeypatch.setattr(files, "_places", [tmp_path / "key"])
+    before = doctor._compiled()
+    assert (before.ok, before.needed) == (False, False)
+    assert "sharp and grid not yet" in before.text
+    (tmp_path / "key").mkdir()
+    for method in warm.COMPILED_METHODS:
+        (tmp_path / "key" / f"{method}.json").write_text("{}")
+    after = doctor._compiled()
+    assert after.ok
+    assert str(tmp_path / "key") in after.text

@@ -30,7 +30,7 @@ HDF5 = {
     "ensemble.doctor.probe",
     "ensemble.versions",
 }
-COMPILED = {"solver.compiled", "ensemble.bench.measure"}
+COMPILED = {"solver.compiled"}
 FIGURES = {
     "ensemble.bench.figure",
     "ensemble.report.figures.catalogue",
@@ -69,6 +69,7 @@ SOLVER_FOR_ENSEMBLE = {
     "solver.registry",
     "solver.trace",
     "solver.validate.claims",
+    "solver.warm",
 }
 
 

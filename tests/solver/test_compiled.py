@@ -96,7 +96,7 @@ def test_settings_and_processor_have_a_folder_each(copy, monkeypatch):
     monkeypatch.setattr(module.config, "CPU_FEATURES", "+nothing")
     seen.add(str(module.settings()))
     assert len(seen) == 6
-    assert module.settings()["using_svml"] == "False"
+    assert module.settings()["using_svml"] == "0"
 
 
 def _modules() -> list[types.ModuleType]:

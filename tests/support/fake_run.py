@@ -86,7 +86,9 @@ def fake_engine(behaviour: str) -> Engine:
                 resource.setrlimit(resource.RLIMIT_FSIZE, limits)
             super().write_result(row, result, rank)
 
-    engine = Engine(run_task, lambda campaign, task: None, FakeWriter)
+    engine = Engine(
+        run_task, lambda campaign, task: None, FakeWriter, methods=lambda campaign, tasks: ()
+    )
     return replace(engine, all_write=False) if "serial" in settings else engine
 
 

@@ -1,0 +1,112 @@
+"""Compiling ahead: all that loops and fields of a method call, before the first one is timed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from solver.code_cache import installed_folder
+from solver.compiled import (
+    Compilation,
+    code_files,
+    kept_in_installation,
+    processor,
+    settings,
+    watch_compilation,
+)
+from solver.loop import run_loop
+from solver.material import HalfSpace
+from solver.method import Branch, ContactState
+from solver.problem import Problem
+from solver.profile import self_affine_profile
+from solver.registry import make_method
+
+COMPILED_METHODS = ("sharp", "grid")
+
+__all__ = [
+    "COMPILED_METHODS",
+    "Compilation",
+    "compiled_in",
+    "in_installation",
+    "processor",
+    "settings",
+    "warm",
+    "watch_compilation",
+]
+
+
+def warm(
+    methods: Iterable[str] = COMPILED_METHODS,
+    *,
+    tell: Callable[[Compilation], None] = lambda seen: None,
+    to_installation: bool = False,
+) -> Compilation:
+    """Compile what the methods need, or load it where it is compiled already.
+
+    That is done by small loops, so that nothing is compiled that is not called, and all is that is.
+
+    Parameters
+    ----------
+    methods : iterable of str
+        Of :data:`COMPILED_METHODS`.
+    tell : callable
+        Called each time the compiler begins a function.
+    to_installation : bool
+        Keep the code in the installation, if that can be written, for all its users and nodes.
+
+    Returns
+    -------
+    Compilation
+        How many functions were compiled now, and the time that it took.
+    """
+    with watch_compilation(tell) as seen:
+        for method in methods:
+            if to_installation:
+                with kept_in_installation():
+                    _small_loops(method)
+            else:
+                _small_loops(method)
+            _mark(method, to_installation)
+    return seen
+
+
+def compiled_in(method: str) -> Path | None:
+    """Folder in which all code of a method lies for this processor and these settings, or None."""
+    return code_files().find(_marker(method))
+
+
+def in_installation(folder: Path) -> bool:
+    """Whether a folder of compiled code is the installation's, not the user's."""
+    return folder.is_relative_to(installed_folder())
+
+
+def _marker(method: str) -> str:
+    return f"{method}.json"
+
+
+def _mark(method: str, to_installation: bool) -> None:
+    files = code_files(to_installation)
+    if files.read(_marker(method)) is None:
+        words = {"method": method, "processor": processor(), **settings()}
+        files.write(_marker(method), json.dumps(words, indent=1).encode())
+
+
+def _small_loops(method: str) -> None:
+    """Loops that call all compiled functions with all types of arguments that loops call them."""
+    for work_of_adhesion in (0.04, 0.0):
+        profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=3, h_rms=1e-6)
+        problem = Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
+        chosen = (
+            make_method("grid", problem, nodes_per_wave=8)
+            if method == "grid"
+            else make_method("sharp", problem)
+        )
+        states: list[ContactState] = []
+
+        def keep(_: Branch, state: ContactState, states: list[ContactState] = states) -> None:
+            states.append(state)
+
+        run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
+        nodes = chosen.nodes or 256
+        chosen.fields(max(states, key=lambda state: state.patches), nodes)

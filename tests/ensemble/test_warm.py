@@ -1,0 +1,135 @@
+"""Compilation comes before the first task, once a node, with words, and never again."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ensemble import warm as ensemble_warm
+from ensemble.command import warm as command
+from solver import code_cache, warm
+from solver import compiled as door
+from solver.code_cache import CodeFiles
+from solver.compiled import Compilation
+from tests.support.campaign_support import ROOT, environment, write_campaign
+from tests.support.launchers import MPIRUN
+
+# Another setting than any cache was made with: nothing is compiled yet, and it is quickly done.
+COLD = {"NUMBA_OPT": "1"}
+
+
+def logged_run(folder: Path, ranks: int, cache: Path) -> tuple[list[list[str]], str]:
+    """Return what was begun, by process, in a small campaign, and what was said."""
+    log = folder / "log"
+    script = ROOT / "tests" / "support" / "logged_run.py"
+    campaign = write_campaign(folder, hurst="[0.7]", realisations="1")
+    words = [script, log, "run", campaign, "--out", folder / "r.h5"]
+    done = subprocess.run(
+        [MPIRUN, "-n", str(ranks), sys.executable, "-m", "mpi4py", *map(str, words)],
+        env=environment(ADHESIS_CACHE=str(cache), **COLD),
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return [line.split() for line in log.read_text().splitlines()], done.stderr
+
+
+@pytest.mark.mpi
+def test_three_ranks_with_an_empty_cache_compile_once_and_before_the_first_task(tmp_path):
+    lines, said = logged_run(tmp_path, 3, tmp_path / "cache")
+    compiling = [pid for pid, what in lines if what == "compiles"]
+    assert len(set(compiling)) == 1
+    assert "compiles" not in [what for _, what in lines[len(compiling) :]]
+    assert [path.name for path in (tmp_path / "cache").glob("*/*.json")] == ["grid.json"]
+    assert said.count("compiling the method grid") <= 1
+
+
+@pytest.mark.mpi
+@pytest.mark.slow(reason="compiles on two ranks at once")
+def test_without_a_folder_each_rank_compiles_before_the_first_task_and_one_line_warns(tmp_path):
+    (tmp_path / "file").write_text("")
+    lines, said = logged_run(tmp_path, 2, tmp_path / "file" / "beneath")
+    compiling = [pid for pid, what in lines if what == "compiles"]
+    assert len(set(compiling)) == 2
+    for pid in set(compiling):
+        own = [what for other, what in lines if other == pid]
+        assert own == sorted(own)  # compiles, then computes
+    assert said.count("cannot be kept") == 1
+
+
+@pytest.fixture
+def places(tmp_path, monkeypatch):
+    """The installation's and the user's folder, both empty."""
+    monkeypatch.setattr(code_cache, "installed_folder", lambda: tmp_path / "installed")
+    monkeypatch.setattr(warm, "installed_folder", lambda: tmp_path / "installed")
+    monkeypatch.setenv("ADHESIS_CACHE", str(tmp_path / "user"))
+    files = CodeFiles("key"), CodeFiles("key", to_installation=True)
+
+    def code_files(to_installation=False):
+        return files[to_installation]
+
+    for module in (door, warm):
+        monkeypatch.setattr(module, "code_files", code_files)
+    return tmp_path / "installed", tmp_path / "user"
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_the_command_keeps_code_for_all_or_for_the_user(places, own, capsys, monkeypatch):
+    monkeypatch.setattr(warm, "_small_loops", lambda method: None)
+    assert command.execute(argparse.Namespace(own=own)) == 0
+    for method in warm.COMPILED_METHODS:
+        assert (places[own] / "key" / f"{method}.json").is_file()
+    assert not places[not own].exists()
+    capsys.readouterr()
+    monkeypatch.setattr(warm, "_small_loops", lambda method: pytest.fail("compiled again"))
+    assert command.execute(argparse.Namespace(own=own)) == 0
+    assert "compiled before" in capsys.readouterr().out
+
+
+def test_the_command_puts_the_users_code_into_the_installation(places, monkeypatch):
+    monkeypatch.setattr(warm, "_small_loops", lambda method: door._files().read("code"))
+    CodeFiles("key").write("code", b"machine code")
+    assert command.execute(argparse.Namespace(own=False)) == 0
+    assert (places[0] / "key" / "code").read_bytes() == b"machine code"
+
+
+def test_code_that_cannot_be_kept_is_told(places, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(warm, "_small_loops", lambda method: None)
+    (tmp_path / "installed").write_text("")
+    (tmp_path / "user").write_text("")
+    assert command.execute(argparse.Namespace(own=False)) == 1
+    assert "cannot be kept" in capsys.readouterr().out
+
+
+def test_compiling_that_takes_a_while_is_told_and_a_moment_is_not(places, monkeypatch):
+    def compile_for(seconds: float) -> list[str]:
+        def small_loops(method: str) -> None:
+            seen = Compilation(door_tell[-1])
+            for i in range(40):
+                seen.functions, seen.seconds = i, seconds * i / 40
+                seen._tell(seen)
+
+        door_tell = []
+        monkeypatch.setattr(warm, "_small_loops", small_loops)
+
+        def watch(tell):
+            door_tell.append(tell)
+            return door.watch_compilation(tell)
+
+        monkeypatch.setattr(warm, "watch_compilation", watch)
+        said: list[str] = []
+        ensemble_warm.warm_up(["sharp", "grid"], said.append)
+        return said
+
+    assert compile_for(0.5) == []
+    said = compile_for(32.0)
+    assert said[0].startswith("compiling the methods sharp and grid for ")
+    assert [line.startswith("compiling: ") for line in said[1:-1]] == [True] * 2
+    assert said[-1].startswith("compiled ")
+    assert f"kept in {places[1] / 'key'}" in said[-1]
