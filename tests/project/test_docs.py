@@ -35,6 +35,7 @@ NOT_RUN = {
     "mpirun -n 8 adhesis run my.toml --out my.h5 --redo failed": "as before",
     "sbatch --ntasks=64 --time=12:00:00 PATH/jobs/slurm.sh my.toml": "tests/ensemble/test_slurm.py",
     'sbatch --ntasks=2 --wrap ".venv/bin/adhesis doctor --in ."': "needs a Slurm",
+    'sbatch --ntasks=1 --wrap ".venv/bin/adhesis warm"': "as before",
     "qsub -l select=2:ncpus=32:mpiprocs=32 -v CAMPAIGN=my.toml,SCRIPT=PATH/jobs/pbs.sh "
     "PATH/jobs/pbs.sh": "needs a PBS",
     "qsub -l select=2:ncpus=32:mpiprocs=32 -l walltime=12:00:00 -v CAMPAIGN=my.toml,"
