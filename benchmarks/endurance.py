@@ -35,6 +35,7 @@ from ensemble.campaign.tasks import Task
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, file_size
 from ensemble.results.write import Writer
+from ensemble.run.launch import ONE_THREAD, launch_environment, launcher
 from ensemble.run.ranks import world
 from ensemble.run.session import Engine, run_campaign
 from ensemble.task.compute import check_task, methods_of, run_task
@@ -43,7 +44,6 @@ from ensemble.task.fields import field_plan
 from ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 ROOT = Path(__file__).resolve().parent.parent
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass
@@ -140,14 +140,15 @@ def launch(
 
     ``pretend``: seconds of the tasks that do nothing, instead of real ones.
     """
-    script = f'. "{ROOT}/tools/mpi.sh" && choose_mpirun "{ROOT}" && allow_ranks {workers + 1} 1'
+    ranks, mpirun = workers + 1, launcher()
+    if mpirun is None:
+        sys.exit("there is no mpirun here")
     words = [sys.executable, "-m", "mpi4py", __file__, "rank", str(campaign), "--out", str(out)]
     if pretend is not None:
         words += ["--pretend", str(pretend)]
-    environ = {**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": str(ROOT)}
     process = subprocess.run(
-        ["bash", "-c", f'{script} && exec "$MPIRUN" -n {workers + 1} "$@"', "bash", *words],
-        env=environ,
+        [mpirun, "-n", str(ranks), *words],
+        env={**launch_environment(ranks), **ONE_THREAD, "PYTHONPATH": str(ROOT)},
         stderr=None if pretend is None else subprocess.PIPE,
         text=True,
     )

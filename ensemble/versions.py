@@ -28,6 +28,12 @@ def versions() -> dict[str, str]:
     }
 
 
+def adhesis_version() -> str:
+    """Return the version of adhesis, with the commit that it runs from where that is known."""
+    version, known = _package("adhesis", missing="unknown"), commit()
+    return version if known == "unknown" else f"{version} (commit {known[:12]})"
+
+
 def installed() -> dict[str, str]:
     """Version texts by name: the packages, python, mpi, hdf5 and fftw; or why one does not load.
 

@@ -12,12 +12,9 @@ set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 campaign=${1:?which campaign? usage: jobs/local.sh CAMPAIGN.toml [RANKS]}
-cores=$(nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
-ranks=${2:-$((cores + 1))}
+ranks=${2:-$(($(nproc 2>/dev/null || getconf _NPROCESSORS_ONLN) + 1))}
 name=$(basename "$campaign" .toml)
 out=${OUT:-out}
-
-. "$here/tools/mpi.sh"
 
 if [ -x "$here/.venv/bin/adhesis" ]; then
     adhesis=$here/.venv/bin/adhesis
@@ -27,30 +24,16 @@ elif ! adhesis=$(command -v adhesis); then
 fi
 mkdir -p "$out"
 
-# The ranks share the cores among themselves: one thread each.
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
-
-choose_mpirun "$here"
-if [ -n "$MPIRUN" ] && [ "$ranks" -gt 1 ]; then
-    allow_ranks "$ranks" "$cores"
-    launch=("$MPIRUN" -n "$ranks")
-else
-    launch=()
-    echo "jobs/local.sh: one process (no mpirun was found, or one rank was asked for)"
-fi
-
 # A shell that waits for a command in the foreground keeps signals to itself until that has ended;
-# so the run goes to the background. Told to terminate, it is stopped in order (SIGUSR1), which
-# mpirun passes on to the ranks: at SIGTERM it would kill them.
-signalled='' interrupted='' run=''
+# so the run goes to the background, and is told to stop in order.
+run='' signalled=''
 # shellcheck disable=SC2317
 stop() {
     signalled=yes
     if [ -n "$run" ]; then kill -s USR1 "$run" 2>/dev/null || true; fi
 }
-trap stop USR1 TERM
-trap 'signalled=yes interrupted=yes' INT # Ctrl-C reaches mpirun by itself
-${launch[@]+"${launch[@]}"} "$adhesis" run "$campaign" --out "$out/$name.h5" </dev/null &
+trap stop USR1 TERM INT
+"$adhesis" run "$campaign" --out "$out/$name.h5" --ranks "$ranks" </dev/null &
 run=$!
 while :; do
     signalled='' code=0
@@ -59,8 +42,6 @@ while :; do
     if [ -z "$signalled" ]; then break; fi
 done
 trap - USR1 TERM INT
-# mpirun makes a code of its own of Ctrl-C.
-if [ -n "$interrupted" ] && [ "$code" != 0 ]; then code=75; fi
 if [ "$code" = 75 ]; then
     echo "jobs/local.sh: stopped early; the same command resumes it ($out/$name.h5)" >&2
 fi

@@ -20,6 +20,7 @@ from typing import Literal
 
 from ensemble.bench.scenes import WARM_UP, Scene
 from ensemble.bench.tamaas import tamaas_loop
+from ensemble.run.launch import ONE_THREAD
 from solver.loop import LoopResult, run_loop
 from solver.registry import MethodName, make_method
 from solver.warm import watch_compilation
@@ -111,12 +112,11 @@ def measure(run: Run) -> Measurement:
     A run that fails or takes too long is a :class:`Measurement` with a note, not an exception.
     """
     # Threads of the linear algebra would burn CPU time on matrices of a few dozen rows.
-    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     # What the warm-up does not meet may be compiled once; the next process finds it in the cache.
     for _ in range(2):
         child = subprocess.run(
             [sys.executable, "-m", "ensemble.bench.measure", json.dumps(asdict(run))],
-            env={**os.environ, **one_thread},
+            env={**os.environ, **ONE_THREAD},
             capture_output=True,
             text=True,
             check=False,

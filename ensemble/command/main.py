@@ -12,6 +12,7 @@ import os
 import sys
 
 from ensemble.errors import InputError
+from ensemble.run.launch import ONE_THREAD
 
 COMMANDS: dict[str, str] = {
     "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
@@ -26,24 +27,26 @@ COMMANDS: dict[str, str] = {
 }
 BAD_INPUT = 2
 
-# Small matrices gain nothing from threads, ranks already share the cores, and sums split over a
-# number of threads would tie the last bits to it. Set before numpy is loaded.
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; returns its exit code (2 for bad input, with one sentence on stderr)."""
     words = sys.argv[1:] if argv is None else argv
     name = words[0] if words else ""
+    if name == "--version":
+        from ensemble.versions import adhesis_version
+
+        print(f"adhesis {adhesis_version()}")
+        return 0
     if name not in COMMANDS:
         _overview().parse_args(words or ["--help"])
         return BAD_INPUT
-    for variable in _ONE_THREAD:
-        os.environ.setdefault(variable, "1")
+    for variable, count in ONE_THREAD.items():
+        os.environ.setdefault(variable, count)  # before numpy is loaded
     module = importlib.import_module(f"ensemble.command.{name}")
     parser = argparse.ArgumentParser(prog=f"adhesis {name}", description=module.__doc__)
     module.add_arguments(parser)
     args = parser.parse_args(words[1:])
+    args.words = words
     try:
         code: int = module.execute(args)
     except InputError as error:
@@ -62,5 +65,6 @@ def _overview() -> argparse.ArgumentParser:
         epilog=f"commands:\n{listing}\n\nadhesis COMMAND --help tells more.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action="store_true", help="version and commit")
     parser.add_argument("command", choices=list(COMMANDS), metavar="COMMAND")
     return parser

@@ -1,9 +1,9 @@
-"""Run or resume a campaign; under mpirun, rank 0 hands out and the others work.
+"""Run or resume a campaign; with --ranks or under mpirun, rank 0 hands out, the others work.
 
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
 itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime): run the
-same command again to resume.
+same command again to resume. 137: a rank that --ranks started was killed; the same holds.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import os
 import sys
 import time
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
 OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
+_CODES = (DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, WRITE_FAILED, RESUME)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
     parser.add_argument(
         "--out", metavar="FILE.h5", help="results file (default: the campaign's name, here)"
+    )
+    parser.add_argument(
+        "--ranks",
+        metavar="N",
+        help="start N ranks here (one more than cores is right: rank 0 only waits)",
     )
     parser.add_argument(
         "--walltime",
@@ -66,14 +73,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
-    """Run, with another engine than loops if one is given; returns the exit code of all ranks."""
+def execute(
+    args: argparse.Namespace,
+    engine: Engine | None = None,
+    program: Sequence[str] | None = None,
+) -> int:
+    """Run; returns the exit code, the same on every rank.
+
+    Tests pass another engine than loops, and what starts a rank with it.
+    """
+    from ensemble.run import launch
     from ensemble.run.ranks import launched, world
 
     started = time.time()
     first = launched()[1] == 0
     comm = None
     try:
+        if args.ranks is not None and launch.STARTED not in os.environ:
+            code = _start_ranks(args, program)
+            if code is not None:
+                return code
         comm = world()
         if comm is not None:
             first = comm.rank == 0
@@ -90,6 +109,38 @@ def execute(args: argparse.Namespace, engine: Engine | None = None) -> int:
         traceback.print_exc()
         _end_job(comm, OUR_ERROR)
         return OUR_ERROR
+
+
+def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int | None:
+    """Start ranks and wait for them; None if this process is to compute alone."""
+    from ensemble.run import launch
+    from ensemble.run.ranks import launched
+
+    ranks = int(_number("--ranks", args.ranks, whole=True))
+    if ranks < 1:
+        raise InputError(f"--ranks is {args.ranks!r}: it must be a whole number of at least 1")
+    if launched()[0] > 1:
+        raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
+    if ranks == 1:
+        return None
+    mpirun = launch.launcher()
+    if mpirun is None:
+        print(
+            "no mpirun was found, so one process computes; MPIRUN=PATH names one",
+            file=sys.stderr,
+            flush=True,
+        )
+        return None
+    code = launch.run_ranks(mpirun, ranks, args.words, program)
+    if code in _CODES:
+        return code
+    print(
+        f"adhesis run: a rank was killed ({Path(mpirun).name} ended with {code}); what was done is "
+        "kept, run the same command again to resume",
+        file=sys.stderr,
+        flush=True,
+    )
+    return launch.KILLED
 
 
 def _end_job(comm: Any, code: int) -> None:

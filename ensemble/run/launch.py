@@ -1,16 +1,33 @@
-"""Starting ranks from within a program: which ``mpirun``, how many cores, which environment."""
+"""Starting ranks from within a program: which ``mpirun``, how many cores, which environment.
+
+One thread a rank: the ranks share the cores among themselves, small matrices gain nothing from
+threads, and sums split over a number of threads would tie the last bits to it.
+"""
 
 from __future__ import annotations
 
 import os
 import shutil
+import signal
+import subprocess
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 # What a launcher tells its ranks. A program that passes it on to a launcher of its own is taken
 # for one of those ranks, and both wait for each other or end without a word.
 _RANK_MARKS = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE")
 _LAUNCHER_PREFIXES = ("OMPI_", "OPAL_", "ORTE_", "PRTE_", "PMIX_", "PMI_", "HYDI_", "HYDRA_")
+
+
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+# Set for ranks that :func:`run_ranks` starts: they start none themselves.
+STARTED = "ADHESIS_STARTED"
+KILLED = 137  # what a shell says of a process that signal 9 has ended
 
 
 def cores() -> int:
@@ -60,3 +77,55 @@ def launch_environment(ranks: int) -> dict[str, str]:
         env["PRTE_MCA_rmaps_default_mapping_policy"] = ":oversubscribe"
         env["PRTE_MCA_hwloc_default_binding_policy"] = "none"
     return env
+
+
+def run_ranks(
+    launcher: str, ranks: int, words: Sequence[str], program: Sequence[str] | None = None
+) -> int:
+    """Start ranks with a command of adhesis and wait for their end; returns the exit code.
+
+    SIGTERM, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C ends them at once.
+
+    Parameters
+    ----------
+    launcher : str
+        An ``mpirun``.
+    ranks : int
+    words : sequence of str
+        What follows ``adhesis``.
+    program : sequence of str, optional
+        What a rank runs instead of adhesis, before the words.
+    """
+    # An error that a rank does not handle must end the others, too: mpi4py sees to it.
+    program = program or [sys.executable, "-m", "mpi4py", "-m", "ensemble"]
+    here = str(Path(__file__).resolve().parent.parent.parent)
+    env = launch_environment(ranks) | ONE_THREAD | {STARTED: "1"}
+    env["PYTHONPATH"] = os.pathsep.join(filter(None, [here, env.get("PYTHONPATH", "")]))
+    process = subprocess.Popen(
+        [launcher, "-n", str(ranks), *program, *words],
+        env=env,
+        stdin=subprocess.DEVNULL,
+        process_group=0,  # Ctrl-C would make mpirun end its ranks; here it becomes a stop in order
+    )
+    with _passed_on(process):
+        return process.wait()
+
+
+@contextmanager
+def _passed_on(process: subprocess.Popen[bytes]) -> Iterator[None]:
+    """Turn signals to this process into stops of the ranks: mpirun passes SIGUSR1 on to them."""
+    interrupted = False
+
+    def stop(number: int, _: FrameType | None) -> None:
+        nonlocal interrupted
+        again = interrupted and number == signal.SIGINT
+        process.send_signal(signal.SIGTERM if again else signal.SIGUSR1)
+        interrupted = interrupted or number == signal.SIGINT
+
+    numbers = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
+    before = {number: signal.signal(number, stop) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.trace.pool import cores
+from ensemble.run.launch import cores
 from ensemble.trace.prepare import Prepared
 from ensemble.trace.units import length_text
 from ensemble.trace.worker import Job

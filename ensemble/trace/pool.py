@@ -14,19 +14,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ensemble.run.launch import ONE_THREAD
 from ensemble.trace.worker import Job
 
 Result = dict[str, Any]
 Watch = Callable[["Pool"], None]
-
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class Pool:
@@ -74,7 +66,7 @@ class Pool:
         worker = len(self._workers)
         root = str(Path(__file__).resolve().parents[2])
         path = os.environ.get("PYTHONPATH")
-        environment = os.environ | dict.fromkeys(_ONE_THREAD, "1")
+        environment = os.environ | ONE_THREAD
         environment["PYTHONPATH"] = root + (os.pathsep + path if path else "")
         process = subprocess.Popen(
             [sys.executable, "-m", "ensemble.trace.worker"],

@@ -77,6 +77,44 @@ def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
     assert 8 - kept - 2 <= len(log.read_text().splitlines()) <= 8 - kept
 
 
+def test_a_run_starts_its_own_ranks(tmp_path, whole):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = adhesis("run", path, "--out", out, "--ranks", "3", fake="")
+    assert process.returncode == 0, process.stderr
+    assert differences(out, whole) == []
+    with Results(out) as results:
+        assert set(results.column("rank").tolist()) <= {1, 2}  # rank 0 only handed out
+    for words, sentence in (
+        (("--ranks", "0"), "--ranks is '0': it must be a whole number of at least 1"),
+        (("--ranks", "many"), "--ranks is 'many'"),
+    ):
+        process = adhesis("run", path, "--out", out, *words)
+        assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)
+        assert sentence in process.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, "--ranks", "3", fake="step=0.1")
+    wait_until(lambda: done_rows(out) >= 1)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode == 75, errors
+    assert "stopped early: SIGUSR1 received" in errors
+
+
+def test_a_killed_rank_ends_with_what_to_do(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, "--ranks", "3", fake="step=0.1")
+    wait_until(lambda: done_rows(out) >= 1)
+    (launcher,) = ranks_of(process.pid)
+    os.kill(ranks_of(launcher)[-1], signal.SIGKILL)
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode == 137
+    assert errors.splitlines()[-1].endswith("run the same command again to resume")
+
+
 KILLS = int(os.environ.get("ADHESIS_KILLS", "0"))
 
 

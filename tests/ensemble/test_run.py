@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import sys
 import time
 
@@ -49,6 +50,29 @@ def test_a_run_from_nothing_to_done(tmp_path):
             assert file.attrs[name]
         assert file.attrs["campaign"] == (tmp_path / "c.toml").read_text()
         assert file.attrs["seed"] == 5
+
+
+def test_where_there_is_no_launcher_one_process_computes(tmp_path):
+    path = write_campaign(tmp_path)
+    code = (
+        "import sys; from ensemble.run import launch; launch.launcher = lambda: None\n"
+        "from ensemble.command.main import main; sys.exit(main(sys.argv[1:]))"
+    )
+    words = ("run", path, "--out", tmp_path / "r.h5", "--ranks", "3")
+    process = subprocess.run(
+        [sys.executable, "-c", code, *map(str, words)],
+        env=environment(),
+        capture_output=True,
+        text=True,
+    )
+    assert process.returncode == 0
+    assert "no mpirun was found, so one process computes" in process.stderr
+
+
+def test_the_version_is_told():
+    process = adhesis("--version")
+    assert process.returncode == 0
+    assert process.stdout.startswith("adhesis 0.")
 
 
 def test_the_results_file_is_named_after_the_campaign_by_default(tmp_path):
@@ -338,8 +362,6 @@ def test_status_of_a_large_file_takes_under_a_second_and_no_mpi(tmp_path):
         "import sys; from ensemble.command.main import main; main(['status', sys.argv[1]]); "
         "print([m for m in sys.modules if m.startswith('mpi4py')])"
     )
-    import subprocess
-
     started = time.monotonic()
     process = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path / "r.h5")],

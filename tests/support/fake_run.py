@@ -97,4 +97,7 @@ if __name__ == "__main__":
 
     parser = argparse.ArgumentParser(prog="adhesis run")
     run.add_arguments(parser)
-    sys.exit(run.execute(parser.parse_args(sys.argv[3:]), fake_engine(sys.argv[1])))
+    args = parser.parse_args(sys.argv[3:])
+    args.words = sys.argv[2:]
+    program = [sys.executable, "-m", "mpi4py", __file__, sys.argv[1]]
+    sys.exit(run.execute(args, fake_engine(sys.argv[1]), program))
