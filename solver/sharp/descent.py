@@ -26,7 +26,7 @@ _NOISE = 1e-3  # a rise of the energy below this share of the work done both way
 _LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
 
 # How a descent ended.
-RESTING, NARROW, UNFINISHED = 0, 1, 2
+RESTING, NARROW, UNFINISHED, LOST = 0, 1, 2, 3
 
 
 @compiled
@@ -55,7 +55,7 @@ def descend(
     -------
     gaps, how it ended, fields, tangents, kinds
         RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
-        length, UNFINISHED after the last step.
+        length, UNFINISHED after the last step, LOST where the edges have no field.
     """
     edges = 2 * gaps.shape[0]
     fields = 0
@@ -75,6 +75,8 @@ def descend(
         table = map_gaps(gaps)
         kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
         of = solve(gaps, prescribed, law.hold, kinds, 1 if held else 2, rules, panels)
+        if not np.isfinite(of.pressure):
+            return gaps, LOST, fields, tangents, kinds
         residual, drift = imbalance(of, law, panels)
         # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²
         rise = 0.0

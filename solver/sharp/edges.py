@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.method import PathError
 from solver.profile import Array
 from solver.sharp.balance import Law
-from solver.sharp.descent import NARROW, RESTING, descend
+from solver.sharp.descent import LOST, NARROW, RESTING, descend
 from solver.sharp.equilibrium import equilibrium
 from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution
 from solver.sharp.source import StressSource
@@ -175,8 +176,8 @@ class EdgeMechanics:
 
         Raises
         ------
-        RuntimeError
-            If the descent does not end.
+        PathError
+            If the descent does not end, or comes to edges that have no field.
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
@@ -191,6 +192,8 @@ class EdgeMechanics:
             self.count.descent_steps += fields
             self.count.derivatives += tangents
             left -= fields
+            if ended == LOST:
+                raise PathError(f"there is no field of these edges at q0 s = {prescribed:.9g}")
             if ended == NARROW:
                 rest = self.without_small(gaps)
                 if rest is not None:
@@ -207,7 +210,7 @@ class EdgeMechanics:
                 point = self.equilibrium(gaps, prescribed, reach, kinds, patient=patient)
                 if point is not None:
                     return point
-        raise RuntimeError(f"the descent at q0 s = {prescribed} did not end")
+        raise PathError(f"the descent at q0 s = {prescribed:.9g} did not end")
 
     def without_small(self, gaps: Array) -> Array | None:
         """Gaps without closed gaps or vanished patches, or None if there are none."""

@@ -68,6 +68,8 @@ def equilibrium(
     while True:
         steps += 1
         of = solve(at, prescribed, law.hold, kinds, 2, rules, panels)
+        if not np.isfinite(of.pressure):
+            break
         residual, drift = imbalance(of, law, panels)
         tangent, by_edge = tangent_of(of, drift, rules)
         step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float

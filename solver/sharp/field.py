@@ -40,7 +40,16 @@ from numpy.typing import NDArray
 
 from solver.compiled import compiled, compiled_sums
 from solver.profile import Array
-from solver.sharp.coordinate import ALPHA, LEFT, convergence, map_gaps, theta_at
+from solver.sharp.coordinate import (
+    ALPHA,
+    LEFT,
+    LEFT_PATCH,
+    RIGHT,
+    RIGHT_PATCH,
+    convergence,
+    map_gaps,
+    theta_at,
+)
 from solver.sharp.linear import cholesky, solve_factored
 from solver.sharp.source import Panels, StressSource, gap_moments
 
@@ -272,6 +281,17 @@ def choose_kinds(table: Array, digits: float, counts: Kinds) -> Kinds:
 
 
 @compiled
+def _in_order(table: Array) -> bool:
+    """Whether every gap and patch has a length; not so where an edge is no number."""
+    for k in range(table.shape[0]):
+        # not written as <= : a length that is no number is a failure, too
+        length = table[k, RIGHT] - table[k, LEFT]
+        if not (length > 0 and table[k, LEFT_PATCH] > 0 and table[k, RIGHT_PATCH] > 0):
+            return False
+    return True
+
+
+@compiled
 def solve(
     gaps: Array,
     prescribed: float,
@@ -284,10 +304,17 @@ def solve(
     """Solve (1) with the source S (``fields`` 1), or S and S' (2) for :func:`derivatives`.
 
     An iteration must keep the kinds: where they change, the field jumps by its error. The pressure
-    is NaN if the matrix is not positive definite to rounding.
+    is NaN if the matrix is not positive definite to rounding, or edges are no numbers or cross.
     """
     table = map_gaps(gaps)
     offset = np.zeros(table.shape[0] + 1, dtype=np.int64)
+    if not _in_order(table):
+        nothing, none = np.empty(0), np.empty((0, 0))
+        return Solution(
+            table, kinds, offset, nothing, nothing, np.empty((table.shape[0], 2)), none, none, none,
+            none, np.empty((0, 0, 0)), hold.share, np.nan, np.nan, np.nan, np.nan, nothing,
+            np.full(2 * table.shape[0], np.nan),
+        )  # fmt: skip
     for k in range(table.shape[0]):
         offset[k + 1] = offset[k] + rules.counts[kinds[k]]
     theta, weight, slope, matrix, rhs, beyond = _assemble(

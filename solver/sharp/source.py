@@ -39,6 +39,12 @@ from solver.sharp.coordinate import (
 # long as its distance from a singularity leaves 5.8^-p.
 _NODES = ((1e-5, 8), (1e-7, 10), (2e-9, 12), (0.0, 14))
 
+# Nodes of h' on a finest panel: interpolation leaves 2e-10 of the shortest wave's slope. The
+# length sqrt(1 + h'²) follows from h'; a series of its own would converge the more slowly the
+# steeper the profile. Its integral is taken by the rule of as many nodes over pieces of a panel.
+_TILT_NODES = 12
+_PIECES_BY_SLOPE = 4.0
+
 _SHORT_GAP = 4  # gaps shorter than so many finest panels are integrated directly
 _PHASE = 3.0  # radians of the highest Chebyshev mode that one panel may span
 _SAFE = 2.0  # modes·length/distance of a panel up to which it surely spans less
@@ -55,8 +61,10 @@ class Panels(NamedTuple):
         Number of finest panels; the shortest wave covers at least two.
     x, w : array, shape (p,)
         Gauss-Legendre rule of a panel.
-    stress, slope, measure : array, shape (finest, p)
-        Chebyshev coefficients of S, S' and sqrt(1 + h'²) on each finest panel.
+    stress, slope : array, shape (finest, p)
+        Chebyshev coefficients of S and S' on each finest panel.
+    tilt : array, shape (finest, 12)
+        Those of h'.
     weights : array, shape (2, 2·finest, p)
         ω for S and for S', of every panel of every level, the finest level first.
     level_start : int array
@@ -71,7 +79,7 @@ class Panels(NamedTuple):
     w: Array
     stress: Array
     slope: Array
-    measure: Array
+    tilt: Array
     weights: Array
     level_start: NDArray[np.int64]
     end_x: Array
@@ -95,6 +103,8 @@ class StressSource:
         Mean square slope.
     sharpest : float
         Largest |h''|, in units of q0.
+    steepest : float
+        Largest |h'|.
     panels : Panels
     """
 
@@ -110,12 +120,19 @@ class StressSource:
         self.sharpest = float(np.abs(profile.curvatures(8 * top)).max()) / profile.q0
         stress = _on_panels(m * h, x, count)  # symbol |q| of the half-space
         slope = _on_panels(1j * m * m * h, x, count)
-        measure = np.sqrt(1 + _on_panels(1j * m * h, x, count) ** 2)
+        y, v = legendre.leggauss(_TILT_NODES)
+        tilt = _on_panels(1j * m * h, y, count) @ _to_chebyshev(y)
 
-        to_chebyshev = np.linalg.inv(chebyshev.chebvander(x, p - 1)).T
-        self._primitive = chebyshev.chebint(np.eye(p), lbnd=-1, axis=0)
+        to_chebyshev = _to_chebyshev(x)
+        self.steepest = float(np.abs(profile.slopes(8 * top)).max())
+        pieces = int(np.ceil(1 + _PIECES_BY_SLOPE * self.steepest))
+        # rule on a finest panel, composed of equal pieces; nodes and weights from 0 to 1
+        start = np.arange(pieces)[:, None]
+        self._piece_x = ((start + (y + 1) / 2) / pieces).ravel()
+        self._piece_w = np.tile(v / (2 * pieces), pieces)
         # ∫ sqrt(1 + h'²) dθ from 0 to the start of each finest panel
-        self._measure_before = np.concatenate([[0.0], np.cumsum((measure @ w) * width / 2)])
+        whole = _lengths(np.arange(count), np.ones(count), tilt, self._piece_x, self._piece_w)
+        self._measure_before = np.concatenate([[0.0], np.cumsum(whole * width)])
 
         # ω of the finest level, then each parent from its two children: exact for polynomials.
         to_left, to_right = (_lagrange(x, (x + side) / 2) for side in (-1.0, 1.0))
@@ -125,7 +142,7 @@ class StressSource:
             level = level[:, 0::2] @ to_left + level[:, 1::2] @ to_right
             levels.append(level)
         sizes = [k.shape[1] for k in levels]
-        t, v = legendre.leggauss(2 * p - 4)
+        t, end = legendre.leggauss(2 * p - 4)
         self.panels = Panels(
             width=width,
             finest=count,
@@ -133,11 +150,11 @@ class StressSource:
             w=w,
             stress=np.ascontiguousarray(stress @ to_chebyshev),
             slope=np.ascontiguousarray(slope @ to_chebyshev),
-            measure=np.ascontiguousarray(measure @ to_chebyshev),
+            tilt=np.ascontiguousarray(tilt),
             weights=np.ascontiguousarray(np.concatenate(levels, axis=1)),
             level_start=np.cumsum([0, *sizes[:-1]]),
             end_x=(t + 1) / 2,
-            end_w=v / 2,
+            end_w=end / 2,
         )
 
     def sample(self, theta: Array) -> Array:
@@ -151,13 +168,17 @@ class StressSource:
         return float((self._measure_to(right) - self._measure_to(left)).sum())
 
     def _measure_to(self, theta: Array) -> Array:
-        width, count, measure = self.panels.width, self.panels.finest, self.panels.measure
+        width, count = self.panels.width, self.panels.finest
         turns, rest = np.divmod(theta, 2 * np.pi)
         k = np.minimum((rest / width).astype(int), count - 1)
-        x = np.clip(2 * (rest / width - k) - 1, -1, 1)
-        basis = np.cos(np.multiply.outer(np.arccos(x), np.arange(measure.shape[1] + 1)))
-        part = np.sum(basis * (measure[k] @ self._primitive.T), axis=1) * width / 2
+        share = np.clip(rest / width - k, 0, 1)
+        part = _lengths(k, share, self.panels.tilt, self._piece_x, self._piece_w) * width
         return np.asarray(turns * self._measure_before[-1] + self._measure_before[k] + part)
+
+
+def _to_chebyshev(nodes: Array) -> Array:
+    """Matrix that turns rows of values at ``nodes`` into rows of Chebyshev coefficients."""
+    return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes, len(nodes) - 1)).T)
 
 
 def _on_panels(a: NDArray[np.complex128], x: Array, count: int) -> Array:
@@ -213,7 +234,7 @@ def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
     place = theta / panels.width
     k = int(np.floor(place))
     x = 2 * (place - k) - 1
-    c = panels.measure[k & (panels.finest - 1)]
+    c = panels.tilt[k & (panels.finest - 1)]
     # d/dx of Σ c_j T_j = Σ j c_j U_{j-1}
     u_prev = 0.0
     u = 1.0
@@ -221,7 +242,22 @@ def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
     for j in range(1, c.shape[0]):
         total += j * c[j] * u
         u, u_prev = 2 * x * u - u_prev, u
-    return _clenshaw(c, x), total * 2 / panels.width
+    tilt = _clenshaw(c, x)
+    measure = np.sqrt(1 + tilt * tilt)
+    return measure, tilt / measure * total * 2 / panels.width
+
+
+@compiled
+def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, w: Array) -> Array:
+    """∫ sqrt(1 + h'²) over the first ``share`` of each panel, in panel widths."""
+    out = np.empty(panel.shape[0])
+    for i in range(panel.shape[0]):
+        total = 0.0
+        for j in range(nodes.shape[0]):
+            value = _clenshaw(tilt[panel[i]], 2 * share[i] * nodes[j] - 1)
+            total += w[j] * np.sqrt(1 + value * value)
+        out[i] = total * share[i]
+    return out
 
 
 # Nodes of a gap's moments: rows 1 - η, 1 + η, ∫S dθ and ∫S' dθ of each.
