@@ -1,6 +1,6 @@
 # make help lists what there is. tools/setup.sh does nothing when nothing has changed.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test run test test-kills lint bench clean lock
+.PHONY: help setup setup-test run test test-kills lint bench docs clean lock
 SHELL := /bin/bash
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
@@ -34,6 +34,9 @@ test-kills: setup  ## 20 kills each of a worker, of rank 0 and of the whole job 
 bench: setup  ## speed against error of each method
 	$(bin)/adhesis bench
 
+docs: setup  ## the documentation site in docs/_build, its examples run
+	@tools/docs.sh
+
 lock: setup  ## requirements.lock from the versions in .venv
 	@{ sed '/^[^#]/d' requirements.lock; \
 	    $(bin)/pip freeze --all --exclude-editable | grep -vE '^(pip|wheel|mpich|h5py)\b'; \
@@ -42,5 +45,5 @@ lock: setup  ## requirements.lock from the versions in .venv
 
 clean:  ## removes .venv, caches and the example's results; built wheels stay in .setup
 	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info \
-	    out/example out/example.h5
+	    out/example out/example.h5 docs/_build docs/gallery
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

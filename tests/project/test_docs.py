@@ -20,7 +20,9 @@ import pytest
 from matplotlib.image import imread
 
 from ensemble.campaign.file import parse_campaign
+from ensemble.command import run
 from ensemble.command.main import COMMANDS, main
+from ensemble.run import launch
 
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
@@ -146,7 +148,8 @@ def parser_of(name: str) -> argparse.ArgumentParser:
 
 
 def test_every_block_is_of_a_kind_that_is_tested() -> None:
-    kinds = {"python", "toml", "", "bash", "sh"}
+    # Directives in braces are for the site alone: `make docs` takes each warning for an error.
+    kinds = {"python", "toml", "", "bash", "sh", "{include}", "{toctree}"}
     assert [block.name for block in BLOCKS if block.language not in kinds] == []
     for block, line in LINES:
         word = line.split()[0]
@@ -165,8 +168,6 @@ def test_the_lists_of_what_is_not_run_are_up_to_date() -> None:
     "block", [b for b in BLOCKS if b.language == "python"], ids=lambda block: block.name
 )
 def test_python_runs(block: Block, tmp_path: Path) -> None:
-    if block.page.name == "README.md":
-        return  # tests/project/test_readme.py runs it and looks at what it prints
     done = subprocess.run(
         [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{block.text}"],
         cwd=tmp_path,
@@ -176,6 +177,11 @@ def test_python_runs(block: Block, tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout
+    if block.page.name == "README.md":
+        match = re.fullmatch(r"([\d.]+) J/m² lost in (\d+) jumps \(([\d.]+) J/m²\)\n", done.stdout)
+        assert match is not None, done.stdout
+        assert float(match[1]) > 0
+        assert abs(float(match[1]) / float(match[3]) - 1) < 0.01
 
 
 @pytest.mark.parametrize(
@@ -270,8 +276,22 @@ def test_commands_in_the_text_exist(page: Path) -> None:
             known = parser_of(name)._option_string_actions
             for option in (word for word in rest if word.startswith("--")):
                 assert option in known, snippet
+        if snippet.startswith("make "):
+            assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
         for path in re.findall(r"^(?:(?:jobs|docs|tests|tools|solver|examples)/[\w/.-]+)", snippet):
             assert (ROOT / path).exists(), snippet
+
+
+def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
+    tables = {
+        page.name: {
+            int(code) for code in re.findall(r"^\| (\d+) \|", page.read_text(), re.MULTILINE)
+        }
+        for page in PAGES
+    }
+    codes = {run.DONE, run.SOME_FAILED, run.BAD_INPUT, run.OUR_ERROR, run.WRITE_FAILED, run.RESUME}
+    assert tables.pop("README.md") == codes | {launch.KILLED}
+    assert [name for name, told in tables.items() if run.RESUME in told] == []
 
 
 # ---------------------------------------------------------------------- links and images

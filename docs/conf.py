@@ -1,0 +1,93 @@
+"""The documentation site, made by `make docs` from these pages, the docstrings and examples/."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import adhesis
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+project = "adhesis"
+author = copyright = "The adhesis developers"
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
+]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["README.md", "paper/README.md"]
+language = "en"
+
+# Anchors as the pages use them where they are read as plain Markdown.
+myst_heading_anchors = 4
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings say types, with shapes and units
+napoleon_numpy_docstring = True
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+
+html_theme = "furo"
+html_title = "adhesis"
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {"navigation_with_keys": True}
+html_css_files = ["adhesis.css"]
+html_static_path = ["static"]
+
+sphinx_gallery_conf = {
+    "examples_dirs": str(ROOT / "examples"),
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"/\d_",
+    "ignore_pattern": r"measured_profile|__init__",
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "min_reported_time": 0,
+    "image_scrapers": ("matplotlib",),
+    "matplotlib_animations": False,
+    "capture_repr": (),
+    "write_computation_times": False,
+}
+
+# A docstring's home is the module that defines it; the pages describe it as a name of `adhesis`.
+PUBLIC = {f"{getattr(adhesis, n).__module__}.{n}": f"adhesis.{n}" for n in adhesis.__all__}
+
+
+def plain(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Take signs of formulas (E*, |a_m|²) for what they are, and pages of docs/ for links."""
+    for place, line in enumerate(lines):
+        parts = re.split(r"(``[^`]*``|:\w+:`[^`]*`)", line)
+        parts[::2] = [re.sub(r"([*|])", r"\\\1", part) for part in parts[::2]]
+        line = "".join(parts)
+        lines[place] = re.sub(r"docs/([\w-]+)\.md", r":doc:`\1`", line)
+
+
+def start_page(app: Any, name: str, source: list[str]) -> None:
+    """Lead to the start page, which holds the README, where a page links to that."""
+    source[0] = source[0].replace("](../README.md", "](index.md")
+
+
+def public_name(app: Any, env: Any, node: Any, content: Any) -> Any:
+    """Resolve `solver.loop.LoopResult` to the entry of `adhesis.LoopResult`."""
+    wanted = PUBLIC.get(node.get("reftarget", ""))
+    if wanted is None:
+        return None
+    domain = env.domains["py"]
+    return domain.resolve_xref(
+        env, node["refdoc"], app.builder, node["reftype"], wanted, node, content
+    )
+
+
+def setup(app: Any) -> None:
+    """Connect the three."""
+    app.connect("source-read", start_page)
+    app.connect("autodoc-process-docstring", plain, priority=400)  # ahead of napoleon
+    app.connect("missing-reference", public_name)

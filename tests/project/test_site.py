@@ -1,0 +1,58 @@
+"""The documentation site: what it has to hold, and that its examples run. `make docs` makes it."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import adhesis
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+EXAMPLES = sorted((ROOT / "examples").glob("[0-9]_*.py"))
+
+
+def test_every_public_name_is_in_the_reference_and_nothing_else() -> None:
+    text = (ROOT / "docs" / "reference.rst").read_text()
+    assert sorted(re.findall(r"auto\w+:: adhesis\.(\w+)", text)) == sorted(adhesis.__all__)
+
+
+def test_every_page_is_in_the_contents() -> None:
+    index = (ROOT / "docs" / "index.md").read_text()
+    pages = {
+        str(path.relative_to(ROOT / "docs").with_suffix(""))
+        for path in (ROOT / "docs").rglob("*.*")
+        if path.suffix in (".md", ".rst") and not {"_build", "gallery"} & set(path.parts)
+    }
+    left_out = {"index", *(p for p in pages if p.endswith("README"))}
+    assert pages - left_out - set(index.split()) == set()
+
+
+def test_what_the_site_is_made_with_is_locked() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    lock = (ROOT / "docs" / "requirements.lock").read_text().lower()
+    for requirement in project["optional-dependencies"]["docs"]:
+        name = re.split(r"[^\w-]", requirement)[0]
+        assert re.search(rf"^{name}==", lock, re.MULTILINE), name
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_run(
+    path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each says something and draws something."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    monkeypatch.setattr(plt, "show", lambda: None)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    runpy.run_path(str(path))
+    figures = plt.get_fignums()
+    plt.close("all")
+    assert figures
+    assert capsys.readouterr().out

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Makes the documentation site in docs/_build, from docs/, the docstrings and examples/.
+#
+# What it is made with (docs/requirements.lock) is kept in .setup/docs, apart from .venv: nothing
+# else needs it. A warning is an error.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+python=${PYTHON:-.venv/bin/python}
+tools=.setup/docs
+if ! cmp -s docs/requirements.lock "$tools/requirements.lock"; then
+    echo "docs: installing what the site is made with into $tools"
+    rm -rf "$tools"
+    "$python" -m pip --no-input --disable-pip-version-check install --quiet --target "$tools" \
+        -r docs/requirements.lock
+    cp docs/requirements.lock "$tools/"
+fi
+echo "docs: running the examples, making the pages (a minute)"
+PYTHONPATH=$tools:. OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
+    "$python" -m sphinx --fail-on-warning --keep-going --quiet -b html docs docs/_build
+echo "docs: open docs/_build/index.html"
