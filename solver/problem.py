@@ -82,6 +82,13 @@ class Problem:
         """What is prescribed (x of :mod:`solver.control`) in a state: in m, for a load in Pa."""
         return self.control.prescribed(state.separation, state.mean_stress)
 
+    def full_contact(self, prescribed: float) -> str:
+        """One sentence for a contact that runs into full contact on the way to x = prescribed."""
+        where = f"before a mean stress of {-prescribed:g} Pa"
+        if not self.control.is_load:
+            where = f"before u_tot/h_max = {self.penetration(prescribed):g}"
+        return f"the contact runs into full contact {where}: no state with a gap carries that"
+
     def penetration(self, separation: float) -> float:
         """Penetration Δ~ = 1 - s/h_max at the separation s in m."""
         return 1.0 - separation / self.profile.h_max

@@ -141,7 +141,7 @@ class SharpMethod(Method):
         try:
             trace = self._trace(state, target)
         except FullContact:
-            raise PathError(self._full_contact(prescribed)) from None
+            raise PathError(self.problem.full_contact(prescribed)) from None
         return Path(tuple(trace.states), tuple(trace.jumps))
 
     def _trace(self, state: ContactState, target: Target) -> Trace:
@@ -177,12 +177,6 @@ class SharpMethod(Method):
         if point is None and at != target.at and not control.is_load:
             trace.states.append(self.detached(target.prescribed))
         return trace
-
-    def _full_contact(self, prescribed: float) -> str:
-        where = f"before a mean stress of {-prescribed:g} Pa"
-        if not self.problem.control.is_load:
-            where = f"before u_tot/h_max = {self.problem.penetration(prescribed):g}"
-        return f"the contact runs into full contact {where}: no state with a gap carries that"
 
     def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
         """Without adhesion the state is unique, and nothing jumps.
