@@ -5,28 +5,35 @@ notice. Lengths in m, stresses in Pa (compression positive), energies per unit d
 per nominal area in J/m². Loads no MPI and no matplotlib.
 """
 
+from solver.control import Control
 from solver.jumps import Jump
-from solver.loop import LoopResult, run_loop
+from solver.loop import LoopResult, run_loop, run_loops
 from solver.material import HalfSpace
 from solver.method import ContactState, Fields, Method, Opening, Path
+from solver.path import MinorLoop, PathResult, run_path
 from solver.problem import Problem
 from solver.profile import Profile, profile_from_heights, self_affine_profile, single_wave
 from solver.registry import make_method
 
 __all__ = [
     "ContactState",
+    "Control",
     "Fields",
     "HalfSpace",
     "Jump",
     "LoopResult",
     "Method",
+    "MinorLoop",
     "Opening",
     "Path",
+    "PathResult",
     "Problem",
     "Profile",
     "make_method",
     "profile_from_heights",
     "run_loop",
+    "run_loops",
+    "run_path",
     "self_affine_profile",
     "single_wave",
 ]

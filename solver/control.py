@@ -44,6 +44,10 @@ class Control:
     ------
     ValueError
         If the stiffness is negative or no number.
+
+    References
+    ----------
+    docs/theory.md, "8. Paths and controls"
     """
 
     stiffness: float = math.inf

@@ -8,18 +8,22 @@ of the energy drops at the jumps are the same energy. They are computed independ
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from time import process_time
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.control import Control
 from solver.jumps import Branch, Jump
-from solver.method import ContactState, Method, MethodReport, Path, PathError
+from solver.method import ContactState, Method, MethodReport, PathError
 from solver.problem import Problem
 from solver.profile import Array
+from solver.record import Axis, Record
+
+T = TypeVar("T")
 
 Progress = Callable[[Branch, float, ContactState], None]
 """Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
@@ -60,13 +64,16 @@ class LoopResult:
         In J/m, per period.
     jumps : tuple of Jump
     loss : float
-        ∮ p̄ dΔ in J/m² of nominal area, over all states (:func:`integral`; :mod:`solver.control`).
+        ∮ p̄ dΔ in J/m² of nominal area, over all states (:func:`solver.record.integral`).
     loss_dimensionless : float
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
     loss_from_drops : float
         Sum of the energy drops at the jumps, in J/m².
     loss_error : float
         Estimated numerical error of the loss, in J/m².
+    work_gained, work_spent : float
+        Work that is gained on loading and spent on unloading, in J/m² of nominal area: ∓∫ p̄ du_tot
+        along the branch. Their difference is the loss.
     seconds : float
         CPU time of this process, in s.
     method : MethodReport
@@ -95,6 +102,8 @@ class LoopResult:
     loss_dimensionless: float
     loss_from_drops: float
     loss_error: float
+    work_gained: float
+    work_spent: float
     seconds: float
     method: MethodReport
 
@@ -128,6 +137,21 @@ class LoopResult:
         """Largest mean tension on unloading, -min p̄, in Pa."""
         return float(-self.mean_stress[self.branch == "unloading"].min())
 
+    @property
+    def largest_contact_fraction(self) -> float:
+        """Largest A/A0 on the loop."""
+        return float(self.contact_fraction.max())
+
+    @property
+    def effective_work_of_approach(self) -> float:
+        """Work gained per largest contact area, in J/m² of contact."""
+        return self.work_gained / self.largest_contact_fraction
+
+    @property
+    def effective_work_of_separation(self) -> float:
+        """Work spent per largest contact area, in J/m² of contact."""
+        return self.work_spent / self.largest_contact_fraction
+
     def __str__(self) -> str:
         """A few lines for a terminal: what was followed, its losses, its jumps, its pull-off."""
         profile = self.problem.profile
@@ -155,22 +179,6 @@ class LoopResult:
         return np.flatnonzero(chosen & self.load_step if load_steps_only else chosen)
 
 
-def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:
-    """∫ Y dx over the states, in J/m²: trapezoidal rule, end-corrected where dY/dx is known.
-
-    At fixed separation that is ∫ p̄ ds. The correction h²/12 (Y'_0 - Y'_1) raises the order from two
-    to four on smooth pieces; it is left out where a stiffness is NaN.
-
-    Parameters
-    ----------
-    prescribed, conjugate, stiffness : array, shape (states,)
-        x, Y and dY/dx (:mod:`solver.control`; m, Pa and Pa/m, or Pa, m and m/Pa), in the order of
-        the path.
-    """
-    bend = -np.diff(stiffness) * np.diff(prescribed) ** 2 / 12
-    return float(np.trapezoid(conjugate, prescribed)) + float(np.nansum(bend))
-
-
 def check_cycle(turning_point: float, load_steps: int, control: Control | None = None) -> None:
     """Refuse a cycle that cannot be run.
 
@@ -194,46 +202,6 @@ def check_cycle(turning_point: float, load_steps: int, control: Control | None =
         )
     if load_steps != int(load_steps) or load_steps < 1:
         raise ValueError(f"load_steps is {load_steps!r}: it must be a whole number of at least 1")
-
-
-@dataclass
-class Record:
-    """The states of a path in order, each with its branch, and the jumps between them.
-
-    Parameters
-    ----------
-    on_state : callable, optional
-        Called with every state of the path, in order.
-    """
-
-    on_state: Callable[[Branch, ContactState], None] | None = None
-    branches: list[Branch] = field(default_factory=list)
-    on_axis: list[bool] = field(default_factory=list)
-    states: list[ContactState] = field(default_factory=list)
-    jumps: list[Jump] = field(default_factory=list)
-    error: float = 0.0
-    """Sum of what the method knows of its own error, in J/m²; NaN if it does not know."""
-
-    def visit(self, branch: Branch, on_axis: bool, state: ContactState) -> None:
-        """Take down one state; ``on_axis`` if it ends a load step."""
-        self.branches.append(branch)
-        self.on_axis.append(on_axis)
-        self.states.append(state)
-        if self.on_state is not None:
-            self.on_state(branch, state)
-
-    def extend(self, branch: Branch, path: Path) -> ContactState:
-        """Take down one load step, whose last state lies on the axis; return that state."""
-        for passed in path.states[:-1]:
-            self.visit(branch, False, passed)
-        self.visit(branch, True, path.states[-1])
-        self.jumps += path.jumps
-        self.error += path.error
-        return path.states[-1]
-
-    def column(self, name: str) -> Array:
-        """One attribute of every state, shape (states,)."""
-        return np.array([getattr(state, name) for state in self.states])
 
 
 def run_loop(
@@ -273,20 +241,78 @@ def run_loop(
     ----------
     docs/theory.md, "3. The loop"
     """
-    turning_point = _turning_point(method.problem, max_penetration, max_stress)
+    turning_point = turning_of(method.problem, max_penetration, max_stress)
     check_cycle(turning_point, load_steps, method.problem.control)
     started = process_time()
     record = Record(on_state)
-    for branch, index, state in _steps(method, record, turning_point, load_steps):
-        if progress is not None:
-            progress(branch, turning_point * index / load_steps, state)
+    axis = Axis(turning_point, load_steps)
+    *_, (_, state) = _load(method, record, [axis(i) for i in range(load_steps + 1)], progress)
+    _unload(method, record, state, axis, load_steps, progress)
     return _result(method, record, turning_point, load_steps, started)
 
 
-def _turning_point(
-    problem: Problem, max_penetration: float | None, max_stress: float | None
-) -> float:
-    """The turning point that belongs to the control.
+def run_loops(
+    method: Method,
+    *,
+    max_penetration: Sequence[float] | None = None,
+    max_stress: Sequence[float] | None = None,
+    load_steps: int,
+    progress: Progress | None = None,
+) -> tuple[LoopResult, ...]:
+    """Loops that share one loading branch: it is followed once, and left at every turning point.
+
+    Parameters
+    ----------
+    method : Method
+    max_penetration, max_stress : sequence of float, shape (loops,)
+        The turning points, different ones: Δ/h_max or u_tot/h_max, or Pa under a load.
+    load_steps : int
+        Equal steps up to the largest turning point; every unloading branch goes on with that step.
+    progress : callable, optional
+        See :data:`Progress`.
+
+    Returns
+    -------
+    tuple of LoopResult
+        One a turning point, ascending. ``load_steps`` counts those of its own loading branch, and
+        ``seconds`` holds that branch up to the turning point and the unloading from there.
+
+    Raises
+    ------
+    ValueError
+        If a cycle cannot be run (:func:`check_cycle`), or a turning point is given twice, or none.
+    PathError
+        As in :func:`run_loop`.
+
+    References
+    ----------
+    docs/theory.md, "8. Paths and controls"
+    """
+    points = turning_of(method.problem, max_penetration, max_stress)
+    turns = sorted(points)
+    if not turns or len(set(turns)) < len(turns):
+        raise ValueError(f"turning points are {list(points)}: there must be some, all different")
+    for turn in turns:
+        check_cycle(turn, load_steps, method.problem.control)
+    axis = Axis(turns[-1], load_steps)
+    loading = Record()
+    results: list[LoopResult] = []
+    spent = 0.0  # CPU time of the loading branch so far
+    started = process_time()
+    drives = axis.between(0.0, turns[-1], turns)
+    for steps, (drive, state) in enumerate(_load(method, loading, drives, progress)):
+        if drive in turns:
+            spent += process_time() - started
+            started = process_time() - spent
+            record = loading.copy()
+            _unload(method, record, state, axis, axis.above(drive), progress)
+            results.append(_result(method, record, drive, steps, started))
+            started = process_time()
+    return tuple(results)
+
+
+def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None) -> T:
+    """The turning point, or points, that belong to the control.
 
     Raises
     ------
@@ -302,29 +328,39 @@ def _turning_point(
     return wanted[1]
 
 
-def _steps(
-    method: Method, record: Record, turning_point: float, load_steps: int
-) -> Iterator[tuple[Branch, int, ContactState]]:
-    """Go through the load steps of a loop; gives branch, place on the axis and state of each."""
-    problem = method.problem
-
-    def prescribed(index: int) -> float:
-        return problem.prescribed(turning_point * index / load_steps)
-
-    state = method.detached(problem.profile.h_max)
+def _load(
+    method: Method, record: Record, drives: Sequence[float], progress: Progress | None
+) -> Iterator[tuple[float, ContactState]]:
+    """Load from first touch through the load steps ``drives``; gives the state at each."""
+    state = method.detached(method.problem.profile.h_max)
     record.visit("loading", False, state)
-    for i in range(load_steps + 1):
-        state = record.extend("loading", method.follow(state, prescribed(i)))
-        yield "loading", i, state
+    for drive in drives:
+        state = record.extend("loading", method.follow(state, method.problem.prescribed(drive)))
+        if progress is not None:
+            progress("loading", drive, state)
+        yield drive, state
+
+
+def _unload(
+    method: Method,
+    record: Record,
+    state: ContactState,
+    axis: Axis,
+    index: int,
+    progress: Progress | None,
+) -> None:
+    """Go back by load steps, the next one below ``index``, until contact is lost."""
     # The turning point belongs to both branches: it starts the unloading curve.
     record.visit("unloading", True, state)
-    i = load_steps
+    i = index
     while state.patches:
         i -= 1
-        if load_steps - i > _MAX_UNLOADING_STROKES * load_steps:
-            raise PathError(f"still in contact at {turning_point * i / load_steps:g}")
-        state = record.extend("unloading", method.follow(state, prescribed(i)))
-        yield "unloading", i, state
+        drive = axis(i)
+        if index - i > _MAX_UNLOADING_STROKES * axis.load_steps:
+            raise PathError(f"still in contact at {drive:g}")
+        state = record.extend("unloading", method.follow(state, method.problem.prescribed(drive)))
+        if progress is not None:
+            progress("unloading", drive, state)
 
 
 def _result(
@@ -333,16 +369,11 @@ def _result(
     """The loop of a record; ``started`` is the CPU time at which it was begun, in s."""
     problem = method.problem
     separation = record.column("separation")
-    mean_stress = record.column("mean_stress")
-    control, h_max = problem.control, problem.profile.h_max
-    loss = -integral(
-        control.prescribed(separation, mean_stress),
-        control.conjugate(separation, mean_stress, h_max),
-        record.column("stiffness"),
-    )
+    loss = record.work(problem)
+    turn = record.branches.index("unloading")  # the turning point's state stands in both branches
+    gained = -record.slice(0, turn).work(problem)
     max_penetration = turning_point
-    if not control.is_fixed:
-        turn = record.branches.index("unloading")
+    if not problem.control.is_fixed:
         max_penetration = problem.penetration(separation[turn])
     drops = float(sum(jump.energy_drop for jump in record.jumps))
     return LoopResult(
@@ -354,7 +385,7 @@ def _result(
         load_step=np.array(record.on_axis),
         penetration=1.0 - separation / problem.profile.h_max,
         separation=separation,
-        mean_stress=mean_stress,
+        mean_stress=record.column("mean_stress"),
         contact_fraction=record.column("contact_fraction"),
         patches=record.column("patches").astype(np.int64),
         elastic_energy=record.column("elastic_energy"),
@@ -364,6 +395,8 @@ def _result(
         loss_dimensionless=loss / problem.loss_scale,
         loss_from_drops=drops,
         loss_error=_loss_error(loss, drops, record),
+        work_gained=gained,
+        work_spent=loss + gained,
         seconds=process_time() - started,
         method=method.report(),
     )

@@ -64,6 +64,14 @@ class Problem:
         """E* q0 h_max² / 2 in J/m²: a loss per nominal area is W~ times this, W~ = ∮ σ~ dΔ~."""
         return self.stress_scale * self.profile.h_max
 
+    @property
+    def full_contact_energy(self) -> float:
+        """Elastic energy of full contact, (E*/4) Σ |q||h_q|² in J/m² of nominal area.
+
+        Where γ exceeds it by far, contact runs to full contact by itself.
+        """
+        return 0.25 * self.half_space.modulus * self.profile.moment(1)
+
     def separation(self, penetration: float) -> float:
         """Separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""
         return self.profile.h_max * (1.0 - penetration)

@@ -31,9 +31,9 @@ def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
         for i, kind in enumerate(kinds)
     )
     return LoopResult(
-        problem, top, n, branch, on_axis, penetration, problem.separation(0) * (1 - penetration),
-        value, value, value.astype(int), value, value, catalogue, 2.0, 3.0, 1.5, 0.02, 0.1,
-        MethodReport("grid", None),
+        problem, top, top, n, branch, on_axis, penetration,
+        problem.separation(0) * (1 - penetration), value, value, value.astype(int), value, value,
+        catalogue, 2.0, 3.0, 1.5, 0.02, 1.0, 3.0, 0.1, MethodReport("grid", None),
     )  # fmt: skip
 
 

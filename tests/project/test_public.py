@@ -19,18 +19,23 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 
 PUBLIC = [
     "ContactState",
+    "Control",
     "Fields",
     "HalfSpace",
     "Jump",
     "LoopResult",
     "Method",
+    "MinorLoop",
     "Opening",
     "Path",
+    "PathResult",
     "Problem",
     "Profile",
     "make_method",
     "profile_from_heights",
     "run_loop",
+    "run_loops",
+    "run_path",
     "self_affine_profile",
     "single_wave",
 ]
@@ -145,9 +150,9 @@ def test_arguments_and_fields_are_told_with_shapes_and_units(name: str) -> None:
     for argument, annotation in arguments(THINGS[name]).items():
         kind = annotation.split(" | None")[0]
         words = told[argument]
-        if "Array" in kind and "tuple" not in kind:
+        if ("Array" in kind and "tuple" not in kind) or "Sequence" in kind:
             assert "shape" in words or "shape" in lead, f"{argument}: which shape?"
-        if kind in ("float", "Array") or "complex" in kind:
+        if kind in ("float", "Array") or "complex" in kind or "Sequence[float]" in kind:
             assert UNIT.search(words) or NO_UNIT.search(words), f"{argument}: which unit?"
         else:
             assert WITHOUT_SIZE.search(kind) or "NDArray" in kind, f"{argument}: {kind}"

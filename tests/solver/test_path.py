@@ -1,0 +1,130 @@
+"""Paths of several legs: shared loading branches, minor loops, memory, and their audits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import (
+    Control,
+    HalfSpace,
+    Problem,
+    make_method,
+    run_loop,
+    run_loops,
+    run_path,
+    self_affine_profile,
+)
+from solver.method import PathError
+from solver.record import Axis
+from solver.references.exact_wave import ExactWave
+from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
+
+ROUGH = self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)
+HALF_SPACE = HalfSpace(1e6, 0.0)
+
+
+def problem_of(work_of_adhesion: float = 0.01, control: Control | None = None) -> Problem:
+    return Problem(ROUGH, HALF_SPACE, work_of_adhesion, control or Control())
+
+
+def test_load_steps_of_a_leg_are_multiples_and_marks():
+    axis = Axis(0.9, 3)
+    assert axis.between(0.0, 0.9) == pytest.approx([0.0, 0.3, 0.6, 0.9])
+    assert axis.between(0.9, 0.2) == pytest.approx([0.9, 0.6, 0.3, 0.2])
+    assert axis.between(0.2, 0.8, [0.5, 0.95]) == pytest.approx([0.2, 0.3, 0.5, 0.6, 0.8])
+    assert axis.between(0.0, 0.6 + 1e-12)[-1] == 0.6 + 1e-12  # gives way to the end
+    assert len(axis.between(0.0, 0.6 + 1e-12)) == 3
+
+
+def test_loops_of_one_loading_branch_are_the_separate_loops():
+    turns = [0.3, 0.55, 0.8]
+    method = make_method("sharp", problem_of())
+    together = run_loops(method, max_penetration=turns, load_steps=8)
+    for turn, loop in zip(turns, together, strict=True):
+        alone = run_loop(make_method("sharp", problem_of()), max_penetration=turn, load_steps=8)
+        assert loop.max_penetration == turn
+        # other load steps, so jumps are found elsewhere within their resolution
+        assert loop.loss == pytest.approx(alone.loss, rel=1e-4)
+        assert [j.kind for j in loop.jumps] == [j.kind for j in alone.jumps]
+        assert abs(loop.audit_residual) < 1e-4
+    # the last one has the load steps of a loop of its own
+    on_axis = together[-1].penetration[together[-1].states("loading", load_steps_only=True)]
+    assert set(np.round(np.arange(9) * 0.1, 12)) <= set(np.round(on_axis, 12))
+
+
+def test_a_path_of_one_turning_point_is_a_loop():
+    path = run_path(make_method("sharp", problem_of()), [0.8], load_steps=8)
+    loop = run_loop(make_method("sharp", problem_of()), max_penetration=0.8, load_steps=8)
+    assert path.work == pytest.approx(loop.loss, rel=1e-12)
+    assert path.loss_from_drops == loop.loss_from_drops
+    assert path.energy_change == 0
+    assert path.ends_out
+    assert path.minor_loops == ()
+
+
+@pytest.mark.parametrize("stiffness", [np.inf, 2e8])
+def test_minor_loops_are_found_and_audited(stiffness):
+    """0.8 → 0.3 → 0.6 → out closes 0.3-0.6-0.3; a whole turn is work = energy change + drops."""
+    method = make_method("sharp", problem_of(control=Control(stiffness)))
+    path = run_path(method, [0.8, 0.3, 0.6], load_steps=8)
+    (minor,) = path.minor_loops
+    assert (minor.start, minor.turn, minor.branch) == (0.3, 0.6, "loading")
+    assert abs(path.audit_residual) < 1e-4
+    assert abs(minor.audit_residual) < 1e-4 * path.work
+    assert minor.loss >= -1e-6 * path.work
+    assert list(np.unique(path.leg)) == [0, 1, 2, 3]
+
+
+def test_nested_minor_loops_close_from_the_inside():
+    method = make_method("sharp", problem_of())
+    path = run_path(method, [0.8, 0.2, 0.7, 0.4, 0.6], load_steps=8)
+    assert [(m.start, m.turn) for m in path.minor_loops] == [(0.4, 0.6), (0.2, 0.7)]
+    assert abs(path.audit_residual) < 1e-4
+
+
+def test_the_single_wave_closes_every_minor_loop_without_loss():
+    """Between touch and fold its states lie on one branch."""
+    wave = wave_of(0.2)
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave.work_of_adhesion)
+    path = run_path(ExactWave(problem), [0.5, 0.1, 0.4], load_steps=5)
+    (minor,) = path.minor_loops
+    assert minor.closes
+    assert abs(minor.loss) < 1e-6 * path.work
+    assert path.work == pytest.approx(wave.loop.loss, rel=1e-4)
+
+
+def test_a_path_may_end_in_contact():
+    path = run_path(make_method("sharp", problem_of()), [0.8, 0.3], load_steps=8, out=False)
+    assert not path.ends_out
+    assert path.penetration[-1] == pytest.approx(0.3)
+    assert path.energy_change < 0
+    assert abs(path.audit_residual) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("points", "rule"),
+    [
+        ([], "at least one"),
+        ([-0.1], "start with loading"),
+        ([0.5, 0.6], "after loading it must unload"),
+        ([0.5, 0.3, 0.2], "after unloading it must load"),
+        ([0.5, 0.5], "after loading it must unload"),
+        ([0.5, np.nan, 0.6], "not a finite number"),
+        ([1.2], "max_penetration is 1.2"),
+        ([0.5, 0.3], "leave that turning point away"),
+    ],
+)
+def test_impossible_paths_are_refused(points, rule):
+    with pytest.raises(ValueError, match=rule):
+        run_path(make_method("sharp", problem_of()), points, load_steps=5)
+
+
+def test_contact_that_is_lost_on_the_way_ends_the_path():
+    with pytest.raises(PathError, match="contact is lost on the way to -50"):
+        run_path(make_method("sharp", problem_of()), [0.5, -50.0, 0.6], load_steps=3)
+
+
+def test_turning_points_must_differ():
+    with pytest.raises(ValueError, match="all different"):
+        run_loops(make_method("sharp", problem_of()), max_penetration=[0.5, 0.5], load_steps=5)
