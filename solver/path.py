@@ -147,6 +147,11 @@ class PathResult:
     method: MethodReport
 
     @property
+    def energy(self) -> Array:
+        """U in J/m, per period, shape (states,)."""
+        return self.elastic_energy + self.adhesion_energy
+
+    @property
     def ends_out(self) -> bool:
         """Whether the path ends out of contact."""
         return bool(self.patches[-1] == 0)

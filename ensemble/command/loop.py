@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,14 @@ from typing import Any
 import numpy as np
 
 from ensemble.errors import InputError
+from ensemble.loop.cycle import Cycle, add_cycle_arguments, cycle_of
 from ensemble.loop.record import (
     FieldStates,
     check_writable,
-    loop_document,
     loop_summary,
+    loops_document,
+    path_document,
+    path_summary,
     write_json,
     write_npz,
 )
@@ -33,9 +36,10 @@ from ensemble.trace.options import (
     what_was_read,
 )
 from ensemble.warm import warm_up
-from solver.loop import Progress, check_cycle, run_loop
+from solver.loop import LoopResult, Progress, run_loop, run_loops
 from solver.material import HalfSpace
-from solver.method import Branch, ContactState, Method
+from solver.method import Branch, ContactState, Method, PathError
+from solver.path import PathResult, run_path
 from solver.problem import Problem
 from solver.profile import Array, Profile, profile_from_heights, self_affine_profile
 from solver.registry import METHOD_NAMES, make_method
@@ -45,6 +49,7 @@ from solver.warm import compiled_in
 _PERIOD, _N0, _RATIO, _H_RMS = 2e-3 * np.pi, 10, 100, 1e-6
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
 _SECONDS_BETWEEN_LINES = 5.0
+FIGURE_FORMATS = (".png", ".pdf", ".svg")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,10 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     contact.add_argument("--young", type=float, default=1e6, metavar="E", help="Pa (default 1e6)")
     contact.add_argument("--poisson", type=float, default=0.5, metavar="NU", help="(default 0.5)")
-    contact.add_argument(
-        "--max-penetration", type=float, default=0.9, metavar="D", help="Δ/h_max (default 0.9)"
-    )
-    contact.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+    add_cycle_arguments(contact)
     method = parser.add_argument_group("method")
     method.add_argument(
         "--method", default="auto", metavar="NAME", help=f"{', '.join(METHOD_NAMES)} (default auto)"
@@ -88,6 +90,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
     output = parser.add_argument_group("output")
     output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")
+    output.add_argument(
+        "--figure", type=Path, metavar="FILE", help="stress and contact: .png, .pdf or .svg"
+    )
     output.add_argument("--fields", type=Path, metavar="FILE.npz", help="stress, shape and gap")
     output.add_argument(
         "--field-penetrations",
@@ -101,41 +106,80 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(args: argparse.Namespace) -> int:
-    """Run the loop and write what was asked for."""
+    """Run the loop, loops or path, and write what was asked for."""
     with _bad_input():
         profile = _profile(args)
         half_space = HalfSpace(args.young, args.poisson)
-        problem = Problem(profile, half_space, args.work_of_adhesion)
-        check_cycle(args.max_penetration, args.load_steps)
-    for path in (args.json, args.fields):
-        if path is not None:
-            check_writable(path)
-    penetrations = _field_penetrations(args)
+        cycle = cycle_of(args, half_space)
+        problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control)
+        cycle.check(problem)
+    if args.figure is not None and args.figure.suffix.lower() not in FIGURE_FORMATS:
+        raise InputError(
+            f"--figure is {args.figure}: the name must end in {', '.join(FIGURE_FORMATS)}"
+        )
+    files = [path for path in (args.json, args.fields, args.figure) if path is not None]
+    for path in files:
+        check_writable(path)
+    penetrations = _field_penetrations(args, cycle)
     with _bad_input():
         method = make_method(
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
     if compiled_in(method.name) is None:
         warm_up([method.name], _quiet if args.quiet else _tell)
-    picked = FieldStates(method, penetrations)
     nodes = _field_nodes(args, method) if penetrations else 0
-    result = run_loop(
-        method,
-        max_penetration=args.max_penetration,
-        load_steps=args.load_steps,
-        progress=None if args.quiet else _progress(args.max_penetration / args.load_steps),
-        on_state=picked.visit if penetrations else None,
-    )
+    picked = FieldStates(method, penetrations)
+    try:
+        results = _run(args, method, cycle, picked.visit if penetrations else None)
+    except PathError as error:
+        print(f"adhesis loop: {error}", file=sys.stderr)
+        return 1
     fields = picked.collect(nodes) if penetrations else {}  # everything is there before a file is
+    if isinstance(results, PathResult):
+        document, summary = path_document(results), path_summary(results)
+    else:
+        document, summary = loops_document(results), "\n\n".join(map(loop_summary, results))
     if args.json is not None:
-        write_json(args.json, loop_document(result))
+        write_json(args.json, document)
     if fields:
         write_npz(args.fields, fields)
-    print(loop_summary(result))
-    for path in (args.json, args.fields):
-        if path is not None:
-            print(f"wrote       {path}")
+    if args.figure is not None:
+        from ensemble.loop.figure import draw_loops
+
+        draw_loops(results).savefig(args.figure, dpi=200)
+    print(summary)
+    for path in files:
+        print(f"wrote       {path}")
     return 0
+
+
+def _run(
+    args: argparse.Namespace,
+    method: Method,
+    cycle: Cycle,
+    on_state: Callable[[Branch, ContactState], None] | None,
+) -> tuple[LoopResult, ...] | PathResult:
+    progress = (
+        None if args.quiet else _progress(cycle.top / cycle.load_steps, cycle.control.is_load)
+    )
+    if cycle.is_path:
+        return run_path(
+            method,
+            cycle.turning_points,
+            load_steps=cycle.load_steps,
+            out=cycle.out,
+            progress=progress,
+            on_state=on_state,
+        )
+    name = "max_stress" if cycle.control.is_load else "max_penetration"
+    if len(cycle.turning_points) > 1:
+        turns: Any = {name: cycle.turning_points}
+        return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turns)
+    turn: Any = {name: cycle.turning_points[0]}
+    loop = run_loop(
+        method, load_steps=cycle.load_steps, progress=progress, on_state=on_state, **turn
+    )
+    return (loop,)
 
 
 # ---------------------------------------------------------------------- input
@@ -239,7 +283,7 @@ def _read_heights(path: Path) -> Array:
     return np.asarray(table, dtype=float).reshape(-1)
 
 
-def _field_penetrations(args: argparse.Namespace) -> list[float]:
+def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
     """Penetrations of the fields; empty if no fields are wanted."""
     if args.fields is None:
         for name in ("field_penetrations", "field_nodes"):
@@ -248,14 +292,18 @@ def _field_penetrations(args: argparse.Namespace) -> list[float]:
         return []
     if args.fields.suffix != ".npz":
         raise InputError(f"--fields is {args.fields}: the name must end in .npz")
+    if cycle.is_path or len(cycle.turning_points) > 1 or not cycle.control.is_fixed:
+        raise InputError(
+            "--fields belongs to one loop at fixed separation: give one --max-penetration, and "
+            "neither --path nor --stiffness"
+        )
     if args.field_penetrations is None:
-        return [part * args.max_penetration for part in _FIELD_PARTS]
+        return [part * cycle.top for part in _FIELD_PARTS]
     wanted = [float(value) for value in args.field_penetrations]
     for value in wanted:
-        if not (np.isfinite(value) and value <= args.max_penetration):
+        if not (np.isfinite(value) and value <= cycle.top):
             raise InputError(
-                f"--field-penetrations holds {value}: the loop goes no deeper than "
-                f"{args.max_penetration}"
+                f"--field-penetrations holds {value}: the loop goes no deeper than {cycle.top:g}"
             )
     return list(dict.fromkeys(wanted))
 
@@ -284,12 +332,13 @@ def _quiet(_: str) -> None:
     pass
 
 
-def _progress(step: float) -> Progress:
+def _progress(step: float, load: bool) -> Progress:
     """Progress lines on stderr: one that is rewritten on a terminal, else one every few seconds."""
     live = sys.stderr.isatty()
+    name = "p̄ in Pa" if load else "Δ/h_max"
     started = last = time.monotonic()
 
-    def show(branch: Branch, penetration: float, state: ContactState) -> None:
+    def show(branch: Branch, drive: float, state: ContactState) -> None:
         nonlocal last
         now = time.monotonic()
         done = branch == "unloading" and not state.patches
@@ -297,7 +346,7 @@ def _progress(step: float) -> Progress:
             return
         last = now
         line = (
-            f"{branch:<9} step {round(penetration / step):>4}  Δ/h_max {penetration:+.3f}  "
+            f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  "
             f"A/A0 {state.contact_fraction:.4f}  patches {state.patches:>4}  "
             f"{now - started:.0f} s"
         )

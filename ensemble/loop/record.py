@@ -18,8 +18,11 @@ from typing import IO, Any
 import numpy as np
 
 from ensemble.errors import InputError
+from solver.jumps import Jump
 from solver.loop import LoopResult
 from solver.method import BRANCHES, Branch, ContactState, Fields, Method
+from solver.path import PathResult
+from solver.problem import Problem
 
 _STATE_KEYS = ("branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy")
 _MORE_STATE_KEYS = ("separation", "elastic_energy", "adhesion_energy", "load_step")
@@ -31,20 +34,13 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
     The states are there twice: ``states`` is a list of objects, one per state, and each of its
     keys is also a list of its own at the top level, for readers that want columns.
     """
-    profile = result.problem.profile
     columns = {key: getattr(result, key).tolist() for key in _STATE_KEYS + _MORE_STATE_KEYS}
     rows = zip(*columns.values(), strict=True)
     details = asdict(result.method)
     return {
-        "h_max": profile.h_max,
-        "h_rms": profile.h_rms,
-        "m0": profile.m0,
-        "m2": profile.m2,
-        "m4": profile.m4,
-        "period": profile.period,
-        "young": result.problem.half_space.young,
-        "poisson": result.problem.half_space.poisson,
-        "work_of_adhesion": result.problem.work_of_adhesion,
+        **_scene(result.problem),
+        **_held(result),
+        "turning_point": result.turning_point,
         "max_penetration": result.max_penetration,
         "load_steps": result.load_steps,
         "loss": result.loss,
@@ -54,30 +50,132 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
         "loss_error": result.loss_error,
         "races": result.races,
         "energy_at_stake": result.energy_at_stake,
+        "work_gained": result.work_gained,
+        "work_spent": result.work_spent,
+        "largest_contact_fraction": result.largest_contact_fraction,
+        "effective_work_of_approach": result.effective_work_of_approach,
+        "effective_work_of_separation": result.effective_work_of_separation,
+        "full_contact_energy": result.problem.full_contact_energy,
         "pull_off_stress": result.pull_off_stress,
         "pull_off_penetration": result.pull_off_penetration,
         "seconds": result.seconds,
         "method": details.pop("name"),
         "method_details": {key: _plain(value) for key, value in details.items()},
-        "jumps": [
-            {
-                "branch": jump.branch,
-                "penetration": result.problem.penetration(jump.separation),
-                "energy_drop": jump.energy_drop,
-                "kind": jump.kind,
-                "patches_before": jump.patches_before,
-                "patches_after": jump.patches_after,
-                "contact_before": jump.contact_before,
-                "contact_after": jump.contact_after,
-                "patch_length": jump.patch_length,
-                "raced": jump.raced,
-                "at_stake": jump.at_stake,
-            }
-            for jump in result.jumps
-        ],
+        "jumps": _catalogue(result.problem, result.jumps),
         "states": [dict(zip(columns, row, strict=True)) for row in rows],
         **columns,
     }
+
+
+def loops_document(results: Sequence[LoopResult]) -> dict[str, Any]:
+    """Return the JSON document of loops with ascending turning points.
+
+    That of the last one, and where there are several all of them, in order, as ``turns``.
+    """
+    documents = [loop_document(result) for result in results]
+    return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})
+
+
+def path_document(result: PathResult) -> dict[str, Any]:
+    """Return the JSON document of a path; the keys are those of a loop where they mean the same."""
+    details = asdict(result.method)
+    columns = {
+        key: getattr(result, key).tolist() for key in (*_STATE_KEYS, *_MORE_STATE_KEYS, "leg")
+    }
+    return {
+        **_scene(result.problem),
+        **_held(result),
+        "turning_points": list(result.turning_points),
+        "out": result.ends_out,
+        "load_steps": result.load_steps,
+        "loss": result.work,
+        "loss_dimensionless": result.work / result.problem.loss_scale,
+        "loss_from_drops": result.loss_from_drops,
+        "energy_change": result.energy_change,
+        "audit_residual": result.audit_residual,
+        "loss_error": result.loss_error,
+        "minor_loops": [
+            asdict(part) | {"audit_residual": part.audit_residual} for part in result.minor_loops
+        ],
+        "seconds": result.seconds,
+        "method": details.pop("name"),
+        "method_details": {key: _plain(value) for key, value in details.items()},
+        "jumps": [
+            jump | {"leg": int(leg)}
+            for jump, leg in zip(
+                _catalogue(result.problem, result.jumps), result.jump_leg, strict=True
+            )
+        ],
+        **columns,
+    }
+
+
+def _scene(problem: Problem) -> dict[str, Any]:
+    """Profile and material."""
+    profile = problem.profile
+    return {
+        "h_max": profile.h_max,
+        "h_rms": profile.h_rms,
+        "m0": profile.m0,
+        "m2": profile.m2,
+        "m4": profile.m4,
+        "period": profile.period,
+        "young": problem.half_space.young,
+        "poisson": problem.half_space.poisson,
+        "work_of_adhesion": problem.work_of_adhesion,
+    }
+
+
+def _held(result: LoopResult | PathResult) -> dict[str, Any]:
+    """Stiffness in Pa/m (None: fixed separation) and, where there is one, the far side's path."""
+    control, profile = result.problem.control, result.problem.profile
+    if control.is_fixed:
+        return {"stiffness": None}
+    far = control.displacement(result.separation, result.mean_stress, profile.h_max)
+    return {"stiffness": control.stiffness, "displacement": (far / profile.h_max).tolist()}
+
+
+def _catalogue(problem: Problem, jumps: Sequence[Jump]) -> list[dict[str, Any]]:
+    return [
+        {
+            "branch": jump.branch,
+            "penetration": problem.penetration(jump.separation),
+            "energy_drop": jump.energy_drop,
+            "kind": jump.kind,
+            "patches_before": jump.patches_before,
+            "patches_after": jump.patches_after,
+            "contact_before": jump.contact_before,
+            "contact_after": jump.contact_after,
+            "patch_length": jump.patch_length,
+            "raced": jump.raced,
+            "at_stake": jump.at_stake,
+        }
+        for jump in jumps
+    ]
+
+
+def path_summary(result: PathResult) -> str:
+    """Return a path in a few lines for the terminal."""
+    way = ", ".join(f"{point:g}" for point in result.turning_points)
+    lines = [
+        f"path        {way}{', out' if result.ends_out else ''} in {result.load_steps} load steps "
+        "to the largest",
+        f"work        {result.work:.6g} J/m², of which {result.energy_change:.6g} J/m² are stored",
+        f"audit       {result.loss_from_drops:.6g} J/m² in {len(result.jumps)} jumps, "
+        f"residual {result.audit_residual:.2e}",
+    ]
+    for part in result.minor_loops:
+        end = (
+            "comes back to the same state"
+            if part.closes
+            else (f"ends {part.stress_change:+.3g} Pa and {part.contact_change:+.3g} A/A0 away")
+        )
+        lines.append(
+            f"minor loop  {part.start:g}, {part.turn:g}, {part.start:g}: {part.loss:.6g} J/m² "
+            f"(drops {part.loss_from_drops:.6g}), {end}"
+        )
+    lines.append(f"method      {result.method.name}, {result.seconds:.1f} s")
+    return "\n".join(lines)
 
 
 def loop_summary(result: LoopResult) -> str:
@@ -92,8 +190,8 @@ def loop_summary(result: LoopResult) -> str:
             f"h_rms {profile.h_rms:.4g} m, h_max {profile.h_max:.4g} m, m2 {profile.m2:.4g}",
             f"contact     E {half_space.young:.4g} Pa, nu {half_space.poisson:.3g}, "
             f"work of adhesion {problem.work_of_adhesion:.4g} J/m²",
-            f"cycle       to penetration {result.max_penetration:g} h_max in {result.load_steps} "
-            f"load steps, detached by {result.pull_off_penetration:.4g} h_max; "
+            f"cycle       {_turn(result)} in {result.load_steps} load steps, "
+            f"detached by {result.pull_off_penetration:.4g} h_max; "
             f"largest contact fraction {result.contact_fraction.max():.4g}, "
             f"most patches {result.patches.max()}",
             f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
@@ -103,6 +201,18 @@ def loop_summary(result: LoopResult) -> str:
             f"pull-off    mean tension {result.pull_off_stress:.6g} Pa",
             f"method      {result.method.name}, {result.seconds:.1f} s",
         )
+    )
+
+
+def _turn(result: LoopResult) -> str:
+    control = result.problem.control
+    if control.is_load:
+        return f"under a load to {result.turning_point:g} Pa"
+    if control.is_fixed:
+        return f"to penetration {result.max_penetration:g} h_max"
+    return (
+        f"held by {control.stiffness:.4g} Pa/m, far side to {result.turning_point:g} h_max "
+        f"(penetration {result.max_penetration:.4g} h_max)"
     )
 
 

@@ -32,6 +32,7 @@ HDF5 = {
 }
 COMPILED = {"solver.compiled"}
 FIGURES = {
+    "ensemble.loop.figure",
     "ensemble.bench.figure",
     "ensemble.report.figures.catalogue",
     "ensemble.report.figures.fields",

@@ -1,0 +1,139 @@
+"""The loading path of ``adhesis loop``: turning points, any path, and what holds the half-space."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass
+
+from ensemble.errors import InputError
+from solver.control import Control
+from solver.loop import check_cycle
+from solver.material import HalfSpace
+from solver.path import check_path
+from solver.problem import Problem
+
+_OUT = "out"
+_MAX_PENETRATION = 0.9
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What is to be followed.
+
+    Attributes
+    ----------
+    control : Control
+    turning_points : tuple of float
+        Of loops, one each; or of one path, in order, if ``is_path``. Δ/h_max, u_tot/h_max, or Pa
+        under a load.
+    is_path : bool
+    out : bool
+        Whether a path goes on until contact is lost.
+    load_steps : int
+    """
+
+    control: Control
+    turning_points: tuple[float, ...]
+    is_path: bool
+    out: bool
+    load_steps: int
+
+    @property
+    def top(self) -> float:
+        """Largest turning point."""
+        return max(self.turning_points)
+
+    def check(self, problem: Problem) -> None:
+        """Refuse a cycle that cannot be followed.
+
+        Raises
+        ------
+        ValueError
+            With the rule.
+        """
+        if self.is_path:
+            check_path(self.turning_points, self.load_steps, problem)
+        for turn in () if self.is_path else self.turning_points:
+            check_cycle(turn, self.load_steps, self.control)
+
+
+def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
+    """Declare the options of the loading path."""
+    group.add_argument(
+        "--max-penetration",
+        metavar="D[,D…]",
+        help="turning point in h_max, or several that share their loading branch (default 0.9); "
+        "with --stiffness of the far side, u_tot/h_max",
+    )
+    group.add_argument(
+        "--max-stress", metavar="P[,P…]", help="Pa: turning points under a load (--stiffness 0)"
+    )
+    group.add_argument(
+        "--path",
+        metavar="A,B,…,out",
+        help="instead: any path, loading first, ending with 'out' of contact or in contact",
+    )
+    group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+    group.add_argument(
+        "--stiffness",
+        type=float,
+        metavar="K",
+        help="Pa/m of nominal area of what holds the solid; 0 is load control "
+        "(default: fixed separation)",
+    )
+    group.add_argument(
+        "--layer", type=float, metavar="D", help="m: the stiffness of a layer of this thickness"
+    )
+
+
+def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
+    """Read the cycle from the options.
+
+    Raises
+    ------
+    InputError
+        If the options contradict one another or are no numbers.
+    ValueError
+        If there is no such control.
+    """
+    control = _control(args, half_space)
+    given = [n for n in ("max_penetration", "max_stress", "path") if getattr(args, n) is not None]
+    if len(given) > 1:
+        names = " and ".join("--" + name.replace("_", "-") for name in given)
+        raise InputError(f"{names} are given: a loop has one of them")
+    if args.path is not None:
+        words = [word.strip() for word in args.path.split(",")]
+        out = words[-1] == _OUT
+        points = _numbers("--path", words[:-1] if out else words)
+        return Cycle(control, points, True, out, args.load_steps)
+    if control.is_load != (args.max_stress is not None):
+        if control.is_load:
+            raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
+        raise InputError("--max-stress belongs to load control: give --stiffness 0 with it")
+    text = args.max_stress if control.is_load else args.max_penetration
+    name = "--max-stress" if control.is_load else "--max-penetration"
+    points = (_MAX_PENETRATION,) if text is None else _numbers(name, str(text).split(","))
+    if len(set(points)) < len(points):
+        raise InputError(f"{name} is {text}: turning points must differ")
+    return Cycle(control, tuple(sorted(points)), False, True, args.load_steps)
+
+
+def _control(args: argparse.Namespace, half_space: HalfSpace) -> Control:
+    if args.layer is not None:
+        if args.stiffness is not None:
+            raise InputError("--stiffness and --layer are given: one of them says the stiffness")
+        return Control(half_space.layer_stiffness(args.layer))
+    return Control(math.inf if args.stiffness is None else args.stiffness)
+
+
+def _numbers(option: str, words: list[str]) -> tuple[float, ...]:
+    try:
+        values = tuple(float(word) for word in words)
+    except ValueError:
+        raise InputError(
+            f"{option} is {','.join(words)!r}: it must be numbers with commas between them"
+        ) from None
+    if not values:
+        raise InputError(f"{option} holds no turning point")
+    return values
