@@ -1,11 +1,12 @@
 # make help lists what there is. tools/setup.sh does nothing when nothing has changed.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test run test test-kills lint bench docs clean lock
+.PHONY: help setup setup-test run test test-kills fuzz lint bench docs check-package clean lock
 SHELL := /bin/bash
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
 ARGS :=
 CAMPAIGN := jobs/example.toml
+FOR := 600
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
@@ -31,11 +32,17 @@ test-kills: setup  ## 20 kills each of a worker, of rank 0 and of the whole job 
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
 	    export MPIRUN ADHESIS_KILLS=20 && exec $(bin)/python -m pytest tests/ensemble/test_mpi.py -k random_moments
 
+fuzz: setup  ## new examples from a seed that is printed, for FOR=600 seconds
+	@$(bin)/python tools/fuzz.py --seconds $(FOR)
+
 bench: setup  ## speed against error of each method
 	$(bin)/adhesis bench
 
 docs: setup  ## the documentation site in docs/_build, its examples run
 	@tools/docs.sh
+
+check-package: setup  ## wheel and source distribution, used in a bare environment
+	@tools/check_package.sh
 
 lock: setup  ## requirements.lock from the versions in .venv
 	@{ sed '/^[^#]/d' requirements.lock; \

@@ -58,7 +58,15 @@ def last_lines(text: str, count: int = 2) -> str:
 
 
 def commit() -> str:
-    """Return the commit of the checkout that this code runs from; "unknown" if it is installed."""
+    """Return the commit that this code runs from or was built from; or "unknown"."""
+    known = _checked_out()
+    if known is None:
+        built = Path(__file__).with_name("commit.txt")  # setup.py writes it into what it builds
+        known = built.read_text().strip() if built.exists() else "unknown"
+    return known
+
+
+def _checked_out() -> str | None:
     git = Path(__file__).resolve().parent.parent / ".git"
     try:
         if git.is_file():  # a work tree: "gitdir: PATH"
@@ -77,7 +85,7 @@ def commit() -> str:
                 return line.split()[0]
     except (OSError, IndexError):
         pass
-    return "unknown"
+    return None
 
 
 def _package(name: str, missing: str = "not installed") -> str:

@@ -26,11 +26,11 @@ def report(scratch: Path, together: bool) -> None:
         found["size"] = comm.size
     else:
         # Alone, MPI is loaded but not initialised: that can hang where the network is odd.
-        import mpi4py
-
-        mpi4py.rc.initialize = False
         found["mpi_loads"] = True
         try:
+            import mpi4py
+
+            mpi4py.rc.initialize = False
             importlib.import_module("mpi4py.MPI")
         except (ImportError, RuntimeError) as error:
             found["mpi_loads"] = False

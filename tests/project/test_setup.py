@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).parent.parent.parent
 SCRIPTS = sorted([*ROOT.glob("jobs/*.sh"), *ROOT.glob("tools/*.sh"), ROOT / ".ci" / "run"])
 # Distribution names that differ from what is imported, and what other packages need to find.
-IMPORTED_AS = {"PyYAML": "yaml"}
+IMPORTED_AS = {"surfacetopography": "SurfaceTopography"}
 LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
 
 
@@ -67,14 +67,18 @@ def test_dependencies_are_what_is_imported() -> None:
                 elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                     imported.add(node.module.split(".")[0])
     imported -= set(sys.stdlib_module_names) | {"solver", "ensemble"}
-    declared = names(list(project()["dependencies"]))  # type: ignore[call-overload]
+    extras = project()["optional-dependencies"]
+    assert isinstance(extras, dict)
+    needed = list(project()["dependencies"]) + extras["mpi"] + extras["instruments"]  # type: ignore[call-overload]
+    declared = names(needed)
     assert imported | LOADED_BY_NAME == {IMPORTED_AS.get(name, name) for name in declared}
 
 
 def test_lock_holds_all_that_is_declared_and_nothing_of_this_machine() -> None:
     extras = project()["optional-dependencies"]
     assert isinstance(extras, dict)
-    declared = names(list(project()["dependencies"])) | names(extras["dev"])  # type: ignore[call-overload]
+    declared = names(list(project()["dependencies"]))  # type: ignore[call-overload]
+    declared |= names(extras["dev"]) | names(extras["mpi"])
     assert declared <= set(locked())
     # What building h5py without isolation needs in the environment.
     assert {"setuptools", "cython", "pkgconfig", "packaging", "numpy", "mpi4py"} <= set(locked())
