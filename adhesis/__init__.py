@@ -5,6 +5,9 @@ notice. Lengths in m, stresses in Pa (compression positive), energies per unit d
 per nominal area in J/m². Loads no MPI and no matplotlib.
 """
 
+from ensemble.trace.answer import loss_of_trace
+from ensemble.trace.prepare import prepare_trace
+from ensemble.trace.read import read_trace
 from solver.control import Control
 from solver.jumps import Jump
 from solver.loop import LoopResult, run_loop, run_loops
@@ -29,8 +32,11 @@ __all__ = [
     "PathResult",
     "Problem",
     "Profile",
+    "loss_of_trace",
     "make_method",
+    "prepare_trace",
     "profile_from_heights",
+    "read_trace",
     "run_loop",
     "run_loops",
     "run_path",

@@ -54,7 +54,7 @@ class Case:
         return LENGTH / POINTS
 
 
-def case(number: int, waves: int = 200) -> Case:
+def case(number: int, waves: int) -> Case:
     """Profile and measurement of a number: the same every time."""
     rng = np.random.default_rng([2, number])
     hurst = float(rng.uniform(0.6, 0.9))
@@ -137,6 +137,11 @@ def judged(measured: Case, folder: Path, processes: int | None = None) -> dict[s
         "cut_off": prepared.cut_off,
         "outliers": prepared.outliers,
         "seconds": answer.seconds,
+        "losses": {
+            run.name: found["loss"]
+            for run in answer.plan.runs
+            if (found := answer.result(run.name)) is not None
+        },
     }
     for name, value in known(measured.profile).items():
         stated = getattr(answer, name)
@@ -155,6 +160,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--waves", type=int, default=100, help="most waves a period")
     parser.add_argument("--processes", type=int)
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
@@ -162,7 +168,7 @@ def main() -> None:
     print("case file   H    degree cut-off   known      stated        off   within")
     with tempfile.TemporaryDirectory() as folder:
         for number in range(args.first, args.first + args.cases):
-            row = judged(case(number), Path(folder), args.processes)
+            row = judged(case(number, args.waves), Path(folder), args.processes)
             rows.append(row)
             loss = row["loss"]
             off = loss["stated"] / loss["known"] - 1
@@ -181,6 +187,16 @@ def main() -> None:
             f"{name}: {held} of {len(rows)} within the interval, ± {width:.0%} on average; "
             f"off by {np.mean(off):+.1%} on average, {np.sqrt(np.mean(np.square(off))):.1%} rms"
         )
+    print("loss of one way of closing the period, off the known one:")
+    for way in ("answer", "blend 10 %", "taper 5 %", "taper 10 %"):
+        off = [r["losses"][way] / r["loss"]["known"] - 1 for r in rows if way in r["losses"]]
+        print(f"{way:<11} {np.mean(off):+.1%} ± {np.std(off, ddof=1):.1%}")
+    off = [
+        r["losses"]["mirror"] / r["losses"]["cut-off × 2"] - 1
+        for r in rows
+        if {"mirror", "cut-off × 2"} <= r["losses"].keys()
+    ]
+    print(f"mirror      {np.mean(off):+.1%} ± {np.std(off, ddof=1):.1%} (off the answer)")
     if args.json is not None:
         args.json.parent.mkdir(parents=True, exist_ok=True)
         args.json.write_text(json.dumps(rows, indent=1))

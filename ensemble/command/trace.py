@@ -151,15 +151,15 @@ class _Progress:
             print(line, file=sys.stderr, flush=True)
 
     def _left(self, pool: Pool, now: float) -> float:
-        """Expected seconds, corrected by what the loops that are done have really taken."""
+        """Expected wall seconds, corrected by what the loops have taken so far."""
         expected = self.plan.seconds
-        ended = {name: found for name, found in pool.done.items() if isinstance(found, dict)}
+        running = {name: now - started for name, (started, _, _) in pool.running.items()}
+        ended = list(pool.took)[1:]  # without the first one, which may have made machine code
         told = sum(expected[name] for name in ended)
-        took = sum(found["seconds"] for found in ended.values())
-        ratio = min(max(took / told, 0.05), 20.0) if len(ended) > 1 else 1.0
-        waiting = sum(ratio * expected[job.name] for job in pool.waiting)
+        ratio = sum(pool.took[name] for name in ended) / told if told > 0 else 1.0
         rest = [
-            max(ratio * expected[name] - (now - started), 1.0)
-            for name, (started, _, _) in pool.running.items()
+            max(ratio * expected[name] - seconds, 0.25 * seconds)
+            for name, seconds in running.items()
         ]
+        waiting = sum(ratio * expected[job.name] for job in pool.waiting)
         return max([(waiting + sum(rest)) / pool.processes, *rest])

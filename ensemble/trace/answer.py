@@ -37,6 +37,9 @@ _DOUBTS = {
 }
 
 
+Several = float | Sequence[float]
+
+
 class NoAnswer(RuntimeError):
     """The loop of the answer itself could not be run to its end."""
 
@@ -123,8 +126,8 @@ def loss_of_trace(
     prepared: Prepared,
     *,
     half_space: HalfSpace,
-    work_of_adhesion: float | Sequence[float],
-    max_penetration: float | Sequence[float] = 0.9,
+    work_of_adhesion: Several,
+    max_penetration: Several = 0.9,
     load_steps: int = 40,
     method: str = "auto",
     accuracy: float = 1e-3,
@@ -143,6 +146,11 @@ def loss_of_trace(
         twice as much).
     max_penetration : float or several
         Turning points Δ/h_max in the same way (without others, one and two thirds).
+    load_steps : int
+        Of the loading branch of each loop.
+    method : {"auto", "sharp", "grid"}
+    accuracy : float
+        Wanted relative error of the loss of each loop.
     quick : bool
         Without the two tables.
     processes : int, optional
@@ -156,6 +164,10 @@ def loss_of_trace(
         If a value breaks the solver's rules.
     NoAnswer
         If the loop itself failed; a failed variant is a warning.
+
+    References
+    ----------
+    docs/measured-profile.md, "The answer and its doubts"
     """
     cycle = make_cycle(half_space, work_of_adhesion, max_penetration, load_steps, method, accuracy)
     check(prepared, cycle)
@@ -166,8 +178,8 @@ def loss_of_trace(
 
 def make_cycle(
     half_space: HalfSpace,
-    work_of_adhesion: float | Sequence[float],
-    max_penetration: float | Sequence[float],
+    work_of_adhesion: Several,
+    max_penetration: Several,
     load_steps: int,
     method: str,
     accuracy: float,
@@ -209,7 +221,7 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
     )
 
 
-def _several(value: float | Sequence[float]) -> Sequence[float]:
+def _several(value: Several) -> Sequence[float]:
     return value if isinstance(value, Sequence) else (float(value),)
 
 

@@ -30,6 +30,8 @@ class Pool:
         Result by job name; a text where the loop failed.
     running : dict
         By job name: when it started (monotonic seconds), and branch and penetration it has come to.
+    took : dict
+        Wall seconds by name of the jobs that are done.
     """
 
     def __init__(self, jobs: Sequence[Job], processes: int) -> None:
@@ -37,6 +39,7 @@ class Pool:
         self.processes = max(1, min(processes, len(self.waiting)))
         self.done: dict[str, Result | str] = {}
         self.running: dict[str, tuple[float, str, float]] = {}
+        self.took: dict[str, float] = {}
         self._inbox: queue.Queue[tuple[int, str, Any]] = queue.Queue()
         self._workers: list[subprocess.Popen[bytes]] = []
         self._job_of: dict[int, Job] = {}
@@ -110,7 +113,7 @@ class Pool:
         if kind == "progress":
             self.running[job.name] = (self.running[job.name][0], *content)
             return
-        del self.running[job.name]
+        self.took[job.name] = time.monotonic() - self.running.pop(job.name)[0]
         if kind == "gone":
             self.done[job.name] = f"its process ended with code {content}"
             del self._job_of[worker]

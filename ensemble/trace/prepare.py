@@ -138,6 +138,7 @@ def prepare_trace(
     longest_gap : float, optional
         Drop-outs up to this length (m) are interpolated, longer ones refused.
     keep_outliers : bool
+        Leave spikes in.
     invert : bool
         Turn the heights over: for an instrument whose z points into the sample.
 
@@ -145,6 +146,10 @@ def prepare_trace(
     ------
     InputError
         If a gap is too long, too much is missing, or a value breaks its rule.
+
+    References
+    ----------
+    docs/measured-profile.md, "What is done to it"
     """
     steps: list[Step] = []
     warnings: list[str] = []

@@ -97,7 +97,7 @@ def read_trace(
         the header must tell, or the numbers must be sure to be metres.
     step : float, optional
         Step in m, for heights without positions.
-    columns : two ints, optional
+    columns : sequence of two int, optional
         Which columns of a text are positions and heights, from 1.
     row, channel : int, optional
         Row of a map and channel of an instrument file, from 0.
@@ -108,6 +108,10 @@ def read_trace(
     ------
     InputError
         With one sentence, if the file cannot be read or cannot be understood beyond doubt.
+
+    References
+    ----------
+    docs/measured-profile.md, "What is read"
     """
     path = Path(path)
     if path.is_dir():

@@ -1,0 +1,240 @@
+"""From a file to an answer: its loss, its interval, its page; what fails is said."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import json
+import os
+import re
+import signal
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from adhesis import Problem, make_method, run_loop, self_affine_profile
+from ensemble.command.main import main
+from ensemble.trace import answer as answers
+from ensemble.trace.answer import COVERAGE, NoAnswer, loss_of_trace, make_cycle, run_plan
+from ensemble.trace.plan import Plan, make_plan
+from ensemble.trace.pool import Pool
+from ensemble.trace.prepare import Prepared, prepare_trace
+from ensemble.trace.read import Trace
+from tests.support.scenes import HALF_SPACE
+
+ROOT = Path(__file__).parents[2]
+N, LENGTH = 400, 1e-3
+PROFILE = self_affine_profile(0.8, period=LENGTH, n0=4, ratio=6, seed=2, h_rms=1e-6)
+X = LENGTH / N * np.arange(N)
+CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
+FIGURES = ["cut-off.png", "loop.png", "spectrum.png", "tables.png", "trace.png"]
+
+
+def prepared() -> Prepared:
+    heights = PROFILE.at(X) + 1e-3 * X + 5e-9 * np.random.default_rng(0).standard_normal(N)
+    return prepare_trace(Trace(Path("t.txt"), heights, LENGTH / N))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the command makes of a file with gaps, decimal commas and a bow."""
+    folder = tmp_path_factory.mktemp("trace")
+    z = PROFILE.at(X + 0.3e-3) + 2e-3 * X + 8e-6 * (2 * X / LENGTH - 1) ** 2
+    z = z + 5e-9 * np.random.default_rng(0).standard_normal(N)
+    rows = [f"{1e3 * a:.5f};{1e6 * b:.4f}" for a, b in zip(X, z, strict=True)]
+    rows[100] = rows[100].split(";")[0] + ";"
+    text = "Weg (mm);Höhe (µm)\n" + "\n".join(rows).replace(".", ",")
+    (folder / "t.csv").write_text(text, encoding="latin-1")
+    words = ["trace", str(folder / "t.csv"), *CONTACT, "--to", str(folder / "out"), "--quiet"]
+    assert main(words) == 0
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def document(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "trace.json").read_text())
+    return found
+
+
+def test_the_interval_holds_the_loss_that_is_known(document: dict[str, Any]) -> None:
+    loop = run_loop(
+        make_method("auto", Problem(PROFILE, HALF_SPACE, 0.04)), max_penetration=0.9, load_steps=40
+    )
+    known = {
+        "loss": loop.loss,
+        "pull_off_stress": loop.pull_off_stress,
+        "contact_fraction": loop.contact_fraction.max(),
+    }
+    for name, value in known.items():
+        stated = document[name]
+        assert abs(stated["value"] - value) <= stated["uncertainty"], name
+        assert stated["uncertainty"] < 0.6 * stated["value"], name
+
+
+def test_the_interval_is_made_of_the_doubts(document: dict[str, Any]) -> None:
+    doubts = document["loss"]["doubts"]
+    assert {"cut-off", "continuation", "form", "noise", "numerics"} == set(doubts)
+    spread = np.sqrt(sum(d**2 for d in doubts.values()))
+    relative = document["loss"]["uncertainty"] / document["loss"]["value"]
+    assert relative == pytest.approx(COVERAGE * spread)
+    changes = [r["loss_change"] for r in document["runs"] if r["group"] == "continuation"]
+    assert len(changes) == 3
+    assert doubts["continuation"] == pytest.approx(np.sqrt(np.mean(np.square(changes))))
+    losses = {r["name"]: r["loss"] for r in document["runs"]}
+    change = losses["taper 5 %"] / losses["answer"] - 1
+    assert change in [pytest.approx(c) for c in changes]
+
+
+def test_the_document_says_what_was_read_done_and_found(document: dict[str, Any]) -> None:
+    assert document["read"]["points"] == N
+    assert document["read"]["drop_outs"] == 1
+    assert document["read"]["step"] == pytest.approx(LENGTH / N, rel=1e-4)
+    assert [step["name"] for step in document["preparation"]] == ["drop-outs", "form", "cut-off"]
+    assert document["degree"] == 2
+    tables = {
+        r["name"]: r
+        for r in document["runs"]
+        if r["group"] in ("work of adhesion", "turning point")
+    }
+    assert set(tables) == {"γ 0.02", "γ 0.08", "Δ 0.3", "Δ 0.6"}
+    assert tables["γ 0.02"]["loss"] < document["loss"]["value"] < tables["γ 0.08"]["loss"]
+    assert tables["Δ 0.3"]["contact_fraction"] < document["contact_fraction"]["value"]
+    assert document["loop"]["states"]["penetration"][0] == 0
+    assert document["loop"]["loss"] == document["loss"]["value"]
+
+
+def test_the_page_holds_its_figures_and_needs_nothing_else(folder: Path) -> None:
+    made = [*FIGURES, "trace.html", "trace.json", "trace.md"]
+    assert sorted(p.name for p in folder.iterdir()) == sorted(made)
+    page = (folder / "trace.html").read_text()
+    assert page.count('src="data:image/png;base64,') == len(FIGURES)
+    assert re.findall(r'(?:src|href)="(?!data:)', page) == []
+    text = (folder / "trace.md").read_text()
+    for name in FIGURES:
+        assert f"]({name})" in text
+        assert imread(folder / name).shape[0] > 300
+    for words in ("decimal commas", "tilt and bow", "interval", "taper 10 %", "γ, J/m²"):
+        assert words in text, words
+        assert words in page, words
+
+
+def small_plan() -> tuple[Prepared, Any, Plan]:
+    trace = prepared()
+    cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3)
+    plan = make_plan(trace, cycle, quick=True, processes=2)
+    kept = {"answer", "blend 10 %", "noise 1"}
+    runs = tuple(run for run in plan.runs if run.name in kept)
+    jobs = tuple(job for job in plan.jobs if job.name in kept)
+    return trace, cycle, dataclasses.replace(plan, runs=runs, jobs=jobs)
+
+
+def spoiled(plan: Plan, name: str) -> Plan:
+    """The same plan, with a loop that cannot be run."""
+    jobs = tuple(
+        dataclasses.replace(job, method="nonsense") if job.name == name else job
+        for job in plan.jobs
+    )
+    return dataclasses.replace(plan, jobs=jobs)
+
+
+def test_a_variant_that_fails_is_a_warning_and_the_answer_stands() -> None:
+    trace, cycle, plan = small_plan()
+    found = run_plan(trace, cycle, spoiled(plan, "blend 10 %"))
+    assert any("“blend 10 %” did not end (ValueError" in warning for warning in found.warnings)
+    assert "continuation" not in found.loss.doubts
+    assert found.loss.value > 0
+    with pytest.raises(NoAnswer, match="could not be run to its end: ValueError"):
+        run_plan(trace, cycle, spoiled(plan, "answer"))
+
+
+def test_a_process_that_is_killed_is_said_and_replaced() -> None:
+    _, _, plan = small_plan()
+    pool = Pool(plan.jobs, processes=1)
+    killed: list[str] = []
+
+    def watch(pool: Pool) -> None:
+        if not killed and pool.running:
+            killed.extend(pool.running)
+            os.kill(pool._workers[-1].pid, signal.SIGKILL)
+
+    done = pool.run(watch, every=0.05)
+    assert set(done) == {job.name for job in plan.jobs}
+    failed = [name for name, found in done.items() if isinstance(found, str)]
+    assert failed == killed
+    assert "ended with code -9" in str(done[killed[0]])
+
+
+def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
+    """And are priced before any work, with a word on what would be cheaper."""
+    n = 100_000
+    rng = np.random.default_rng(1)
+    waves = rng.standard_normal(n // 2 + 1) * np.arange(n // 2 + 1).clip(30) ** -1.3
+    heights = np.fft.irfft(waves * np.exp(1j * rng.uniform(0, 7, n // 2 + 1)), n)
+    trace = Trace(Path("t.txt"), 1e-6 * heights / heights.std(), 0.2e-6)
+    found = prepare_trace(trace)
+    plan = make_plan(found, make_cycle(HALF_SPACE, 0.04, 0.9, 40, "auto", 1e-3), processes=2)
+    assert plan.waves == pytest.approx(0.95 * n / 5, rel=0.01)
+    sizes = {job.name: job.coefficients.size - 1 for job in plan.jobs}
+    assert sizes["taper 5 %"] < 8000 < sizes["answer"]
+    reference = {run.name: run.reference for run in plan.runs}
+    assert reference["taper 5 %"] == "cut-off × 4"
+    assert sizes["blend 10 %"] == pytest.approx(sizes["cut-off × 4"], rel=0.06)
+    assert any(hint.startswith("--cut-off") for hint in plan.hints)
+    assert any("--quick" in hint for hint in plan.hints)
+    assert plan.jobs[0].name == "cut-off × 16"
+
+
+def test_what_the_solver_refuses_is_refused_before_any_loop() -> None:
+    with pytest.raises(ValueError, match="max_penetration is 1"):
+        loss_of_trace(prepared(), half_space=HALF_SPACE, work_of_adhesion=0.04, max_penetration=1.0)
+    with pytest.raises(ValueError, match="work_of_adhesion is -1"):
+        loss_of_trace(prepared(), half_space=HALF_SPACE, work_of_adhesion=-1.0)
+
+
+@pytest.fixture(scope="module")
+def coverage() -> ModuleType:
+    path = ROOT / "benchmarks" / "trace_coverage.py"
+    spec = importlib.util.spec_from_file_location("trace_coverage", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["trace_coverage"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_known_losses_lie_within_their_intervals(
+    number: int, coverage: ModuleType, tmp_path: Path
+) -> None:
+    """Two cases of the benchmark with fewer waves; all of it: benchmarks/trace_coverage.py."""
+    row = coverage.judged(coverage.case(number, waves=40), tmp_path)
+    assert row["loss"]["covered"], row
+    assert answers.QUANTITIES.keys() <= row.keys()
+
+
+def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    heights = PROFILE.at(X) + 1e-3 * X
+    path = tmp_path / "t.txt"
+    np.savetxt(path, 1e6 * np.column_stack([X, heights]))
+    words = ["loop", "--trace", str(path), "--unit", "um", "--cut-off", "100um", "--quiet"]
+    cheap = ["--load-steps", "5", "--max-penetration", "0.3", "--json", str(tmp_path / "l.json")]
+    assert main([*words, *cheap]) == 0
+    assert "400 points" in capsys.readouterr().out
+    loop = json.loads((tmp_path / "l.json").read_text())
+    assert loop["period"] == pytest.approx(0.95 * LENGTH)
+    for more, told in (
+        (["--seed", "1"], "--seed belongs to --hurst"),
+        (["--period", "1"], "--period belongs to --hurst"),
+        (["--hurst", "0.8"], "several are given"),
+        (["--degree", "8"], "--degree is 8"),
+    ):
+        assert main([*words, *more]) == 2
+        assert told in capsys.readouterr().err
+    assert main(["loop", "--hurst", "0.8", "--cut-off", "1um"]) == 2
+    assert "--cut-off belongs to --trace" in capsys.readouterr().err
