@@ -117,7 +117,7 @@ def known(profile: Profile) -> dict[str, float]:
     return dict(zip(QUANTITIES, values, strict=True))
 
 
-def judged(measured: Case, folder: Path, processes: int | None = None) -> dict[str, Any]:
+def judged(measured: Case, folder: Path, processes: int = 0) -> dict[str, Any]:
     """Known and stated values of one case."""
     path, options = written(measured, folder)
     prepared = prepare_trace(read_trace(path, **options))
@@ -161,7 +161,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--waves", type=int, default=100, help="most waves a period")
-    parser.add_argument("--processes", type=int)
+    parser.add_argument("--processes", type=int, default=0)
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     rows = []

@@ -154,7 +154,7 @@ def loss_of_trace(
     quick : bool
         Without the two tables.
     processes : int, optional
-        Side by side; without it one for each core.
+        Side by side; without it one for each core, 0 for none beside this one.
     watch : callable, optional
         Called with the :class:`~ensemble.trace.pool.Pool` about once a second.
 

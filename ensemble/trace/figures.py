@@ -231,7 +231,9 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             axes: Axes = panels[line, column]
             x = [point[0] for point in points]
             y = np.array([by * point[1][key] for point in points])
-            axes.errorbar(x, y, yerr=quantity.relative * np.abs(y), fmt="o-", color=_BLUE)
+            bars = quantity.relative * np.abs(y)
+            above = np.minimum(bars, 1 - y) if key == "contact_fraction" else bars
+            axes.errorbar(x, y, yerr=[bars, above], fmt="o-", color=_BLUE)
             axes.set_ylim(0, 1.1 * (1 + quantity.relative) * float(y.max()))
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel("work of adhesion γ (J/m²)")

@@ -22,7 +22,7 @@ _SECONDS_TO_HINT = 120.0
 
 # CPU seconds of a loop by `sharp`, 40 load steps: measured from 320 waves and 6 patches (0.9 s) to
 # 20,000 waves and 8 patches (35 s); a guess within a factor of about three.
-_SECONDS, _WAVES_POWER, _MANY_PATCHES = 1.1e-3, 0.85, 20.0
+_SECONDS, _WAVES_POWER, _MANY_PATCHES = 0.7e-3, 0.85, 20.0
 _START = 2.0  # seconds for a process to start
 
 
@@ -110,7 +110,7 @@ def make_plan(
     quick : bool
         The loop and its doubts alone, without the tables against γ and turning point.
     processes : int, optional
-        Processes side by side; without it all cores at hand.
+        Processes side by side; without it all cores at hand, 0 for none beside this one.
     """
     processes = cores() if processes is None else processes
     runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]
@@ -128,7 +128,7 @@ def make_plan(
     first = min(runs, key=lambda run: seconds[run.name])
     order = sorted(runs, key=lambda run: (run is not first, -seconds[run.name]))
     wall = max(
-        seconds[first.name] + (sum(seconds.values()) - seconds[first.name]) / processes,
+        seconds[first.name] + (sum(seconds.values()) - seconds[first.name]) / max(processes, 1),
         max(seconds.values()),
     )
     plan = Plan(
@@ -276,7 +276,7 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
     ]
     if not quick:
         tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]
-        saved = sum(plan.seconds[name] for name in tables) / plan.processes
+        saved = sum(plan.seconds[name] for name in tables) / max(plan.processes, 1)
         hints.append(f"--quick leaves the tables out and saves about {clock(saved)}")
     return tuple(hints)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ensemble.run.launch import ONE_THREAD
-from ensemble.trace.worker import Job
+from ensemble.trace.worker import FAILURES, Job, failure, run
 
 Result = dict[str, Any]
 Watch = Callable[["Pool"], None]
@@ -23,6 +23,12 @@ Watch = Callable[["Pool"], None]
 
 class Pool:
     """Runs jobs, the first one alone, so that machine code is made once and not in every process.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    processes : int
+        Side by side; 0 runs them one after the other in this process.
 
     Attributes
     ----------
@@ -36,7 +42,7 @@ class Pool:
 
     def __init__(self, jobs: Sequence[Job], processes: int) -> None:
         self.waiting = list(jobs)
-        self.processes = max(1, min(processes, len(self.waiting)))
+        self.processes = min(processes, len(self.waiting))
         self.done: dict[str, Result | str] = {}
         self.running: dict[str, tuple[float, str, float]] = {}
         self.took: dict[str, float] = {}
@@ -46,6 +52,8 @@ class Pool:
 
     def run(self, watch: Watch | None = None, every: float = 1.0) -> dict[str, Result | str]:
         """Run all jobs; ``watch`` is called every so many seconds, and when a loop is done."""
+        if self.processes == 0:
+            return self._run_here(watch)
         try:
             self._start()
             last = time.monotonic()
@@ -63,6 +71,18 @@ class Pool:
                     watch(self)
         finally:
             self._stop()
+        return self.done
+
+    def _run_here(self, watch: Watch | None) -> dict[str, Result | str]:
+        while self.waiting:
+            job, started = self.waiting.pop(0), time.monotonic()
+            try:
+                self.done[job.name] = run(job)
+            except FAILURES as error:
+                self.done[job.name] = failure(error)
+            self.took[job.name] = time.monotonic() - started
+            if watch is not None:
+                watch(self)
         return self.done
 
     def _start(self) -> None:

@@ -19,6 +19,15 @@ from numpy.typing import NDArray
 _SECONDS_BETWEEN_REPORTS = 1.0
 
 
+# What a loop may end with; anything else is a fault of the program's and ends the process.
+FAILURES = (RuntimeError, ValueError, ArithmeticError, MemoryError)
+
+
+def failure(error: Exception) -> str:
+    """Return a failure in words."""
+    return f"{type(error).__name__}: {error}"
+
+
 @dataclass(frozen=True)
 class Job:
     """One loop: everything that the solver needs, in SI units."""
@@ -51,8 +60,8 @@ def main() -> None:
             return
         try:
             send("done", run(job, lambda branch, where: send("progress", (branch, where))))
-        except (RuntimeError, ValueError, ArithmeticError, MemoryError) as error:
-            send("failed", f"{type(error).__name__}: {error}")
+        except FAILURES as error:
+            send("failed", failure(error))
 
 
 def run(job: Job, report: Any = None) -> dict[str, Any]:
