@@ -98,7 +98,7 @@ def read_trace(
     step : float, optional
         Step in m, for heights without positions.
     columns : sequence of two int, optional
-        Which columns of a text are positions and heights, from 1.
+        Which columns of a text are positions and heights, from 1; shape (2,).
     row, channel : int, optional
         Row of a map and channel of an instrument file, from 0.
     delimiter, decimal : str, optional
