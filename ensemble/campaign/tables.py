@@ -23,7 +23,7 @@ from ensemble.campaign.rules import (
     positive_number,
     whole_number,
 )
-from ensemble.campaign.tasks import Task, task_seed
+from ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
 from solver.profile import Amplitudes, Array
 from solver.registry import METHOD_NAMES, MethodName
 
@@ -160,19 +160,20 @@ class Campaign:
         """Number of tasks."""
         return len(self.sweep.hurst) * len(self.sweep.work_of_adhesion) * self.sweep.realisations
 
-    def tasks(self) -> list[Task]:
-        """Return every task, by H, then γ, then realisation, each ascending.
+    def tasks(self, part: Part = WHOLE) -> list[Task]:
+        """Return every task, or those of a part, by H, then γ, then realisation, each ascending.
 
         The order does not depend on that of the file, so that a grown campaign has the rows of one
         that was this large from the start.
         """
         seeds = [task_seed(self.sweep.seed, r) for r in range(self.sweep.realisations)]
-        return [
+        tasks = [
             Task(hurst, gamma, realisation, seed)
             for hurst in sorted(self.sweep.hurst)
             for gamma in sorted(self.sweep.work_of_adhesion)
             for realisation, seed in enumerate(seeds)
         ]
+        return tasks[part.number - 1 :: part.of]
 
     @cached_property
     def loading_penetration(self) -> Array:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.errors import InputError
 
 
 def task_seed(campaign_seed: int, realisation: int) -> int:
@@ -49,3 +54,42 @@ class Task:
             f"H = {self.hurst:g}, γ = {self.work_of_adhesion:g} J/m², "
             f"realisation {self.realisation}"
         )
+
+
+@dataclass(frozen=True)
+class Part:
+    """A share of the tasks of a campaign, computed apart: every ``of``-th row.
+
+    Attributes
+    ----------
+    number : int
+        1 … of.
+    of : int
+        Number of parts.
+    """
+
+    number: int
+    of: int
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the part that "3/20" names.
+
+        Raises
+        ------
+        InputError
+        """
+        match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text.strip())
+        if match and 1 <= int(match[1]) <= int(match[2]):
+            return cls(int(match[1]), int(match[2]))
+        raise InputError(f"part is {text!r}: it must be K/N with 1 ≤ K ≤ N, as 3/20")
+
+    def rows(self, count: int) -> NDArray[np.int64]:
+        """Rows of the whole campaign, of ``count`` tasks, that belong to the part, ascending."""
+        return np.arange(self.number - 1, count, self.of)
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.of}"
+
+
+WHOLE = Part(1, 1)

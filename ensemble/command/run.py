@@ -43,6 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="start N ranks here (one more than cores is right: rank 0 only waits)",
     )
     parser.add_argument(
+        "--part",
+        metavar="K/N",
+        help="compute the K-th of N shares of the tasks into a file of its own (see adhesis merge)",
+    )
+    parser.add_argument(
         "--walltime",
         metavar="TIME",
         help="stop in time for this walltime, as 3600, 1h30m or 12:00:00 "
@@ -152,6 +157,7 @@ def _end_job(comm: Any, code: int) -> None:
 
 def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
     from ensemble.campaign.file import load_campaign
+    from ensemble.campaign.tasks import WHOLE, Part
     from ensemble.run.dispatch import Overdue
     from ensemble.run.interrupt import deadline, parse_duration
     from ensemble.run.progress import duration
@@ -162,8 +168,11 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
     path = Path(args.out or f"{Path(args.campaign).stem}.h5")
+    if args.part and not args.out:
+        raise InputError("--part needs --out: every part has a results file of its own")
     most = _number("--max-failures", args.max_failures, whole=True)
     options = Options(
+        part=Part.parse(args.part) if args.part else WHOLE,
         redo=_selection(args),
         max_failures=int(most) or None,
         deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),

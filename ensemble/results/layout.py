@@ -21,6 +21,7 @@ import h5py
 import numpy as np
 
 from ensemble.campaign.tables import Campaign
+from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
@@ -42,6 +43,7 @@ def create(
     path: Path | str,
     campaign: Campaign,
     *,
+    part: Part = WHOLE,
     versions: Mapping[str, str] | None = None,
     grown_from: Results | None = None,
 ) -> None:
@@ -52,6 +54,8 @@ def create(
     path : path
         Replaced if it exists.
     campaign : Campaign
+    part : Part, optional
+        Rows to lay out, if not all.
     versions : mapping of str, optional
         Root attributes with the versions of what computes (``mpi``, ``hdf5``, ``fftw``, …).
     grown_from : Results, optional
@@ -63,30 +67,32 @@ def create(
         If the file cannot be written or the disk is too small.
     """
     path = Path(path)
-    part = path.with_name(f"{path.name}.part")
-    needed = file_size(campaign)
+    unfinished = path.with_name(f"{path.name}.part")
+    needed = file_size(campaign, part)
     try:
         free = shutil.disk_usage(path.parent).free
         if needed > free:
             raise InputError(
                 f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
             )
-        with h5py.File(part, "w", locking=False, track_order=False) as file:
-            _lay_out(file, campaign)
+        with h5py.File(unfinished, "w", locking=False, track_order=False) as file:
+            _lay_out(file, campaign, part)
             _describe(file, campaign, versions or {}, grown_from)
+            if part != WHOLE:
+                file.attrs["part"] = str(part)
             if grown_from is not None:
                 _copy_rows(grown_from, file, campaign)
-        with part.open("rb") as handle:
+        with unfinished.open("rb") as handle:
             os.fsync(handle.fileno())
-        part.replace(path)
+        unfinished.replace(path)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {reason(error)}") from error
     finally:
-        part.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
 
 
-def _lay_out(file: h5py.File, campaign: Campaign) -> None:
-    laid_out = scales(campaign)
+def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
+    laid_out = scales(campaign, part)
     sizes = sizes_of(laid_out)
     for scale in laid_out:
         dataset = file.create_dataset(scale.name, data=scale.values)
@@ -101,7 +107,7 @@ def _lay_out(file: h5py.File, campaign: Campaign) -> None:
             dataset.attrs[name] = value
         for axis, dim in enumerate(column.dims):
             dataset.dims[axis].attach_scale(file[dim])
-    tasks = campaign.tasks()
+    tasks = campaign.tasks(part)
     for column in TASK_DATASETS:
         file[column.name][...] = [getattr(task, column.name) for task in tasks]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.campaign.file import parse_campaign
-from ensemble.campaign.tasks import Task
+from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
 from ensemble.results.schema import DATASETS, TASK_DATASETS, check_version, scales, shape_of
 from ensemble.task.dataset import sizes_of
@@ -29,6 +29,8 @@ class Results:
     ----------
     path : Path
     campaign : Campaign
+    part : Part
+        Which rows of the campaign it holds; part 1 of 1 is the whole.
     attributes : dict
         The root attributes (docs/results-file.md).
 
@@ -49,13 +51,14 @@ class Results:
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
+                self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
                 self._check_shapes()
         except BaseException:
             self._file.close()
             raise
 
     def _check_shapes(self) -> None:
-        wanted = scales(self.campaign)
+        wanted = scales(self.campaign, self.part)
         for scale in wanted:
             if self._file[scale.name].shape != scale.values.shape:
                 raise ValueError(scale.name)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.campaign.tables import Campaign
+from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
 from ensemble.task.dataset import COUNT, FLOAT, KEPT, Dataset, Scale, flags, row_shape, sizes_of
 from ensemble.task.row import RESULT_DATASETS, row_scales
@@ -44,19 +45,18 @@ RUN_DATASETS: tuple[Dataset, ...] = (
 DATASETS: tuple[Dataset, ...] = TASK_DATASETS + RUN_DATASETS + RESULT_DATASETS
 
 
-def kept_rows(campaign: Campaign) -> NDArray[np.int64]:
-    """Return the rows of the tasks that keep their fields: the first realisations."""
-    realisations = campaign.sweep.realisations
-    rows = np.arange(campaign.task_count)
-    return rows[rows % realisations < campaign.output.field_realisations]
+def kept_rows(campaign: Campaign, part: Part = WHOLE) -> NDArray[np.intp]:
+    """Return the rows of the tasks that keep their fields, in the file of a part."""
+    realisation = part.rows(campaign.task_count) % campaign.sweep.realisations
+    return np.flatnonzero(realisation < campaign.output.field_realisations)
 
 
-def scales(campaign: Campaign) -> tuple[Scale, ...]:
-    """Return the dimensions of a campaign's results file."""
+def scales(campaign: Campaign, part: Part = WHOLE) -> tuple[Scale, ...]:
+    """Return the dimensions of the results file of a campaign, or of a part of it."""
     return (
-        Scale("task", np.arange(campaign.task_count), "1", "row of the task"),
+        Scale("task", part.rows(campaign.task_count), "1", "row of the task in the whole campaign"),
         *row_scales(campaign),
-        Scale(KEPT, kept_rows(campaign), "1", "row of a task that keeps its fields"),
+        Scale(KEPT, kept_rows(campaign, part), "1", "row of a task that keeps its fields"),
     )
 
 
@@ -65,9 +65,9 @@ def shape_of(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:
     return (sizes[dataset.dims[0]], *row_shape(dataset, sizes))
 
 
-def file_size(campaign: Campaign) -> int:
+def file_size(campaign: Campaign, part: Part = WHOLE) -> int:
     """Bytes of a campaign's results file, without headers."""
-    sizes = sizes_of(scales(campaign))
+    sizes = sizes_of(scales(campaign, part))
     return sum(
         int(np.prod(shape_of(dataset, sizes), dtype=object)) * np.dtype(dataset.dtype).itemsize
         for dataset in DATASETS

@@ -13,7 +13,7 @@ import numpy as np
 
 from ensemble.campaign.compare import compare
 from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
+from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
 from ensemble.results.layout import create
 from ensemble.results.read import Results
@@ -104,6 +104,7 @@ def prepare(
     lock: RunLock,
     size: int,
     *,
+    part: Part = WHOLE,
     redo: Selection | None = None,
     patience: float = 0.0,
     say: Callable[[str], None] = lambda text: None,
@@ -120,6 +121,8 @@ def prepare(
         Taken here, after all that can be checked without it.
     size : int
         Ranks of the run.
+    part : Part, optional
+        The share of the tasks to compute, if not all.
     redo : Selection, optional
         Rows to compute again.
     patience : float
@@ -133,7 +136,12 @@ def prepare(
     ------
     InputError
     """
-    tasks = campaign.tasks()
+    tasks = campaign.tasks(part)
+    if not tasks:
+        raise InputError(
+            f"part is {part}: the campaign has {campaign.task_count} tasks and so at most as many "
+            "parts"
+        )
     if redo is not None:
         redo.check(tasks)
     for task in {t.hurst: t for t in reversed(tasks)}.values():
@@ -141,7 +149,7 @@ def prepare(
     _check_path(path)
     lock.acquire(size, patience)
     if not path.exists():
-        create(path, campaign, versions=versions())
+        create(path, campaign, part=part, versions=versions())
         say(f"{path}: {len(tasks)} tasks to do")
         return Plan(tasks, list(range(len(tasks))), 0, 0)
     with Results(path) as old:
@@ -150,6 +158,14 @@ def prepare(
             raise InputError(
                 f"{path} holds another campaign: {'; '.join(difference.other)} "
                 "(here: this campaign, there: the file)"
+            )
+        if old.part != part:
+            held = "the whole campaign" if old.part == WHOLE else f"part {old.part} of it"
+            raise InputError(f"{path} holds {held}, and part {part} is wanted")
+        if difference.grown and part != WHOLE:
+            raise InputError(
+                f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "
+                "parts are merged into does"
             )
         before = len(old)
         if difference.grown:

@@ -12,7 +12,7 @@ from typing import Any, Protocol, Self
 import h5py
 
 from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
+from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.results.write import Writer
 from ensemble.run.attempt import Compute, Outcome, StopCheck
 from ensemble.run.dispatch import Limits, Master, Worker, work_alone
@@ -95,6 +95,8 @@ class Options:
 
     Attributes
     ----------
+    part : Part
+        The share of the tasks to compute.
     redo : Selection, optional
         Rows to compute again.
     max_failures : int, optional
@@ -105,6 +107,7 @@ class Options:
         How long to wait for another run to let go of the results file, in s.
     """
 
+    part: Part = WHOLE
     redo: Selection | None = None
     max_failures: int | None = 20
     deadline: float | None = None
@@ -183,6 +186,7 @@ def run_campaign(
             comm,
             lambda: prepare(
                 *(campaign, path, lock, size),
+                part=options.part,
                 redo=options.redo,
                 patience=options.patience,
                 say=say,

@@ -42,6 +42,8 @@ NOT_RUN = {
     "PATH/jobs/pbs.sh": "needs a PBS",
     "qsub -l select=2:ncpus=32:mpiprocs=32 -l walltime=12:00:00 -v CAMPAIGN=my.toml,"
     "ADHESIS=$ADHESIS,SCRIPT=PATH/jobs/pbs.sh PATH/jobs/pbs.sh": "needs a PBS",
+    "adhesis run my.toml --part 3/20 --out part3.h5": "tests/ensemble/test_merge.py",
+    "adhesis merge part*.h5 --out all.h5": "as before; a shell knows the names",
     "export ADHESIS=PATH/.venv/bin/adhesis": "a place of the reader's",
     "python benchmarks/endurance.py empty": "a quiet machine; test_mpi.py runs it short",
     "python benchmarks/endurance.py campaign jobs/example.toml": "as before",

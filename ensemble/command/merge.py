@@ -1,0 +1,44 @@
+"""Join the results files of parts, as ``adhesis run --part`` has made them, into one.
+
+All must be of one campaign; rows that two of them hold must have the same bits. FILE.h5 is a
+results file like any other: merge further parts into it, resume it, grow its campaign.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ensemble.errors import InputError, WriteError
+
+_WRITE_FAILED = 74
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("parts", metavar="PART.h5", nargs="+", help="results files of one campaign")
+    parser.add_argument("--out", metavar="FILE.h5", required=True, help="made, or merged into")
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Merge; returns 0."""
+    from ensemble.results.merge import merge
+    from ensemble.run.lock import RunLock
+
+    out = Path(args.out)
+    if not out.parent.is_dir():
+        raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
+    try:
+        with RunLock(out) as lock:
+            lock.acquire(1, 10.0)
+            merged = merge(args.parts, out)
+    except WriteError as error:
+        print(f"adhesis merge: {error}; the same command goes on", file=sys.stderr)
+        return _WRITE_FAILED
+    failed = f", {merged.failed} failed" if merged.failed else ""
+    print(
+        f"{out}: {merged.taken} rows taken over from {len(args.parts)} files; "
+        f"{merged.done} of {merged.total} tasks done{failed}"
+    )
+    return 0

@@ -1,0 +1,233 @@
+"""Joining results files of one campaign: parts that were computed apart become one file.
+
+What is joined is a results file like any other: it can be resumed, merged into again, and grown.
+Memory is bounded by a block of rows, whatever the number and size of the parts; a kill leaves a
+sound file, and the same merge again goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.campaign.compare import compare
+from ensemble.campaign.tables import Campaign
+from ensemble.errors import InputError, WriteError
+from ensemble.results.layout import create
+from ensemble.results.read import Results
+from ensemble.results.schema import (
+    DATASETS,
+    DONE,
+    FAILED,
+    PENDING,
+    TASK_DATASETS,
+    kept_rows,
+)
+from ensemble.results.write import reason
+from ensemble.task.dataset import KEPT, Dataset
+from ensemble.task.row import RESULT_DATASETS
+
+Rows = NDArray[np.intp]
+
+_BLOCK_ROWS = 4096
+_BLOCK_BYTES = 16 * 2**20
+# Time and place may differ between two computations of one task; nothing else may.
+_OF_THE_RUN = ("wall_time", "cpu_time")
+_COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
+_STATUS = next(d for d in DATASETS if d.name == "status")
+# Root attributes that say what a file is; the others say what computed it.
+_NOT_VERSIONS = frozenset(
+    ("file_type", "file_version", "Conventions", "title", "campaign", "seed", "created", "laid_out")
+) | {"part"}
+_COPIED = tuple(d for d in DATASETS if d not in TASK_DATASETS and d is not _STATUS)
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What a merge has left: rows by status, and how many it took over."""
+
+    total: int
+    done: int
+    failed: int
+    taken: int
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A file to take rows from, and where they go."""
+
+    results: Results
+    target: Rows  # row in the merged file of each row, ascending
+    kept: Rows  # place among the merged file's kept rows of each kept row
+    kept_rows: Rows
+    taken: NDArray[np.bool_]  # rows that this file gives
+
+    def row_of(self, target: int) -> int:
+        """Row of a task, by its row in the merged file."""
+        return int(np.searchsorted(self.target, target))
+
+    def gives(self, first: int, stop: int) -> bool:
+        """Whether it gives any of these rows."""
+        low, high = np.searchsorted(self.target, (first, stop))
+        return bool(np.any(self.taken[low:high]))
+
+    def places(self, dataset: Dataset) -> tuple[Rows, NDArray[np.bool_]]:
+        """Where the rows of a dataset go, and which of them are given."""
+        if dataset.dims[0] == KEPT:
+            return self.kept, self.taken[self.kept_rows]
+        return self.target, self.taken
+
+
+def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
+    """Take over the finished rows of several results files of one campaign.
+
+    Parameters
+    ----------
+    parts : sequence of path
+        Parts of the campaign, or whole files of it, finished or not.
+    out : path
+        Made if it does not exist; else a file of the same campaign, or of one that grew from it.
+        The caller holds its lock.
+
+    Raises
+    ------
+    InputError
+        Before anything is written, if a file is damaged or foreign, or if two hold a row with
+        different bits.
+    WriteError
+        If the disk does not take it; the same merge goes on.
+    """
+    out = Path(out)
+    with ExitStack() as stack:
+        opened = [stack.enter_context(Results(part)) for part in parts]
+        there = stack.enter_context(Results(out)) if out.exists() else None
+        for part in opened:
+            if there is not None and part.path.samefile(out):
+                raise InputError(f"{part.path} is to be merged into itself")
+        campaign = opened[0].campaign if there is None else there.campaign
+        for part in opened:
+            _check_campaign(part, campaign, opened[0].path if there is None else out)
+        status = np.zeros(campaign.task_count, np.uint8) if there is None else there.status()
+        if status.size != campaign.task_count:
+            raise InputError(f"{out} is part {there.part if there else ''} of its campaign itself")
+        sources = _assign(opened, campaign, status, there)
+        if there is None:
+            told = opened[0].attributes
+            create(
+                out, campaign, versions={k: v for k, v in told.items() if k not in _NOT_VERSIONS}
+            )
+        else:
+            there.close()
+        _copy(sources, out)
+    return Merged(
+        total=status.size,
+        done=int(np.sum(status == DONE)),
+        failed=int(np.sum(status == FAILED)),
+        taken=sum(int(source.taken.sum()) for source in sources),
+    )
+
+
+def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
+    """Refuse a file of another campaign, or one whose tasks are not those of its campaign."""
+    difference = compare(part.campaign, campaign)
+    if difference.other:
+        raise InputError(
+            f"{part.path} holds another campaign than {of}: {'; '.join(difference.other)} "
+            f"(here: {of}, there: {part.path})"
+        )
+    if part.tasks() != part.campaign.tasks(part.part) or part.status().max(initial=0) > FAILED:
+        raise InputError(f"{part.path} is damaged: its tasks are not those of its campaign")
+
+
+def _assign(
+    opened: Sequence[Results], campaign: Campaign, status: NDArray[np.uint8], there: Results | None
+) -> list[_Source]:
+    """Decide which file gives which row; ``status`` becomes that of the merged file."""
+    place = {task: row for row, task in enumerate(campaign.tasks())}
+    kept = kept_rows(campaign)
+    sources: list[_Source] = []
+    giver = np.full(status.size, -1)  # source of each row that is not there yet
+    for part in opened:
+        target = np.array([place[task] for task in part.tasks()], np.intp)
+        own = part.status()
+        rows = part.column(KEPT)
+        source = _Source(part, target, np.searchsorted(kept, target[rows]), rows, own == DONE)
+        for row in np.flatnonzero((own == DONE) & (status[target] == DONE)).tolist():
+            other = giver[target[row]]
+            if other >= 0:
+                _compare(source, row, sources[other].results, sources[other].row_of(target[row]))
+            elif there is not None:
+                _compare(source, row, there, int(target[row]))
+        # A row that failed elsewhere, in time or place, gives way to one that did not.
+        better = (own == DONE) & (status[target] != DONE)
+        better |= (own == FAILED) & (status[target] == PENDING)
+        for row in np.flatnonzero(better & (giver[target] >= 0)).tolist():
+            loser = sources[giver[target[row]]]
+            loser.taken[loser.row_of(target[row])] = False
+        source.taken[:] = better
+        giver[target[better]] = len(sources)
+        status[target[better]] = own[better]
+        sources.append(source)
+    return sources
+
+
+def _compare(source: _Source, row: int, other: Results, there: int) -> None:
+    """Refuse a row that two files hold with different bits."""
+    for dataset in _COMPARED:
+        if dataset.dims[0] == KEPT:
+            continue
+        one = source.results.column(dataset.name, slice(row, row + 1))
+        two = other.column(dataset.name, slice(there, there + 1))
+        if one.tobytes() != two.tobytes():
+            raise InputError(
+                f"{source.results.path} and {other.path} both hold {source.results.tasks()[row]}, "
+                f"and their {dataset.name} differs"
+            )
+
+
+def _copy(sources: Sequence[_Source], out: Path) -> None:
+    """Write the rows that were assigned, block by block, the status of a block last."""
+    try:
+        with h5py.File(out, "r+", locking=False) as file:
+            kept = file[KEPT][:]
+            for first in range(0, file["task"].size, _BLOCK_ROWS):
+                stop = first + _BLOCK_ROWS
+                if not any(source.gives(first, stop) for source in sources):
+                    continue
+                for dataset in _COPIED:
+                    if dataset.dims[0] == KEPT:
+                        low, high = np.searchsorted(kept, (first, stop))
+                        _copy_dataset(sources, file, dataset, int(low), int(high))
+                    else:
+                        _copy_dataset(sources, file, dataset, first, stop)
+                file.flush()
+                _copy_dataset(sources, file, _STATUS, first, stop)
+                file.flush()
+    except OSError as error:
+        raise WriteError(f"{out} could not be written: {reason(error)}") from error
+
+
+def _copy_dataset(
+    sources: Sequence[_Source], file: h5py.File, dataset: Dataset, first: int, stop: int
+) -> None:
+    """Take over rows ``first`` … ``stop`` - 1 of one dataset."""
+    there = file[dataset.name]
+    width = max(1, int(np.prod(there.shape[1:])) * there.dtype.itemsize)
+    step = max(1, _BLOCK_BYTES // width)
+    for start in range(first, min(stop, there.shape[0]), step):
+        end = min(start + step, stop, there.shape[0])
+        block = there[start:end]
+        for source in sources:
+            target, taken = source.places(dataset)
+            low, high = np.searchsorted(target, (start, end))
+            chosen = taken[low:high]
+            if np.any(chosen):
+                values = source.results.column(dataset.name, slice(int(low), int(high)))
+                block[target[low:high][chosen] - start] = values[chosen]
+        there[start:end] = block

@@ -1,0 +1,184 @@
+"""Parts of a campaign that were computed apart, joined into one results file."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from ensemble.campaign.file import parse_campaign
+from ensemble.campaign.tasks import Part
+from ensemble.errors import InputError
+from ensemble.results.layout import create
+from ensemble.results.merge import merge
+from ensemble.results.read import Results
+from ensemble.results.schema import DONE, FAILED, PENDING
+from ensemble.results.write import Writer
+from tests.support.campaign_support import (
+    adhesis,
+    campaign_text,
+    differences,
+    environment,
+    write_campaign,
+)
+from tests.support.fake_run import fake_result
+
+CAMPAIGN = campaign_text(realisations="6")
+
+
+def computed(path, part="1/1", text=CAMPAIGN, skip=(), fail=()):
+    """Write the results file of a part with made-up rows; some left out, some failed."""
+    campaign, share = parse_campaign(text), Part.parse(part)
+    create(path, campaign, part=share)
+    with Writer(path) as writer:
+        for row, task in enumerate(campaign.tasks(share)):
+            whole = int(share.rows(campaign.task_count)[row])
+            if whole in fail:
+                writer.write_failure(row, "ValueError: no", 1.0)
+            elif whole not in skip:
+                writer.write_result(row, fake_result(campaign, task))
+    return path
+
+
+def parts(folder, count, **others):
+    return [computed(folder / f"p{k}.h5", f"{k}/{count}", **others) for k in range(1, count + 1)]
+
+
+def test_parts_merged_equal_the_file_of_one_run(tmp_path):
+    """By the command, with more parts than realisations, computed in any order."""
+    path, whole = write_campaign(tmp_path, realisations="5"), tmp_path / "whole.h5"
+    assert adhesis("run", path, "--out", whole, fake="").returncode == 0
+    names = [tmp_path / f"part{k}.h5" for k in range(1, 8)]
+    for k, name in enumerate(names, start=1):
+        process = adhesis("run", path, "--part", f"{k}/7", "--out", name, fake="")
+        assert process.returncode == 0, process.stderr
+    process = adhesis("merge", *reversed(names), "--out", tmp_path / "all.h5")
+    assert process.returncode == 0, process.stderr
+    assert "20 rows taken over from 7 files; 20 of 20 tasks done" in process.stdout
+    assert differences(tmp_path / "all.h5", whole) == []
+    with h5py.File(tmp_path / "all.h5") as one, h5py.File(whole) as two:
+        new = {"created", "laid_out"}
+        assert {n: v for n, v in one.attrs.items() if n not in new and n != "file_version"} == {
+            n: v for n, v in two.attrs.items() if n not in new and n != "file_version"
+        }
+
+
+def test_a_merge_is_resumed_and_grown(tmp_path):
+    """Missing parts come later; then the campaign gains realisations, and parts of those."""
+    one, two, three = parts(tmp_path, 3)
+    out = tmp_path / "all.h5"
+    assert merge([one, three], out).done == 16
+    assert merge([two, one], out).taken == 8
+    assert differences(out, computed(tmp_path / "whole.h5")) == []
+    larger = campaign_text(realisations="8", hurst="[0.7, 0.75, 0.8]")
+    path = write_campaign(tmp_path, realisations="8", hurst="[0.7, 0.75, 0.8]")
+    process = adhesis("run", path, "--out", out, fake="")
+    assert "48 of 48 tasks done; 24 computed" in process.stderr
+    assert differences(out, computed(tmp_path / "larger.h5", text=larger)) == []
+    # Parts of the smaller campaign still fit into the larger file.
+    assert merge([two], out).taken == 0
+
+
+def test_what_failed_in_one_part_gives_way_to_what_was_done_in_another(tmp_path):
+    first = computed(tmp_path / "a.h5", fail=(3, 4), skip=(9,))
+    second = computed(tmp_path / "b.h5", fail=(4, 9), skip=(5,))
+    for order in ([first, second], [second, first]):
+        out = tmp_path / f"{order[0].stem}.all.h5"
+        merged = merge(order, out)
+        assert (merged.done, merged.failed) == (22, 2)
+        with Results(out) as results:
+            assert results.status()[[3, 4, 5, 9]].tolist() == [DONE, FAILED, DONE, FAILED]
+            task = results.tasks()[3]
+            loss = fake_result(results.campaign, task)["loss"]
+            assert results.column("loss")[3] == loss
+
+
+def refused(sources, out) -> str:
+    before = out.read_bytes() if out.exists() else None
+    with pytest.raises(InputError) as caught:
+        merge(sources, out)
+    assert (out.read_bytes() if out.exists() else None) == before
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tmp_path):
+    one, two = parts(tmp_path, 2)
+    out = tmp_path / "all.h5"
+    other = computed(tmp_path / "o.h5", "2/2", campaign_text(realisations="6", seed="6"))
+    assert "sweep.seed is 5 here and 6 there" in refused([one, other], out)
+    again = computed(tmp_path / "again.h5", "2/2")
+    assert merge([one, two, again], tmp_path / "same.h5").done == 24  # the same bits: no matter
+    with h5py.File(again, "r+") as file:
+        file["unloading_energy"][7, 2] *= 1 + 1e-15
+    sentence = refused([one, two, again], out)
+    assert "again.h5" in sentence
+    assert "and their unloading_energy differs" in sentence
+    merge([one, two], out)
+    assert "differs" in refused([again], out)
+    with h5py.File(two, "r+") as file:
+        file["seed"][3] += 1
+    assert "p2.h5 is damaged: its tasks are not those of its campaign" in refused([two], out)
+    two.write_bytes(two.read_bytes()[:5000])
+    assert "damaged or truncated" in refused([one, two], out)
+    assert "merged into itself" in refused([one, out], out)
+    assert "is part 1/2 of its campaign" in refused([again], one)
+
+
+def test_a_part_is_what_it_is(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "p.h5"
+    assert adhesis("run", path, "--part", "2/3", "--out", out, fake="").returncode == 0
+    with Results(out) as results:
+        assert results.part == Part(2, 3)
+        assert results.tasks() == results.campaign.tasks()[1::3]
+        assert results.column("task").tolist() == [1, 4, 7]
+    for words, sentence in (
+        (("--part", "1/3", "--out", out), "holds part 2/3 of it, and part 1/3 is wanted"),
+        (("--out", out), "holds part 2/3 of it, and part 1/1 is wanted"),
+        (("--part", "4/3", "--out", out), "part is '4/3': it must be K/N"),
+        (("--part", "9/9", "--out", tmp_path / "q.h5"), "the campaign has 8 tasks"),
+        (("--part", "1/3"), "--part needs --out"),
+    ):
+        process = adhesis("run", path, *words, fake="")
+        assert process.returncode == 2
+        assert sentence in process.stderr
+    more = write_campaign(tmp_path, realisations="3")
+    process = adhesis("run", more, "--part", "2/3", "--out", out, fake="")
+    assert "a part does not grow" in process.stderr
+
+
+MERGED = """
+import resource, sys
+from ensemble.results.merge import merge
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+merge(sys.argv[2:], sys.argv[1])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+
+
+def test_memory_of_a_merge_does_not_grow_with_the_files(tmp_path):
+    """Files of 90 MB are joined in a third of that; a block of rows is held at a time."""
+    text = campaign_text(realisations="3000", load_steps="100").replace("-3", "-1")
+    campaign = parse_campaign(text + "field_penetrations = []\nfield_realisations = 0\n")
+    names = [tmp_path / f"p{k}.h5" for k in (1, 2)]
+    for k, name in enumerate(names, start=1):
+        create(name, campaign, part=Part(k, 2))
+        with h5py.File(name, "r+") as file:
+            file["status"][:] = DONE
+            file["loss"][:] = np.arange(k - 1, campaign.task_count, 2)
+    out = tmp_path / "all.h5"
+    done = subprocess.run(
+        [sys.executable, "-c", MERGED, str(out), *map(str, names)],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert out.stat().st_size > 80e6
+    assert 1024 * int(done.stdout) < 60e6
+    with Results(out) as results:
+        np.testing.assert_array_equal(results.column("loss"), np.arange(campaign.task_count))
+        assert PENDING not in results.status()
