@@ -20,10 +20,13 @@ from typing import TYPE_CHECKING, Any
 from ensemble.errors import InputError, WriteError
 
 if TYPE_CHECKING:
+    from ensemble.campaign.tables import Campaign
+    from ensemble.campaign.tasks import Task
     from ensemble.run.session import Engine
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
 OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
+_PAUSE = 5.0  # s between two lines of a dry run
 _CODES = (DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, WRITE_FAILED, RESUME)
 
 
@@ -41,6 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--ranks",
         metavar="N",
         help="start N ranks here (one more than cores is right: rank 0 only waits)",
+    )
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="say what the campaign costs, by a minute of pilot loops at most; writes nothing",
     )
     parser.add_argument(
         "--part",
@@ -94,7 +102,7 @@ def execute(
     first = launched()[1] == 0
     comm = None
     try:
-        if args.ranks is not None and launch.STARTED not in os.environ:
+        if args.ranks is not None and not args.dry_run and launch.STARTED not in os.environ:
             code = _start_ranks(args, program)
             if code is not None:
                 return code
@@ -168,6 +176,9 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
     path = Path(args.out or f"{Path(args.campaign).stem}.h5")
+    if args.dry_run:
+        alone = comm is None or comm.rank == 0
+        return _tell_price(campaign, path, args, engine) if alone else DONE
     if args.part and not args.out:
         raise InputError("--part needs --out: every part has a results file of its own")
     most = _number("--max-failures", args.max_failures, whole=True)
@@ -211,6 +222,39 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     if summary.pending and not too_many:
         return RESUME
     return SOME_FAILED if summary.failed else DONE
+
+
+def _tell_price(
+    campaign: Campaign, path: Path, args: argparse.Namespace, engine: Engine | None
+) -> int:
+    from ensemble.campaign.tasks import WHOLE, Part
+    from ensemble.run.price import as_text, price
+    from ensemble.run.session import Engine
+    from ensemble.warm import warm_up  # brings the compiler in
+
+    engine = engine or Engine()
+    part = Part.parse(args.part) if args.part else WHOLE
+    tasks = campaign.tasks(part)
+    for task in {t.cell: t for t in reversed(tasks)}.values():
+        engine.check(campaign, task)
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    warm_up(engine.methods(campaign, tasks), say)
+    heard = time.monotonic()
+
+    def tried(task: Task, seconds: float) -> None:
+        nonlocal heard
+        if time.monotonic() > heard + _PAUSE:
+            heard = time.monotonic()
+            say(f"pilot loop: {task}: {seconds:.3g} s")
+
+    told = price(
+        *(campaign, path, part), compute=lambda c, t: engine.compute(c, t, None), on_pilot=tried
+    )
+    print(as_text(told))
+    return DONE
 
 
 def _selection(args: argparse.Namespace) -> Any:

@@ -1,0 +1,73 @@
+"""What a campaign costs, told before it starts."""
+
+from __future__ import annotations
+
+import pytest
+
+from ensemble.campaign.file import parse_campaign
+from ensemble.campaign.tasks import Part
+from ensemble.results.layout import create
+from ensemble.results.write import Writer
+from ensemble.run.price import as_text, price
+from tests.support.campaign_support import adhesis, campaign_text, write_campaign
+from tests.support.fake_run import fake_result
+
+
+def cost(task):
+    return 100 * task.work_of_adhesion * (1 + 0.1 * task.realisation)
+
+
+def compute(campaign, task):
+    return {"cpu_time": cost(task)}
+
+
+def test_pilots_tell_what_the_campaign_costs():
+    campaign = parse_campaign(campaign_text(realisations="10"))
+    true = sum(cost(task) for task in campaign.tasks())
+    told = price(campaign, compute=compute)
+    assert told.pilots == 40  # they take no time here
+    assert told.seconds == pytest.approx(true)
+    assert told.longest == pytest.approx(4.0 * 1.9)
+    assert told.makespan(2) == pytest.approx(true / 2)
+    assert told.makespan(1000) == told.longest
+    hurried = price(campaign, compute=compute, seconds=0.0)
+    assert hurried.pilots == 0
+
+
+def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
+    """Time is up after three cells; the prior says how the fourth compares."""
+    clock = iter(range(100))
+    monkeypatch.setattr("ensemble.run.price.time.monotonic", lambda: float(next(clock)))
+    campaign = parse_campaign(campaign_text(realisations="10"))
+    told = price(campaign, compute=compute, seconds=3.0)
+    assert told.pilots == 3
+    assert [bool(cell.measured) for cell in told.cells].count(False) == 1
+    assert "~ scaled from other cells" in as_text(told)
+    assert all(cell.seconds > 0 for cell in told.cells)
+
+
+def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
+    campaign, path = parse_campaign(campaign_text()), tmp_path / "r.h5"
+    create(path, campaign)
+    with Writer(path) as writer:
+        for row, task in enumerate(campaign.tasks()[:6]):
+            writer.write_result(row, fake_result(campaign, task) | {"cpu_time": 7.0})
+    told = price(campaign, path, compute=compute)
+    assert (told.done, told.pilots) == (6, 2)
+    assert told.seconds == pytest.approx(cost(campaign.tasks()[6]) + cost(campaign.tasks()[7]))
+
+
+def test_a_part_costs_its_share():
+    campaign = parse_campaign(campaign_text(realisations="10"))
+    shares = [price(campaign, None, Part(k, 4), compute=compute).seconds for k in range(1, 5)]
+    assert sum(shares) == pytest.approx(sum(cost(task) for task in campaign.tasks()))
+
+
+def test_a_dry_run_writes_nothing(tmp_path):
+    path = write_campaign(tmp_path)
+    process = adhesis("run", path, "--dry-run", "--ranks", "3", cwd=tmp_path, fake="")
+    assert process.returncode == 0, process.stderr
+    assert "8 tasks to do in 4 cells, 0 done; nothing was written" in process.stdout
+    assert "core hours" in process.stdout
+    assert "MB of memory a rank" in process.stdout
+    assert [p.name for p in tmp_path.iterdir()] == ["c.toml"]
