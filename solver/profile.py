@@ -257,6 +257,7 @@ def self_affine_profile(
     period: float,
     n0: int,
     ratio: int,
+    rolloff: float = 1.0,
     seed: int,
     h_rms: float | None = None,
     m2: float | None = None,
@@ -277,6 +278,9 @@ def self_affine_profile(
         λ in m.
     n0, ratio : int
         Lowest harmonic, and highest over lowest (q_max/q_min), both ≥ 1.
+    rolloff : float
+        Roll-off over lowest wave number, q_r/q_min, 1 ≤ rolloff ≤ ratio: below it the spectrum is
+        flat, as those of real surfaces are (Persson et al. 2005, J. Phys. Condens. Matter 17, R1).
     seed : int
         Non-negative.
     h_rms, m2, c0 : float
@@ -302,6 +306,8 @@ def self_affine_profile(
             raise ValueError(f"{name} is {value!r}: it must be a whole number of at least 1")
     if seed != int(seed) or seed < 0:
         raise ValueError(f"seed is {seed!r}: it must be a whole number of at least 0")
+    if not 1 <= rolloff <= ratio:
+        raise ValueError(f"rolloff is {rolloff!r}: it must lie between 1 and ratio ({ratio})")
     given = {k: v for k, v in {"h_rms": h_rms, "m2": m2, "c0": c0}.items() if v is not None}
     if len(given) != 1:
         raise ValueError(
@@ -319,7 +325,7 @@ def self_affine_profile(
     phase_stream, size_stream = np.random.SeedSequence(int(seed)).spawn(2)
     phase = np.random.default_rng(phase_stream).uniform(-np.pi, np.pi, top)  # wave numbers 1 … top
     m = np.arange(n0, top + 1)
-    size = (m / n0) ** -(hurst + 0.5)
+    size = (np.maximum(m / n0, rolloff) / rolloff) ** -(hurst + 0.5)
     if amplitudes == "rayleigh":
         size = size * np.sqrt(np.random.default_rng(size_stream).exponential(size=top))[n0 - 1 :]
     a = np.zeros(top + 1, dtype=np.complex128)

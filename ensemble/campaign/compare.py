@@ -11,6 +11,7 @@ from typing import Any
 
 from ensemble.campaign.rules import shown
 from ensemble.campaign.tables import TABLES, Campaign
+from ensemble.campaign.tasks import Task
 
 
 @dataclass(frozen=True)
@@ -33,11 +34,14 @@ def compare(old: Campaign, new: Campaign) -> Difference:
     """Say how ``new`` differs from ``old``; keys that cannot change a result are left out."""
     before, after = old.values(), new.values()
     grown, other = [], []
+    missing = {old.identity(t)[:2] + old.identity(t)[4:] for t in _firsts(old)} - {
+        new.identity(t)[:2] + new.identity(t)[4:] for t in _firsts(new)
+    }
     for key, was in before.items():
         value = after[key]
         if value == was or _is_free(key):
             continue
-        if _extends(key, was, value):
+        if _extends(key, was, value) and not missing:
             grown.append(key)
         else:
             other.append(f"{key} is {shown(value)} here and {shown(was)} there")
@@ -52,4 +56,20 @@ def _is_free(key: str) -> bool:
 def _extends(key: str, was: Any, now: Any) -> bool:
     if key == "sweep.realisations":
         return bool(now > was)
-    return key in ("sweep.hurst", "sweep.work_of_adhesion") and set(was) < set(now)
+    table, name = key.split(".")
+    entry = next(f for f in fields(TABLES[table]) if f.name == name)  # type: ignore[index]
+    if key not in ("sweep.hurst", "sweep.work_of_adhesion") and entry.metadata["axis"] is None:
+        return False
+    # All turning points of a profile belong together: they do not become more.
+    if key == "cycle.max_penetration":
+        return False
+    return _values(was) < _values(now)
+
+
+def _values(value: Any) -> set[Any]:
+    return set(value) if isinstance(value, list) else {value}
+
+
+def _firsts(campaign: Campaign) -> list[Task]:
+    """One task of every cell."""
+    return campaign.tasks()[:: campaign.sweep.realisations]

@@ -10,8 +10,8 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from ensemble.campaign.rules import shown
-from ensemble.campaign.tables import TABLES, Campaign, Table
+from ensemble.campaign.rules import list_of, shown
+from ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from ensemble.errors import InputError
 from solver.profile import MOST_WAVES
 
@@ -61,13 +61,18 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
         if name not in TABLES:
             known = ", ".join(f"[{t}]" for t in TABLES)
             raise InputError(f"{source}: {shown(name)} is unknown; the tables are {known}")
-    tables = {name: _read_table(source, name, document.get(name, {})) for name in TABLES}
-    campaign = Campaign(text=text, **tables)
+    lists: list[tuple[Table, str, tuple[float, ...]]] = []
+    tables = {name: _read_table(source, name, document.get(name, {}), lists) for name in TABLES}
+    _check_zip(source, tables["sweep"], lists)
+    campaign = Campaign(text=text, lists=tuple(lists), **tables)
     _check_together(source, campaign)
     return campaign
 
 
-def _read_table(source: str, name: Table, entries: object) -> Any:
+def _read_table(
+    source: str, name: Table, entries: object, lists: list[tuple[Table, str, tuple[float, ...]]]
+) -> Any:
+    """Check a table; of an axis it gets the smallest value, and ``lists`` gets all of them."""
     kind = TABLES[name]
     if not isinstance(entries, dict):
         raise InputError(f"{source}: {name} is {shown(entries)}: it must be a table, [{name}]")
@@ -78,10 +83,16 @@ def _read_table(source: str, name: Table, entries: object) -> Any:
             raise InputError(
                 f"{source}: [{name}] {_spelt(key)} is unknown; the keys of [{name}] are {names}"
             )
-    values = {
-        key: known[key].metadata["rule"](f"{source}: [{name}] {key}", value)
-        for key, value in entries.items()
-    }
+    values = {}
+    for key, value in entries.items():
+        metadata, where = known[key].metadata, f"{source}: [{name}] {key}"
+        if metadata["axis"] is not None and isinstance(value, list):
+            several = list_of(metadata["rule"])(where, value)
+            values[key] = min(several)
+            if len(several) > 1:
+                lists.append((name, key, several))
+        else:
+            values[key] = metadata["rule"](where, value)
     for key, entry in known.items():
         if key not in values and entry.default is MISSING:
             raise InputError(
@@ -95,6 +106,31 @@ def _spelt(key: str) -> str:
     return key if key.isidentifier() else shown(key)
 
 
+def _check_zip(
+    source: str, sweep: SweepTable, lists: list[tuple[Table, str, tuple[float, ...]]]
+) -> None:
+    """Check that the keys which are to vary together are axes of one length."""
+    length = {name: len(values) for _, name, values in lists}
+    length |= {"hurst": len(sweep.hurst), "work_of_adhesion": len(sweep.work_of_adhesion)}
+    for group in sweep.zip:
+        for name in group:
+            if name not in length:
+                raise InputError(
+                    f"{source}: [sweep] zip names {shown(name)}: it must name keys that are lists "
+                    f"of several values, here {', '.join(sorted(length))}"
+                )
+        if len({length[name] for name in group}) > 1:
+            told = ", ".join(f"{name} {length[name]}" for name in group)
+            raise InputError(
+                f"{source}: [sweep] zip joins lists of different lengths ({told}): they must have "
+                "as many values each"
+            )
+
+
+def _largest(campaign: Campaign, name: str, value: float) -> float:
+    return max((max(v) for _, key, v in campaign.lists if key == name), default=value)
+
+
 def _check_together(source: str, campaign: Campaign) -> None:
     """Check the rules that join several keys."""
     profile, cycle = campaign.profile, campaign.cycle
@@ -104,15 +140,26 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [profile] gives {' and '.join(given) or 'none of h_rms, m2 and c0'}: "
             "exactly one of h_rms, m2 and c0 must be given"
         )
-    if profile.n0 * profile.ratio > MOST_WAVES:
+    n0, ratio = (_largest(campaign, name, getattr(profile, name)) for name in ("n0", "ratio"))
+    if n0 * ratio > MOST_WAVES:
         raise InputError(
-            f"{source}: [profile] n0 · ratio is {profile.n0 * profile.ratio}: "
+            f"{source}: [profile] n0 · ratio is {n0 * ratio:g}: "
             f"it must be at most {MOST_WAVES} harmonics"
         )
     if campaign.task_count > _MOST_TASKS:
         raise InputError(
             f"{source}: [sweep] makes {campaign.task_count} tasks: "
             f"at most {_MOST_TASKS} are allowed"
+        )
+    if _largest(campaign, "rolloff", profile.rolloff) > profile.ratio:
+        raise InputError(
+            f"{source}: [profile] rolloff is {_largest(campaign, 'rolloff', profile.rolloff):g}: "
+            f"it must be at most ratio ({profile.ratio})"
+        )
+    if campaign.output.field_penetrations and campaign.has_axis("max_penetration"):
+        raise InputError(
+            f"{source}: [output] field_penetrations is given beside several max_penetration: it "
+            "must be left out there (a third, two thirds and all of each are kept) or be empty"
         )
     for value in campaign.output.field_penetrations or ():
         if not cycle.unloading_until <= value <= cycle.max_penetration:

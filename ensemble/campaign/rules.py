@@ -99,6 +99,11 @@ def number_between(low: float, high: float, *, upper_included: bool = False) -> 
     )
 
 
+def number_from(least: float) -> Rule:
+    """Least ≤ value, finite."""
+    return _number_rule(f"a finite number of at least {least:g}", lambda x: x >= least)
+
+
 def whole_number(least: int, most: int = 2**63 - 1) -> Rule:
     """Least ≤ value ≤ most, an integer."""
 
@@ -134,3 +139,23 @@ def list_of(rule: Rule, *, may_be_empty: bool = False) -> Rule:
         return values
 
     return Rule(f"a list of different values, each {rule.text}", read)
+
+
+def list_of_names() -> Rule:
+    """Lists of two or more names each; read as a tuple of sorted tuples."""
+
+    def read(value: object) -> tuple[tuple[str, ...], ...]:
+        if not isinstance(value, list):
+            raise ValueError
+        groups = []
+        for names in value:
+            if not isinstance(names, list) or len(names) < 2:
+                raise ValueError
+            if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+                raise ValueError
+            groups.append(tuple(sorted(names)))
+        if len({name for group in groups for name in group}) < sum(map(len, groups)):
+            raise ValueError
+        return tuple(sorted(groups))
+
+    return Rule('a list of groups of keys, as [["hurst", "m2"]], no key twice', read)

@@ -7,19 +7,22 @@ Every key has one rule. What a campaign means is here; how its file is read is i
 from __future__ import annotations
 
 import math
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
 
+from ensemble.campaign.axes import Axis, Value, aligned, points
 from ensemble.campaign.rules import (
     Rule,
     choice,
     list_of,
+    list_of_names,
     negative_number,
     not_negative_number,
     number_between,
+    number_from,
     positive_number,
     whole_number,
 )
@@ -28,24 +31,39 @@ from solver.profile import Amplitudes, Array
 from solver.registry import METHOD_NAMES, MethodName
 
 
-def _key(rule: Rule, meaning: str, default: Any = MISSING, *, free: bool = False) -> Any:
+def _key(
+    rule: Rule,
+    meaning: str,
+    default: Any = MISSING,
+    *,
+    free: bool = False,
+    axis: str | None = None,
+) -> Any:
     """Return a dataclass field for one key.
 
     ``free`` marks a key that cannot change a result: it may differ when a file is resumed.
+    ``axis`` is the unit (as UDUNITS reads it) of a number that may be a list, and then is an axis.
     """
-    return field(default=default, metadata={"rule": rule, "meaning": meaning, "free": free})
+    metadata = {"rule": rule, "meaning": meaning, "free": free, "axis": axis}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
 class ProfileTable:
     """``[profile]``: the rough profile, by the spectral method."""
 
-    period: float = _key(positive_number("m"), "period λ in m")
-    n0: int = _key(whole_number(1), "lowest harmonic: its wave number is n0 · 2π/λ")
-    ratio: int = _key(whole_number(1), "highest over lowest wave number, q_max/q_min")
-    h_rms: float | None = _key(positive_number("m"), "root mean square height in m", None)
-    m2: float | None = _key(positive_number("1"), "mean square slope", None)
-    c0: float | None = _key(positive_number("m²"), "C0 = |a_n0|² in m²", None)
+    period: float = _key(positive_number("m"), "period λ in m", axis="m")
+    n0: int = _key(whole_number(1), "lowest harmonic: its wave number is n0 · 2π/λ", axis="1")
+    ratio: int = _key(whole_number(1), "highest over lowest wave number, q_max/q_min", axis="1")
+    rolloff: float = _key(
+        number_from(1),
+        "roll-off over lowest wave number, q_r/q_min: the spectrum is flat below",
+        1.0,
+        axis="1",
+    )
+    h_rms: float | None = _key(positive_number("m"), "root mean square height in m", None, axis="m")
+    m2: float | None = _key(positive_number("1"), "mean square slope", None, axis="1")
+    c0: float | None = _key(positive_number("m²"), "C0 = |a_n0|² in m²", None, axis="m2")
     amplitudes: Amplitudes = _key(  # noqa: RUF009
         choice(*get_args(Amplitudes)),
         "amplitudes fixed by the power law, or scattered about it (a Gaussian process)",
@@ -63,13 +81,15 @@ class ProfileTable:
 class MaterialTable:
     """``[material]``: the elastic half-space."""
 
-    young: float = _key(positive_number("Pa"), "Young's modulus E in Pa")
-    poisson: float = _key(number_between(-1, 0.5, upper_included=True), "Poisson's ratio ν")
+    young: float = _key(positive_number("Pa"), "Young's modulus E in Pa", axis="Pa")
+    poisson: float = _key(
+        number_between(-1, 0.5, upper_included=True), "Poisson's ratio ν", axis="1"
+    )
 
 
 @dataclass(frozen=True)
 class SweepTable:
-    """``[sweep]``: one task for every H, γ and realisation."""
+    """``[sweep]``: one task for every H, γ (and what else is a list) and realisation."""
 
     hurst: tuple[float, ...] = _key(list_of(number_between(0, 1)), "Hurst exponents H")
     work_of_adhesion: tuple[float, ...] = _key(
@@ -77,6 +97,11 @@ class SweepTable:
     )
     realisations: int = _key(whole_number(1, 2**31 - 1), "profiles for every H and γ")
     seed: int = _key(whole_number(0), "seed of all profiles", 0)
+    zip: tuple[tuple[str, ...], ...] = _key(
+        list_of_names(),
+        "groups of keys whose lists vary together, instead of in all combinations",
+        (),
+    )
 
 
 @dataclass(frozen=True)
@@ -84,7 +109,9 @@ class CycleTable:
     """``[cycle]``: the loading path."""
 
     max_penetration: float = _key(
-        number_between(0, 1), "Δ~max, the penetration in units of h_max at which unloading starts"
+        number_between(0, 1),
+        "Δ~max, the penetration in units of h_max at which unloading starts",
+        axis="1",
     )
     load_steps: int = _key(whole_number(1, 100_000), "equal steps of the loading branch")
     unloading_until: float = _key(
@@ -130,6 +157,7 @@ class OutputTable:
 
 
 Table = Literal["profile", "material", "sweep", "cycle", "solver", "output"]
+_SWEEP_UNITS = {"hurst": "1", "work_of_adhesion": "J m-2"}
 TABLES: dict[Table, type] = {
     "profile": ProfileTable,
     "material": MaterialTable,
@@ -144,7 +172,14 @@ TABLES: dict[Table, type] = {
 class Campaign:
     """A checked campaign. Built by :mod:`ensemble.campaign.file`.
 
-    Equal if they mean the same; ``text`` is the TOML as it was written.
+    Equal if they mean the same; ``text`` is the TOML as it was written. Where a key of the profile,
+    material or cycle is a list, its table holds the smallest value, and :meth:`at` gives the
+    campaign with the values of a task.
+
+    Attributes
+    ----------
+    lists : tuple
+        The other axes than H and γ, as they were given: (table, name, values).
     """
 
     profile: ProfileTable
@@ -153,40 +188,122 @@ class Campaign:
     cycle: CycleTable
     solver: SolverTable
     output: OutputTable
+    lists: tuple[tuple[Table, str, tuple[Value, ...]], ...] = ()
     text: str = field(default="", compare=False, repr=False)
+    _at: dict[tuple[tuple[str, Value], ...], Campaign] = field(
+        default_factory=dict, init=False, compare=False, repr=False
+    )
+
+    @cached_property
+    def _groups(self) -> list[list[Axis]]:
+        given = {(table, name): values for table, name, values in self.lists}
+        given["sweep", "hurst"] = self.sweep.hurst
+        given["sweep", "work_of_adhesion"] = self.sweep.work_of_adhesion
+        axes = []
+        for table in ("sweep", "profile", "material", "cycle"):
+            for entry in fields(TABLES[table]):
+                if (table, entry.name) in given:
+                    values = given[table, entry.name]
+                    unit = _SWEEP_UNITS.get(entry.name) or entry.metadata["axis"]
+                    axes.append(Axis(table, entry.name, values, unit, entry.metadata["meaning"]))
+        return aligned(axes, self.sweep.zip)
+
+    @cached_property
+    def axes(self) -> tuple[Axis, ...]:
+        """H, γ, and every key of the profile, material and cycle that has several values."""
+        found = {axis.key: axis for group in self._groups for axis in group}
+        first = [found.pop("sweep.hurst"), found.pop("sweep.work_of_adhesion")]
+        order = [f"{table}.{entry.name}" for table in TABLES for entry in fields(TABLES[table])]
+        return (*first, *sorted(found.values(), key=lambda axis: order.index(axis.key)))
+
+    @cached_property
+    def cells(self) -> list[tuple[Value, ...]]:
+        """Values on the axes of every cell, in the order of the rows of a results file."""
+        return points(self.axes, self._groups)
+
+    @property
+    def finest_harmonic(self) -> int:
+        """Highest harmonic of all profiles."""
+        names = [axis.name for axis in self.axes]
+        here = {"n0": self.profile.n0, "ratio": self.profile.ratio}
+        waves = [here | dict(zip(names, cell, strict=True)) for cell in self.cells]
+        return max(int(w["n0"] * w["ratio"]) for w in waves)
+
+    def has_axis(self, name: str) -> bool:
+        """Whether a key ("max_penetration") has several values."""
+        return any(axis.name == name for axis in self.axes[2:])
 
     @property
     def task_count(self) -> int:
         """Number of tasks."""
-        return len(self.sweep.hurst) * len(self.sweep.work_of_adhesion) * self.sweep.realisations
+        return len(self.cells) * self.sweep.realisations
+
+    def at(self, task: Task) -> Campaign:
+        """Return the campaign with the values of a task in its tables, and without other axes."""
+        if not task.others:
+            return self
+        if task.others not in self._at:
+            tables: dict[str, Any] = {}
+            for axis, (name, value) in zip(self.axes[2:], task.others, strict=True):
+                table = tables.get(axis.table, getattr(self, axis.table))
+                tables[axis.table] = replace(table, **{name: value})
+            sweep = replace(self.sweep, zip=())
+            self._at[task.others] = replace(self, sweep=sweep, lists=(), **tables)
+        return self._at[task.others]
+
+    def identity(self, task: Task) -> tuple[Any, ...]:
+        """What tells a task from all others, also in a campaign that grew new axes."""
+        here = self.at(task)
+        rest = tuple(
+            getattr(getattr(here, table), entry.name)
+            for table in TABLES
+            for entry in fields(TABLES[table])
+            if entry.metadata["axis"] is not None
+        )
+        return (task.hurst, task.work_of_adhesion, task.realisation, task.seed, rest)
 
     def tasks(self, part: Part = WHOLE) -> list[Task]:
-        """Return every task, or those of a part, by H, then γ, then realisation, each ascending.
+        """Return every task, or those of a part: by H, γ, what else is an axis, and realisation.
 
         The order does not depend on that of the file, so that a grown campaign has the rows of one
         that was this large from the start.
         """
         seeds = [task_seed(self.sweep.seed, r) for r in range(self.sweep.realisations)]
+        names = [axis.name for axis in self.axes[2:]]
         tasks = [
-            Task(hurst, gamma, realisation, seed)
-            for hurst in sorted(self.sweep.hurst)
-            for gamma in sorted(self.sweep.work_of_adhesion)
+            Task(hurst, gamma, realisation, seed, tuple(zip(names, others, strict=True)))
+            for hurst, gamma, *others in self.cells
             for realisation, seed in enumerate(seeds)
         ]
         return tasks[part.number - 1 :: part.of]
 
     @cached_property
     def loading_penetration(self) -> Array:
-        """Δ/h_max of the loading curve, ascending, shape (load_steps + 1,)."""
+        """Δ/h_max of the loading curve, ascending, shape (load_steps + 1,).
+
+        With several ``max_penetration`` the curves' axes are in units of it.
+        """
         steps = self.cycle.load_steps
-        return self.cycle.max_penetration * np.arange(steps + 1) / steps
+        return self._top * np.arange(steps + 1) / steps
 
     @cached_property
     def unloading_penetration(self) -> Array:
-        """Δ/h_max of the stored unloading curve, descending from Δ~max with the same step."""
-        steps, top = self.cycle.load_steps, self.cycle.max_penetration
-        last = math.ceil(self.cycle.unloading_until / top * steps - 1e-9)
-        return top * np.arange(steps, last - 1, -1) / steps
+        """Δ/h_max of the stored unloading curve, descending from Δ~max with the same step.
+
+        With several ``max_penetration`` in units of it, and as long as the smallest one needs.
+        """
+        steps, smallest = self.cycle.load_steps, self.cycle.max_penetration
+        last = math.ceil(self.cycle.unloading_until / smallest * steps - 1e-9)
+        return self._top * np.arange(steps, last - 1, -1) / steps
+
+    @property
+    def _top(self) -> float:
+        return 1.0 if self.has_axis("max_penetration") else self.cycle.max_penetration
+
+    def penetration_unit(self, task: Task) -> float:
+        """What the penetration axes of the results file are to be multiplied by to be Δ/h_max."""
+        several = self.has_axis("max_penetration")
+        return self.at(task).cycle.max_penetration if several else 1.0
 
     def values(self) -> dict[str, Any]:
         """Every value by its key ("sweep.hurst"), defaults included, lists ascending."""
@@ -196,4 +313,4 @@ class Campaign:
             for entry in fields(table):
                 value = getattr(table, entry.name)
                 out[f"{name}.{entry.name}"] = sorted(value) if type(value) is tuple else value
-        return out
+        return out | {axis.key: list(axis.values) for axis in self.axes}

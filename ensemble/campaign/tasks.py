@@ -37,22 +37,26 @@ class Task:
         0 … realisations - 1.
     seed : int
         Of the profile's phases; ``adhesis loop --seed`` with it gives the same profile.
+    others : tuple of (str, number)
+        Names and values of further axes of the sweep.
     """
 
     hurst: float
     work_of_adhesion: float
     realisation: int
     seed: int
+    others: tuple[tuple[str, float], ...] = ()
 
     @property
     def cell(self) -> tuple[float, ...]:
         """Where the task stands on the axes of the sweep: all realisations of a cell share it."""
-        return (self.hurst, self.work_of_adhesion)
+        return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
 
     def __str__(self) -> str:
         return (
             f"H = {self.hurst:g}, γ = {self.work_of_adhesion:g} J/m², "
-            f"realisation {self.realisation}"
+            + "".join(f"{name} = {value:g}, " for name, value in self.others)
+            + f"realisation {self.realisation}"
         )
 
 

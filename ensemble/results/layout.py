@@ -29,6 +29,8 @@ from ensemble.results.schema import (
     FILE_TYPE,
     FILE_VERSION,
     TASK_DATASETS,
+    axis_datasets,
+    datasets,
     file_size,
     scales,
     shape_of,
@@ -99,7 +101,7 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
         dataset.make_scale(scale.name)
         dataset.attrs["units"] = scale.unit
         dataset.attrs["long_name"] = scale.meaning
-    for column in DATASETS:
+    for column in datasets(campaign):
         dataset = _allocate(file, column, shape_of(column, sizes))
         dataset.attrs["units"] = column.unit
         dataset.attrs["long_name"] = column.meaning
@@ -110,6 +112,8 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
     tasks = campaign.tasks(part)
     for column in TASK_DATASETS:
         file[column.name][...] = [getattr(task, column.name) for task in tasks]
+    for i, column in enumerate(axis_datasets(campaign)):
+        file[column.name][...] = [task.others[i][1] for task in tasks]
 
 
 def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.Dataset:
@@ -142,8 +146,8 @@ def _describe(
 
 
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
-    place = {task: row for row, task in enumerate(campaign.tasks())}
-    target = np.array([place[task] for task in old.tasks()])
+    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks())}
+    target = np.array([place[old.campaign.identity(task)] for task in old.tasks()])
     # A task that kept its fields does so in the grown campaign: realisations are only added.
     kept = np.searchsorted(file[KEPT][:], target[old.column(KEPT)])
     for column in DATASETS:

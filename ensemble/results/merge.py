@@ -149,12 +149,12 @@ def _assign(
     opened: Sequence[Results], campaign: Campaign, status: NDArray[np.uint8], there: Results | None
 ) -> list[_Source]:
     """Decide which file gives which row; ``status`` becomes that of the merged file."""
-    place = {task: row for row, task in enumerate(campaign.tasks())}
+    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks())}
     kept = kept_rows(campaign)
     sources: list[_Source] = []
     giver = np.full(status.size, -1)  # source of each row that is not there yet
     for part in opened:
-        target = np.array([place[task] for task in part.tasks()], np.intp)
+        target = np.array([place[part.campaign.identity(t)] for t in part.tasks()], np.intp)
         own = part.status()
         rows = part.column(KEPT)
         source = _Source(part, target, np.searchsorted(kept, target[rows]), rows, own == DONE)

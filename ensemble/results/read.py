@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
-from ensemble.results.schema import DATASETS, TASK_DATASETS, check_version, scales, shape_of
+from ensemble.results.schema import (
+    TASK_DATASETS,
+    axis_datasets,
+    check_version,
+    datasets,
+    scales,
+    shape_of,
+)
 from ensemble.task.dataset import sizes_of
 
 
@@ -63,7 +70,7 @@ class Results:
             if self._file[scale.name].shape != scale.values.shape:
                 raise ValueError(scale.name)
         sizes = sizes_of(wanted)
-        for known in DATASETS:
+        for known in datasets(self.campaign):
             found = self._file[known.name]
             if found.shape != shape_of(known, sizes) or found.dtype != np.dtype(known.dtype):
                 raise ValueError(known.name)
@@ -116,8 +123,13 @@ class Results:
 
     def tasks(self) -> list[Task]:
         """Return every task, row by row."""
-        columns = [self.column(c.name).tolist() for c in TASK_DATASETS]
-        return [Task(*values) for values in zip(*columns, strict=True)]
+        columns = [self.column(d.name).tolist() for d in TASK_DATASETS]
+        names = [axis.name for axis in self.campaign.axes[2:]]
+        axes = [self.column(d.name).tolist() for d in axis_datasets(self.campaign)]
+        return [
+            Task(hurst, gamma, realisation, seed, tuple(zip(names, others, strict=True)))
+            for hurst, gamma, realisation, seed, *others in zip(*columns, *axes, strict=True)
+        ]
 
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""

@@ -42,7 +42,30 @@ RUN_DATASETS: tuple[Dataset, ...] = (
     _task("error", f"S{ERROR_LENGTH}", "1", "why the task failed (UTF-8)"),
     _task("rank", COUNT, "1", "rank that computed the task"),
 )
+# The datasets of every campaign; one for each further axis comes to them.
 DATASETS: tuple[Dataset, ...] = TASK_DATASETS + RUN_DATASETS + RESULT_DATASETS
+_NAMES = frozenset(dataset.name for dataset in DATASETS)
+
+
+def axis_datasets(campaign: Campaign) -> tuple[Dataset, ...]:
+    """Return the datasets of the axes besides H and γ, by the names of their keys.
+
+    A key that a result is called after ("h_rms") has "wanted" before its name.
+    """
+    return tuple(
+        _task(
+            axis.name if axis.name not in _NAMES else f"wanted_{axis.name}",
+            COUNT if all(isinstance(value, int) for value in axis.values) else FLOAT,
+            axis.unit,
+            axis.meaning,
+        )
+        for axis in campaign.axes[2:]
+    )
+
+
+def datasets(campaign: Campaign) -> tuple[Dataset, ...]:
+    """Return all datasets of a campaign's results file, besides the scales."""
+    return (*TASK_DATASETS, *axis_datasets(campaign), *RUN_DATASETS, *RESULT_DATASETS)
 
 
 def kept_rows(campaign: Campaign, part: Part = WHOLE) -> NDArray[np.intp]:
@@ -60,6 +83,14 @@ def scales(campaign: Campaign, part: Part = WHOLE) -> tuple[Scale, ...]:
     )
 
 
+def same_rows(one: Campaign, two: Campaign) -> bool:
+    """Whether the rows of two campaigns have the same dimensions, value by value."""
+    return all(
+        a.name == b.name and np.array_equal(a.values, b.values)
+        for a, b in zip(row_scales(one), row_scales(two), strict=True)
+    )
+
+
 def shape_of(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:
     """Return the shape of a dataset, from the sizes of the dimensions."""
     return (sizes[dataset.dims[0]], *row_shape(dataset, sizes))
@@ -70,7 +101,7 @@ def file_size(campaign: Campaign, part: Part = WHOLE) -> int:
     sizes = sizes_of(scales(campaign, part))
     return sum(
         int(np.prod(shape_of(dataset, sizes), dtype=object)) * np.dtype(dataset.dtype).itemsize
-        for dataset in DATASETS
+        for dataset in datasets(campaign)
     )
 
 

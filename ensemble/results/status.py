@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, PENDING
+from ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
+_READ = ("wall_time", "loss", "loss_dimensionless", "audit_residual", "loss_error")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
 
@@ -29,7 +31,8 @@ def read_status(path: Path | str) -> dict[str, Any]:
     -------
     dict
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``; ``seconds`` per done task (``mean``,
-        ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each H and γ with
+        ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each cell (a
+        value of each of the ``axes``) with
         its counts, its mean time and its mean loss with standard error (J/m², and W~);
         ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
         checks say that it is wrong (:mod:`ensemble.task.doubt`), the worst first; ``last_row``,
@@ -42,8 +45,17 @@ def read_status(path: Path | str) -> dict[str, Any]:
     """
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy
+        axes = ["hurst", "work_of_adhesion"]
+        axes += [dataset.name for dataset in axis_datasets(results.campaign)]
         state = results.status()
-        names = (*_TASK, "wall_time", "loss", "loss_dimensionless", "audit_residual", "loss_error")
+        names = (
+            *dict.fromkeys((*_TASK, *axes)),
+            "wall_time",
+            "loss",
+            "loss_dimensionless",
+            "audit_residual",
+            "loss_error",
+        )
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
@@ -66,7 +78,8 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
-        "groups": _groups(state, column),
+        "axes": list(axes),
+        "groups": _groups(state, column, axes),
         "failures": failures,
     }
 
@@ -98,12 +111,14 @@ def _times(times: NDArray[np.float64]) -> dict[str, float]:
     }
 
 
-def _groups(state: NDArray[np.uint8], column: dict[str, NDArray[Any]]) -> list[dict[str, Any]]:
-    pairs, group_of = np.unique(
-        np.stack([column["hurst"], column["work_of_adhesion"]]), axis=1, return_inverse=True
+def _groups(
+    state: NDArray[np.uint8], column: dict[str, NDArray[Any]], axes: Sequence[str]
+) -> list[dict[str, Any]]:
+    points, group_of = np.unique(
+        np.stack([column[name] for name in axes]), axis=1, return_inverse=True
     )
     group_of = group_of.ravel()
-    size = pairs.shape[1]
+    size = points.shape[1]
     done = state == DONE
     count = {
         name: np.bincount(group_of[state == code], minlength=size)
@@ -125,8 +140,7 @@ def _groups(state: NDArray[np.uint8], column: dict[str, NDArray[Any]]) -> list[d
     loss, scaled = mean_and_error("loss"), mean_and_error("loss_dimensionless")
     return [
         {
-            "hurst": float(pairs[0, i]),
-            "work_of_adhesion": float(pairs[1, i]),
+            **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
             **{name: int(values[i]) for name, values in count.items()},
             "mean_seconds": seconds[i][0],
             "loss": loss[i][0],
@@ -151,8 +165,10 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         )
     groups = status["groups"]
     if len(groups) <= _MOST_GROUPS_SHOWN:
-        lines += ["", "    H  γ in J/m²     done  pending  failed    mean s  loss W~"]
-        lines += [_group_line(group) for group in groups]
+        further = status["axes"][2:]
+        names = "".join(f"{name}  " for name in further)
+        lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  loss W~"]
+        lines += [_group_line(group, further) for group in groups]
     if status["doubtful"]:
         lines += ["", *_doubt_lines(status["doubtful"])]
     if status["failures"]:
@@ -160,12 +176,14 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     return "\n".join(lines)
 
 
-def _group_line(group: dict[str, Any]) -> str:
+def _group_line(group: dict[str, Any], further: Sequence[str]) -> str:
     counts = f"{group['done']:8d} {group['pending']:8d} {group['failed']:7d}"
     mean, loss = group["mean_seconds"], group["loss_dimensionless"]
     error = group["loss_dimensionless_standard_error"]
     return (
-        f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} {counts} "
+        f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} "
+        + "".join(f"{group[name]:{len(name)}.4g}  " for name in further)
+        + f"{counts} "
         + (f"{mean:9.3g}" if mean is not None else " " * 9)
         + (f"  {loss:.4g}" if loss is not None else "")
         + (f" ± {error:.2g}" if error is not None else "")

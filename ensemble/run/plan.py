@@ -17,7 +17,7 @@ from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
 from ensemble.results.layout import create
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, PENDING
+from ensemble.results.schema import DONE, FAILED, PENDING, same_rows
 from ensemble.results.write import Writer
 from ensemble.run.lock import RunLock
 from ensemble.task.compute import check_task
@@ -144,7 +144,7 @@ def prepare(
         )
     if redo is not None:
         redo.check(tasks)
-    for task in {t.hurst: t for t in reversed(tasks)}.values():
+    for task in {(t.hurst, t.others): t for t in reversed(tasks)}.values():
         check(campaign, task)
     _check_path(path)
     lock.acquire(size, patience)
@@ -166,6 +166,11 @@ def prepare(
             raise InputError(
                 f"{path} holds part {part} of a smaller campaign: a part does not grow, what the "
                 "parts are merged into does"
+            )
+        if difference.grown and not same_rows(old.campaign, campaign):
+            raise InputError(
+                f"{path} cannot grow by {', '.join(difference.grown)}: the bins of its "
+                "spectra would change (they follow the highest n0 · ratio of the campaign)"
             )
         before = len(old)
         if difference.grown:
@@ -223,4 +228,5 @@ def _plan(results: Results) -> Plan:
 
 def prior(task: Task) -> float:
     """Relative time of a loop before any is measured: weak adhesion and roughness take more."""
-    return (2.0 - task.hurst) / math.sqrt(task.work_of_adhesion + 1e-3)
+    waves = math.prod(value for name, value in task.others if name in ("n0", "ratio"))
+    return waves * (2.0 - task.hurst) / math.sqrt(task.work_of_adhesion + 1e-3)

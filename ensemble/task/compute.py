@@ -27,12 +27,14 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
     ValueError
         If no such problem exists.
     """
+    campaign = campaign.at(task)
     table = campaign.profile
     profile = self_affine_profile(
         task.hurst,
         period=table.period,
         n0=table.n0,
         ratio=table.ratio,
+        rolloff=table.rolloff,
         seed=task.seed,
         amplitudes=table.amplitudes,
         **table.normalisation,
@@ -82,11 +84,11 @@ def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -
     """
     wall, cpu = time.perf_counter(), time.process_time()
     method = _make_method(campaign, task)
-    plan = field_plan(campaign)
+    plan = field_plan(campaign, task)
     recorder = FieldRecorder(plan, method, keep=task.realisation < plan.realisations)
     loop = run_loop(
         method,
-        max_penetration=campaign.cycle.max_penetration,
+        max_penetration=campaign.at(task).cycle.max_penetration,
         load_steps=campaign.cycle.load_steps,
         progress=progress,
         on_state=recorder.on_state,

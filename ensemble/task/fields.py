@@ -13,6 +13,7 @@ gap, so that the density of the gap integrates to the fraction out of contact.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.campaign.tables import Campaign
+from ensemble.campaign.tasks import Task
 from ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
 from solver.fields import gap_shares, spectral_density
 from solver.method import BRANCHES, Branch, ContactState, Method
@@ -43,6 +45,9 @@ class FieldPlan:
     period : float
         λ in m.
     lowest_harmonic, highest_harmonic : int
+        Of the profile.
+    finest_harmonic : int
+        Highest harmonic of all profiles of the campaign.
     max_penetration : float
     load_steps : int
     wanted : tuple of float
@@ -56,6 +61,7 @@ class FieldPlan:
     period: float
     lowest_harmonic: int
     highest_harmonic: int
+    finest_harmonic: int
     max_penetration: float
     load_steps: int
     wanted: tuple[float, ...]
@@ -72,7 +78,7 @@ class FieldPlan:
     @cached_property
     def nodes(self) -> int:
         """Nodes on which fields are computed, a power of two."""
-        return int(1 << (NODES_PER_WAVE * self.highest_harmonic - 1).bit_length())
+        return int(1 << (NODES_PER_WAVE * self.finest_harmonic - 1).bit_length())
 
     @cached_property
     def stride(self) -> int:
@@ -116,10 +122,24 @@ class FieldPlan:
         return np.asarray(total / np.diff(edges))
 
 
-def field_scales(plan: FieldPlan) -> tuple[Scale, ...]:
-    """Return the dimensions of the datasets of fields."""
+def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale, ...]:
+    """Return the dimensions of the datasets of fields.
+
+    Parameters
+    ----------
+    plan : FieldPlan
+    several : collection of str
+        Keys that have several values; lengths in units of these are named so.
+    """
+    if "period" in several:
+        waves = Scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
+        places = Scale("field_position", plan.position, "1", "q0 times the position of a node")
+    else:
+        waves = Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin")
+        places = Scale("field_position", plan.position, "m", "position of a node of a kept field")
+    depth = "max_penetration" if "max_penetration" in several else "h_max"
     return (
-        Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin"),
+        waves,
         Scale(
             "gap_bin",
             np.sqrt(GAP_EDGES[:-1] * GAP_EDGES[1:]),
@@ -133,8 +153,8 @@ def field_scales(plan: FieldPlan) -> tuple[Scale, ...]:
             "height/h_rms, middle of its bin",
         ),
         Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
-        Scale("field_penetration", plan.penetration, "1", "penetration/h_max of a field"),
-        Scale("field_position", plan.position, "m", "position of a node of a kept field"),
+        Scale("field_penetration", plan.penetration, "1", f"penetration/{depth} of a field"),
+        places,
     )
 
 
@@ -171,15 +191,24 @@ FIELD_DATASETS = (
 )
 
 
-def field_plan(campaign: Campaign) -> FieldPlan:
-    """Return the plan of a campaign."""
-    profile, cycle, output = campaign.profile, campaign.cycle, campaign.output
-    top = cycle.max_penetration
+def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
+    """Return the plan of a task, or of the file: lengths in units of what the tasks differ in.
+
+    Bins of the spectra are those of the finest profile of the campaign for all of its tasks.
+    """
+    here = campaign if task is None else campaign.at(task)
+    profile, cycle, output = here.profile, here.cycle, here.output
+    top, period = cycle.max_penetration, profile.period
+    if task is None and campaign.has_axis("max_penetration"):
+        top = 1.0
+    if task is None and campaign.has_axis("period"):
+        period = 2 * np.pi
     wanted = output.field_penetrations
     return FieldPlan(
-        period=profile.period,
+        period=period,
         lowest_harmonic=profile.n0,
         highest_harmonic=profile.n0 * profile.ratio,
+        finest_harmonic=campaign.finest_harmonic,
         max_penetration=top,
         load_steps=cycle.load_steps,
         wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,

@@ -59,7 +59,10 @@ BAD_VALUES = [
     ("period", "inf"),
     ("period", "true"),
     ("period", '"1e-3"'),
-    ("period", "[1e-3]"),
+    ("period", "[1e-3, 1e-3]"),
+    ("period", "[]"),
+    ("young", "[1e6, 0]"),
+    ("load_steps", "[4, 5]"),
     ("n0", "0"),
     ("n0", "1.0"),
     ("n0", "true"),
@@ -248,3 +251,69 @@ def test_any_damage_to_the_text_is_read_or_refused_in_one_sentence(data):
     stop = data.draw(st.integers(start, min(len(text), start + 20)))
     text = text[:start] + data.draw(st.text(max_size=8)) + text[stop:]
     assert "\n" not in complaint(text)
+
+
+AXES = {"ratio": "[4, 2]", "young": "[1e6, 2e6]", "max_penetration": "[0.6, 0.3]"}
+
+
+def test_every_list_is_an_axis():
+    campaign = parse_campaign(campaign_text(**AXES))
+    assert [axis.key for axis in campaign.axes] == [
+        *("sweep.hurst", "sweep.work_of_adhesion"),
+        *("profile.ratio", "material.young", "cycle.max_penetration"),
+    ]
+    tasks = campaign.tasks()
+    assert len(tasks) == campaign.task_count == 2 * 2 * 2 * 2 * 2 * 2
+    assert len(set(tasks)) == len(tasks)
+    first, last = tasks[0], tasks[-1]
+    assert first.others == (("ratio", 2), ("young", 1e6), ("max_penetration", 0.3))
+    assert "ratio = 4, young = 2e+06, max_penetration = 0.6, realisation 1" in str(last)
+    here = campaign.at(last)
+    assert (here.profile.ratio, here.material.young, here.cycle.max_penetration) == (4, 2e6, 0.6)
+    assert not here.has_axis("ratio")
+    assert len({t.seed for t in tasks}) == 2  # the same phases along every axis
+    one = parse_campaign(campaign_text(ratio="[4]"))
+    assert one == parse_campaign(campaign_text(ratio="4"))
+
+
+def test_lists_vary_together_where_that_is_asked_for():
+    campaign = parse_campaign(
+        campaign_text(
+            hurst="[0.8, 0.7]", h_rms="[2e-6, 1e-6]", seed='5\nzip = [["h_rms", "hurst"]]'
+        )
+    )
+    cells = {(h, dict(o)["h_rms"]) for h, o in ((t.hurst, t.others) for t in campaign.tasks())}
+    assert cells == {(0.8, 2e-6), (0.7, 1e-6)}
+    assert campaign.task_count == 2 * 2 * 2
+    for zipped, words in (
+        ('[["hurst", "young"]]', "zip names 'young': it must name keys that are lists"),
+        ('[["hurst"]]', "zip is"),
+        ('[["hurst", "h_rms"], ["hurst", "work_of_adhesion"]]', "zip is"),
+    ):
+        assert words in refused(campaign_text(h_rms="[1e-6, 2e-6]", seed=f"5\nzip = {zipped}"))
+    longer = campaign_text(h_rms="[1e-6, 2e-6, 3e-6]", seed='5\nzip = [["hurst", "h_rms"]]')
+    assert "zip joins lists of different lengths (h_rms 3, hurst 2)" in refused(longer)
+
+
+def test_a_number_may_become_an_axis_and_an_axis_longer():
+    old = parse_campaign(campaign_text())
+    grown = parse_campaign(campaign_text(young="[1e6, 2e6]"))
+    assert compare(old, grown).grown == ("material.young",)
+    assert compare(old, parse_campaign(campaign_text(young="[2e6, 3e6]"))).other
+    assert compare(old, parse_campaign(campaign_text(max_penetration="[0.6, 0.3]"))).other
+    # Pairs that were computed must be pairs still.
+    paired = {"seed": '5\nzip = [["hurst", "h_rms"]]'}
+    one = parse_campaign(campaign_text(h_rms="[1e-6, 2e-6]", **paired))
+    more = {"hurst": "[0.7, 0.8, 0.9]"}
+    two = parse_campaign(campaign_text(h_rms="[1e-6, 2e-6, 3e-6]", **more, **paired))
+    three = parse_campaign(campaign_text(h_rms="[1e-6, 3e-6, 2e-6]", **more, **paired))
+    assert set(compare(one, two).grown) == {"profile.h_rms", "sweep.hurst"}
+    assert not compare(one, two).other
+    assert compare(one, three).other
+
+
+def test_rules_hold_in_every_cell():
+    assert "n0 · ratio is 120000" in refused(campaign_text(n0="[1, 2]", ratio="[3, 60000]"))
+    assert "rolloff is 8" in refused(campaign_text(ratio="[4, 16]\nrolloff = [2, 8]"))
+    text = campaign_text(max_penetration="[0.6, 0.3]", jumps="8\nfield_penetrations = [0.1]")
+    assert "field_penetrations is given beside several max_penetration" in refused(text)

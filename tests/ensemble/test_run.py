@@ -12,6 +12,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+import xarray
 
 from ensemble.campaign.file import load_campaign
 from ensemble.errors import InputError
@@ -147,6 +148,33 @@ def test_growing_computes_exactly_what_is_new(tmp_path):
     (tmp_path / "whole").mkdir()
     _, whole = run(tmp_path / "whole", realisations="3")
     assert differences(out, whole) == []
+
+
+def test_a_campaign_on_further_axes(tmp_path):
+    """Run, told by status along its axes, interrupted by nothing, grown along one of them."""
+    axes = {"ratio": "[4, 2]", "max_penetration": "[0.6, 0.3]", "realisations": "1"}
+    process, out = run(tmp_path, hurst="[0.7]", **axes)
+    assert "8 of 8 tasks done" in process.stderr
+    with xarray.open_dataset(out, engine="h5netcdf") as data:
+        assert data["ratio"].values.tolist() == [2, 2, 4, 4] * 2
+        assert data["ratio"].attrs["long_name"].startswith("highest over lowest")
+        assert data["max_penetration"].values.tolist() == [0.3, 0.6] * 4
+        assert data["loading_penetration"].values.tolist() == [0, 0.25, 0.5, 0.75, 1]
+    status = json.loads(adhesis("status", out, "--json").stdout)
+    assert status["axes"] == ["hurst", "work_of_adhesion", "ratio", "max_penetration"]
+    assert [g["max_penetration"] for g in status["groups"][:3]] == [0.3, 0.6, 0.3]
+    assert "ratio  max_penetration" in adhesis("status", out).stdout
+    log = tmp_path / "log"
+    process, _ = run(tmp_path, young="[1e6, 2e6]", hurst="[0.7, 0.8]", fake=f"log={log}", **axes)
+    assert process.returncode == 0, process.stderr
+    assert len(log.read_text().split()) == 32 - 8
+    (tmp_path / "whole").mkdir()
+    _, whole = run(tmp_path / "whole", young="[2e6, 1e6]", hurst="[0.7, 0.8]", **axes)
+    assert differences(out, whole) == []
+    axes["ratio"] = "[2, 4, 8]"
+    process, _ = run(tmp_path, young="[1e6, 2e6]", hurst="[0.7, 0.8]", **axes)
+    assert process.returncode == 2
+    assert "cannot grow by profile.ratio: the bins of its spectra would change" in process.stderr
 
 
 def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path):

@@ -77,6 +77,24 @@ def test_the_catalogue_keeps_the_largest_drops_in_the_order_of_the_path():
     assert total == drops.sum()
 
 
+def test_a_task_on_further_axes_has_the_bits_of_a_campaign_of_its_values():
+    axes = {"ratio": "[2, 4]", "max_penetration": "[0.3, 0.6]", "young": "[1e6, 2e6]"}
+    several = parse_campaign(campaign_text(**axes))
+    task = several.tasks()[-1]
+    alone = parse_campaign(campaign_text(young="2e6"))
+    one, two = run_task(several, task), run_task(alone, alone.tasks()[-1])
+    for name in ("loss", "loss_from_drops", "loading_mean_stress", "jump_penetration", "h_max"):
+        assert np.asarray(one[name]).tobytes() == np.asarray(two[name]).tobytes(), name
+    size = two["unloading_mean_stress"].size  # stored until the same Δ/h_max for the smallest
+    assert one["unloading_mean_stress"].size == 2 * (size - 5) + 5
+    np.testing.assert_array_equal(one["unloading_mean_stress"][:size], two["unloading_mean_stress"])
+    assert several.penetration_unit(task) == 0.6
+    coarse = several.tasks()[0]
+    assert several.at(coarse).profile.ratio == 2
+    small = run_task(several, coarse)
+    assert small["psd_height"].shape == one["psd_height"].shape
+
+
 def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
     campaign = parse_campaign(campaign_text())
     task = campaign.tasks()[0]

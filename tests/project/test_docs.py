@@ -201,7 +201,7 @@ def test_campaigns_are_valid(block: Block) -> None:
 
 def example() -> str:
     """Return the campaign that docs/campaign-file.md gives as an example."""
-    (block,) = (b for b in BLOCKS if b.language == "toml" and b.page.name == "campaign-file.md")
+    block = next(b for b in BLOCKS if b.language == "toml" and b.page.name == "campaign-file.md")
     return block.text
 
 

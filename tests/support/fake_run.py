@@ -36,7 +36,7 @@ def matches(pattern: str | None, task: Task) -> bool:
 
 def fake_result(campaign: Campaign, task: Task) -> Row:
     """Numbers that depend on the task alone."""
-    mixed = [task.seed, round(1e6 * task.hurst), round(1e6 * task.work_of_adhesion)]
+    mixed = [task.seed, *(round(1e6 * value) for value in task.cell)]
     rng = np.random.default_rng(mixed)
     sizes = sizes_of(row_scales(campaign))
     keep = task.realisation < field_plan(campaign).realisations
