@@ -9,22 +9,23 @@ import h5py
 import numpy as np
 import pytest
 
-from ensemble.campaign.file import parse_campaign
+from ensemble.campaign.file import load_campaign, parse_campaign
 from ensemble.campaign.tasks import Part
+from ensemble.command.main import main
 from ensemble.errors import InputError
 from ensemble.results.layout import create
 from ensemble.results.merge import merge
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED, PENDING
 from ensemble.results.write import Writer
+from ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
-    adhesis,
     campaign_text,
     differences,
     environment,
     write_campaign,
 )
-from tests.support.fake_run import fake_result
+from tests.support.fake_run import fake_engine, fake_result
 
 CAMPAIGN = campaign_text(realisations="6")
 
@@ -47,23 +48,26 @@ def parts(folder, count, **others):
     return [computed(folder / f"p{k}.h5", f"{k}/{count}", **others) for k in range(1, count + 1)]
 
 
-def test_parts_merged_equal_the_file_of_one_run(tmp_path):
-    """By the command, with more parts than realisations, computed in any order."""
+def run(path, out, part="1/1"):
+    """Run the fake campaign, or a part of it, in this process."""
+    options = Options(part=Part.parse(part), patience=0.0)
+    return run_campaign(load_campaign(path), out, None, options, engine=fake_engine(""))
+
+
+def test_parts_merged_equal_the_file_of_one_run(tmp_path, capsys):
+    """With more parts than realisations, merged in any order."""
     path, whole = write_campaign(tmp_path, realisations="5"), tmp_path / "whole.h5"
-    assert adhesis("run", path, "--out", whole, fake="").returncode == 0
-    names = [tmp_path / f"part{k}.h5" for k in range(1, 8)]
+    run(path, whole)
+    names = [tmp_path / f"part{k}.h5" for k in range(1, 21)]
     for k, name in enumerate(names, start=1):
-        process = adhesis("run", path, "--part", f"{k}/7", "--out", name, fake="")
-        assert process.returncode == 0, process.stderr
-    process = adhesis("merge", *reversed(names), "--out", tmp_path / "all.h5")
-    assert process.returncode == 0, process.stderr
-    assert "20 rows taken over from 7 files; 20 of 20 tasks done" in process.stdout
+        run(path, name, f"{k}/20")
+    assert main(["merge", *map(str, reversed(names)), "--out", str(tmp_path / "all.h5")]) == 0
+    assert "20 rows taken over from 20 files; 20 of 20 tasks done" in capsys.readouterr().out
     assert differences(tmp_path / "all.h5", whole) == []
     with h5py.File(tmp_path / "all.h5") as one, h5py.File(whole) as two:
-        new = {"created", "laid_out"}
-        assert {n: v for n, v in one.attrs.items() if n not in new and n != "file_version"} == {
-            n: v for n, v in two.attrs.items() if n not in new and n != "file_version"
-        }
+        assert set(one.attrs) == set(two.attrs)
+        for name in ("campaign", "commit", "numpy", "adhesis_version", "seed"):
+            assert one.attrs[name] == two.attrs[name]
 
 
 def test_a_merge_is_resumed_and_grown(tmp_path):
@@ -75,8 +79,7 @@ def test_a_merge_is_resumed_and_grown(tmp_path):
     assert differences(out, computed(tmp_path / "whole.h5")) == []
     larger = campaign_text(realisations="8", hurst="[0.7, 0.75, 0.8]")
     path = write_campaign(tmp_path, realisations="8", hurst="[0.7, 0.75, 0.8]")
-    process = adhesis("run", path, "--out", out, fake="")
-    assert "48 of 48 tasks done; 24 computed" in process.stderr
+    assert run(path, out).computed == 24
     assert differences(out, computed(tmp_path / "larger.h5", text=larger)) == []
     # Parts of the smaller campaign still fit into the larger file.
     assert merge([two], out).taken == 0
@@ -128,26 +131,25 @@ def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tm
     assert "is part 1/2 of its campaign" in refused([again], one)
 
 
-def test_a_part_is_what_it_is(tmp_path):
+def test_a_part_is_what_it_is(tmp_path, capsys):
     path, out = write_campaign(tmp_path), tmp_path / "p.h5"
-    assert adhesis("run", path, "--part", "2/3", "--out", out, fake="").returncode == 0
+    run(path, out, "2/3")
     with Results(out) as results:
         assert results.part == Part(2, 3)
         assert results.tasks() == results.campaign.tasks()[1::3]
         assert results.column("task").tolist() == [1, 4, 7]
-    for words, sentence in (
-        (("--part", "1/3", "--out", out), "holds part 2/3 of it, and part 1/3 is wanted"),
-        (("--out", out), "holds part 2/3 of it, and part 1/1 is wanted"),
-        (("--part", "4/3", "--out", out), "part is '4/3': it must be K/N"),
-        (("--part", "9/9", "--out", tmp_path / "q.h5"), "the campaign has 8 tasks"),
-        (("--part", "1/3"), "--part needs --out"),
+    more = tmp_path / "more.toml"
+    more.write_text(campaign_text(realisations="3"))
+    for campaign, words, sentence in (
+        (path, ("--part", "1/3", "--out", out), "holds part 2/3 of it, and part 1/3 is wanted"),
+        (path, ("--out", out), "holds part 2/3 of it, and part 1/1 is wanted"),
+        (path, ("--part", "4/3", "--out", out), "part is '4/3': it must be K/N"),
+        (path, ("--part", "9/9", "--out", tmp_path / "q.h5"), "the campaign has 8 tasks"),
+        (path, ("--part", "1/3"), "--part needs --out"),
+        (more, ("--part", "2/3", "--out", out), "a part does not grow"),
     ):
-        process = adhesis("run", path, *words, fake="")
-        assert process.returncode == 2
-        assert sentence in process.stderr
-    more = write_campaign(tmp_path, realisations="3")
-    process = adhesis("run", more, "--part", "2/3", "--out", out, fake="")
-    assert "a part does not grow" in process.stderr
+        assert main(["run", str(campaign), *map(str, words)]) == 2
+        assert sentence in capsys.readouterr().err
 
 
 MERGED = """
