@@ -36,7 +36,8 @@ def matches(pattern: str | None, task: Task) -> bool:
 
 def fake_result(campaign: Campaign, task: Task) -> Row:
     """Numbers that depend on the task alone."""
-    mixed = [task.seed, *(round(1e6 * value) for value in task.cell)]
+    hurst, gamma, _, seed, values = campaign.identity(task)
+    mixed = [seed, *(round(1e9 * v) for v in (hurst, gamma, *values) if v is not None)]
     rng = np.random.default_rng(mixed)
     sizes = sizes_of(row_scales(campaign))
     keep = task.realisation < field_plan(campaign).realisations
