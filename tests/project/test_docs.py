@@ -65,6 +65,7 @@ TEXT = {
     "h(x) = Σ_m": "formula",
     "loss = ∮ p̄ dΔ": "formula",
     "loss = (1/λ) Σ": "formula",
+    "W = U + λ": "formula",
 }
 PROGRAMS = (
     "adhesis",

@@ -6,6 +6,7 @@ A room is a folder; in a folder that has rooms inside, each module is a room of 
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -23,6 +24,7 @@ FOLDERS = (*PACKAGES, "tests")
 # Who may import what weighs: to the door of MPI, of the file format, of compiled code, of figures.
 MPI = {"ensemble.run.ranks", "ensemble.doctor.probe"}
 HDF5 = {
+    "ensemble.results.merge",
     "ensemble.results.layout",
     "ensemble.results.read",
     "ensemble.results.write",
@@ -59,11 +61,13 @@ NOT_IN_SOLVER = {
 }
 # All that campaigns know of the mechanics.
 SOLVER_FOR_ENSEMBLE = {
+    "solver.control",
     "solver.fields",
     "solver.jumps",
     "solver.loop",
     "solver.material",
     "solver.method",
+    "solver.path",
     "solver.problem",
     "solver.profile",
     "solver.references.single_wave",
@@ -232,3 +236,14 @@ def test_report_loads_no_mpi(results: Path, tmp_path: Path) -> None:
     packages = loaded(COMMAND, "report", str(results), "--to", str(tmp_path / "r"))
     assert "matplotlib" in packages
     assert "mpi4py" not in packages
+
+
+def test_the_design_page_names_every_room_and_every_file_that_it_names_is_there() -> None:
+    page = (ROOT / "docs" / "design.md").read_text()
+    picture = (ROOT / "docs" / "figures" / "rooms.py").read_text()
+    for folder in {path.parent for path in PATHS.values()} - {ROOT / p for p in PACKAGES}:
+        assert f"{folder.name}/" in page, folder
+        if folder.parent in (ROOT / "solver", ROOT / "ensemble"):
+            assert f'"{folder.name}": (' in picture, folder
+    known = {path.name for path in PATHS.values()}
+    assert set(re.findall(r"`(\w+\.py)`", page)) - known == set()
