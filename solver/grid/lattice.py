@@ -25,12 +25,15 @@ class Lattice:
         h in m.
     adhesion : array
         γ sqrt(1 + h'²) in J/m².
+    origin : int
+        Node at the highest crest.
     """
 
     elastic: ElasticGrid
     compliance: EdgeCompliance
     height: Array
     adhesion: Array
+    origin: int = 0
 
     @classmethod
     def of(cls, problem: Problem, n: int) -> Lattice:
@@ -42,6 +45,7 @@ class Lattice:
             EdgeCompliance(elastic.kernel()),
             profile.heights(n),
             problem.work_of_adhesion * np.sqrt(1 + profile.slopes(n) ** 2),
+            round(profile.highest_point[0] / elastic.dx) % n,
         )
 
     @property

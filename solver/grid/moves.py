@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,19 +19,34 @@ _MARGIN = 1e-4
 
 Key = tuple[int, int, int]
 """Name of a move of a contact set."""
-Memory = dict[tuple[int, int], tuple[int, int]]
-"""Direction and length of the last move of the edge with this side and contact node."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is remembered of an edge: direction and length of its last move, and what is carried.
+
+    ``carried`` is the part of a node that it was to move and has not yet.
+    """
+
+    direction: int
+    length: int
+    carried: float
+
+
+Memory = dict[tuple[int, int], Motion]
+"""Motion of the edge with this side and contact node."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """One edge's move: ``length`` nodes outwards (``direction`` +1) or inwards (-1)."""
+    """One edge's move: ``length`` nodes outwards (``direction`` +1) or inwards (-1), maybe none."""
 
     edge: int
     direction: int
     length: int
     release: float
     key: Key
+    carried: float = 0.0
 
 
 def least_release(lattice: Lattice) -> float:
@@ -40,9 +55,21 @@ def least_release(lattice: Lattice) -> float:
 
 
 def edge_moves(
-    edges: Edges, lattice: Lattice, longest: int, memory: Memory, blocked: set[Key], caution: int
+    edges: Edges,
+    lattice: Lattice,
+    longest: int,
+    memory: Memory,
+    blocked: set[Key],
+    caution: int,
+    equal_speeds: bool,
 ) -> list[Move]:
-    """Moves of single edges that release energy, thinned out by ``caution``."""
+    """Moves of single edges that release energy, thinned out by ``caution``.
+
+    By linear kinetics edges move in proportion to the energy that their next node releases: the
+    leading one by its own step, which doubles while it keeps its direction, the others by their
+    share of that, and by whole nodes as it adds up. For comparison, with ``equal_speeds``, every
+    edge by a step of its own.
+    """
     margin = least_release(lattice)
     moves = []
     for k in np.flatnonzero(np.minimum(edges.growth, edges.recession) < -margin).tolist():
@@ -52,41 +79,69 @@ def edge_moves(
         key = (side, inner, direction)
         if key in blocked:
             continue
-        before, length = memory.get((side, inner), (direction, 0))
-        length = 2 * length if before == direction else 1
+        before = memory.get((side, inner))
+        same = before is not None and before.direction == direction
+        length = 2 * before.length if before is not None and same else 1
         room = int(edges.gap[k] if outwards else edges.width[k])
         length = max(1, min(length, longest, room // 3))
         release = -float(edges.growth[k] if outwards else edges.recession[k])
-        moves.append(Move(k, direction, length, release, key))
-    if not caution or not moves:
+        carried = before.carried if before is not None and same else 0.0
+        moves.append(Move(k, direction, length, release, key, carried))
+    if not moves:
         return moves
-    moves = [Move(m.edge, m.direction, 1, m.release, m.key) for m in moves]
-    # 1: all edges by one node; 2, 3, …: the most unstable half, quarter, …
+    if caution:
+        moves = [replace(m, length=1) for m in moves]
+    if caution < 2:
+        return moves if equal_speeds else _in_proportion(moves)
+    # 2, 3, …: the most unstable half, quarter, … by one node
     keep = max(1, len(moves) >> (caution - 1))
     least = sorted(m.release for m in moves)[-keep] * (1 - _TIE)
     urgent = [m for m in moves if m.release >= least]
-    # Even the tied ones together did not pay: one of them, the leftmost.
-    return urgent[:1] if caution > 1 and len(moves) >> (caution - 2) <= 1 else urgent
+    if len(moves) >> (caution - 2) > 1:
+        return urgent
+    # Even the tied ones together did not pay: one of them, the first from the highest crest on.
+    return [min(urgent, key=lambda m: _place(edges, m.edge, lattice))]
 
 
-def pair_moves(contact: Contact, edges: Edges, lattice: Lattice, blocked: set[Key]) -> list[Move]:
-    """Moves of the pair of edges that releases most, and of those that tie with it."""
+def _in_proportion(moves: list[Move]) -> list[Move]:
+    """Moves in proportion to the energy they release; the leading one keeps its length."""
+    fastest = max(m.release for m in moves)
+    leading = min(m.length for m in moves if m.release >= fastest * (1 - _TIE))
+    shared = []
+    for m in moves:
+        way = m.carried + leading * m.release / fastest
+        # what ties in release ties in way
+        length = min(int(way + 10 * _TIE * leading), m.length)
+        shared.append(replace(m, length=length, carried=min(max(way - length, 0.0), 1.0)))
+    return shared
+
+
+def pair_moves(
+    contact: Contact, edges: Edges, lattice: Lattice, blocked: set[Key], alone: bool
+) -> list[Move]:
+    """Moves of the pair of edges that releases most, and of those that tie with it.
+
+    With ``alone`` one of them only, the first from the highest crest on.
+    """
     margin = least_release(lattice)
     found = pairs(contact, edges, lattice)
     found = [p for p in found if p.release > margin and p.key(edges) not in blocked]
     if not found:
         return []
     most = max(p.release for p in found)
-    return [
-        Move(edge, p.direction, 1, p.release, p.key(edges))
-        for p in found
-        if p.release >= most * (1 - _TIE)
-        for edge in p.edges
-    ]
+    tied = [p for p in found if p.release >= most * (1 - _TIE)]
+    if alone:
+        tied = [min(tied, key=lambda p: _place(edges, p.edges[0], lattice))]
+    return [Move(edge, p.direction, 1, p.release, p.key(edges)) for p in tied for edge in p.edges]
+
+
+def _place(edges: Edges, edge: int, lattice: Lattice) -> int:
+    """Nodes from the highest crest to an edge, to the right."""
+    return (int(edges.inner[edge]) - lattice.origin) % lattice.n
 
 
 def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[Memory, int]:
-    """Move the edges; return each one's direction and step under its new place, and the flips."""
+    """Move the edges; return each one's motion under its new place, and the flips."""
     mask, stress = contact.mask, contact.stress
     n = mask.size
     memory: Memory = {}
@@ -103,11 +158,13 @@ def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[Memo
             # A node under compression is never removed.
             length = int(np.argmin(np.append(stress[nodes] < 0, False)))
             mask[nodes[:length]] = False
-        memory[(side, (inner + move.direction * side * length) % n)] = (move.direction, length)
+        place = (inner + move.direction * side * length) % n
+        memory[(side, place)] = Motion(move.direction, length, move.carried)
         flips += length
     # The last free node never joins.
     if mask.all():
-        mask[edges.outer[moves[0].edge]] = False
+        joined = next(m.edge for m in moves if m.direction > 0 and m.length)
+        mask[edges.outer[joined]] = False
     return memory, flips
 
 

@@ -3,8 +3,9 @@
 The rules (docs/methods.md):
 
 *   a free node beside a patch that overlaps the rigid profile joins;
-*   otherwise edges move by energy comparison; every edge has its own step, doubled while it keeps
-    its direction, one node after it turns, never longer than a tenth of the shortest wave;
+*   otherwise edges move by energy comparison, in proportion to the energy that they release; the
+    leading one's step is doubled while it keeps its direction, is one node after it turns, and
+    never longer than a tenth of the shortest wave;
 *   no state is accepted whose energy lies above that of the last admissible state: the sweep is
     taken back and fewer edges move, in the end the most unstable one alone, by one node;
 *   contact nucleates where the gap vanishes away from edges, from a relaxed state only.
@@ -73,8 +74,12 @@ class Relaxation:
         self.rejected = 0
         self.flips = 0
 
-    def relax(self, contact: Contact, abort: Abort | None = None) -> Contact | None:
-        """Move the edges of ``contact`` (solved) to the nearest local minimum of the energy.
+    def relax(
+        self, contact: Contact, abort: Abort | None = None, *, equal_speeds: bool = False
+    ) -> Contact | None:
+        """Move the edges of ``contact`` (solved) to the local minimum that descent leads to.
+
+        By linear kinetics, or with ``equal_speeds`` by the rule it is compared with.
 
         Returns
         -------
@@ -86,7 +91,7 @@ class Relaxation:
         RuntimeError
             If the edges do not come to rest.
         """
-        return _Descent(self, contact, abort).run()
+        return _Descent(self, contact, abort, equal_speeds).run()
 
     def relax_without_adhesion(self, contact: Contact) -> Contact:
         """Contact without adhesion: no tension, no overlap, one solution at every separation.
@@ -154,8 +159,11 @@ class Relaxation:
 class _Descent:
     """One relaxation: the running contact, the last admissible one, and what was tried from it."""
 
-    def __init__(self, rules: Relaxation, contact: Contact, abort: Abort | None) -> None:
+    def __init__(
+        self, rules: Relaxation, contact: Contact, abort: Abort | None, equal_speeds: bool
+    ) -> None:
         self.rules = rules
+        self.equal_speeds = equal_speeds
         self.lattice, self.solver = rules.lattice, rules.solver
         self.abort = abort
         self.current = contact.copy()
@@ -167,7 +175,8 @@ class _Descent:
         self.blocked: set[Key] = set()
         self.caution = 0
         self.moves: list[Move] = []
-        self.paired = False
+        self.paired = False  # the last moves are those of pairs of edges
+        self.alone = False  # of tied pairs one moves
 
     def run(self) -> Contact | None:
         for _ in range(_MAX_SWEEPS):
@@ -186,6 +195,7 @@ class _Descent:
                 if self.moves:
                     self.blocked.clear()
                     self.caution = 0
+                    self.alone = False
                 if self.abort is not None and self.abort(energy, self.current):
                     return None
                 self.anchor = self.current.copy()
@@ -222,7 +232,10 @@ class _Descent:
         """Go back before the last sweep, and from there try fewer edges, shorter steps."""
         assert self.anchor is not None
         self.rules.rejected += 1
-        if self.paired:
+        if self.paired and len(self.moves) > 2:
+            # Equal pairs hold each other back: one of them leads.
+            self.alone = True
+        elif self.paired:
             self.blocked.update(m.key for m in self.moves)
         elif len(self.moves) == 1 and self.moves[0].length == 1:
             self.blocked.add(self.moves[0].key)
@@ -234,11 +247,17 @@ class _Descent:
     def _move(self, edges: Edges) -> bool:
         """Move single edges, or pairs where no single edge gains energy; whether any moved."""
         self.moves = edge_moves(
-            edges, self.lattice, self.rules.longest_step, self.memory, self.blocked, self.caution
+            edges,
+            self.lattice,
+            self.rules.longest_step,
+            self.memory,
+            self.blocked,
+            self.caution,
+            self.equal_speeds,
         )
         self.paired = False
         if not self.moves and not self._unsolved():
-            self.moves = pair_moves(self.current, edges, self.lattice, self.blocked)
+            self.moves = pair_moves(self.current, edges, self.lattice, self.blocked, self.alone)
             self.paired = bool(self.moves)
         if not self.moves:
             return False

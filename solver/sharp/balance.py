@@ -36,6 +36,10 @@ class Law(NamedTuple):
         An opening this far below zero is an overlap that descent cannot weigh.
     hold : Hold
         What is prescribed.
+    faint : float
+        A force C_c² - C² this small is that of rounding.
+    origin : float
+        θ of the highest crest.
     """
 
     critical: float
@@ -47,6 +51,8 @@ class Law(NamedTuple):
     smallest: float
     overlapping: float
     hold: Hold
+    faint: float
+    origin: float
 
 
 @compiled

@@ -18,11 +18,13 @@ from solver.sharp.balance import (
 from solver.sharp.box import off_saddle, running_step
 from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
 from solver.sharp.field import Kinds, Rules, choose_kinds, solve
+from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.linear import is_definite
 from solver.sharp.source import Panels
 
 _REUSES = 8  # running steps that share one tangent
 _NOISE = 1e-3  # a rise of the energy below this share of the work done both ways is rounding
+_TIE = 1e-3  # two ways off a saddle whose gains differ by less are equal
 _LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
 
 # How a descent ended.
@@ -42,14 +44,24 @@ def _limits(table: Array, longest: float) -> Array:
 
 @compiled
 def descend(
-    gaps: Array, prescribed: float, most: int, least: Kinds, law: Law, rules: Rules, panels: Panels
+    gaps: Array,
+    prescribed: float,
+    most: int,
+    least: Kinds,
+    equal_speeds: bool,
+    law: Law,
+    rules: Rules,
+    panels: Panels,
 ) -> tuple[Array, int, int, int, Kinds]:
     """Descend in energy, d being ``prescribed``, for at most ``most`` steps.
 
-    Edges out of equilibrium run in the direction in which the energy falls, all at the same speed
-    (their limit, twice as long for one that runs alone); edges near equilibrium follow them by
-    Newton's step. A patch or gap loses at most a quarter of its length to each edge. While edges
-    run, a tangent serves several steps, unless an edge turns; the openings are always fresh.
+    Edges move in proportion to their excess energy release rates, by no more than the longest step
+    and a quarter of the gap or patch that they may close. Or, for comparison, with
+    ``equal_speeds``: edges out of equilibrium run, all at the same speed (their limit, twice as
+    long for one that runs alone), and edges near equilibrium follow them by Newton's step.
+
+    While edges run, a tangent serves several steps, unless an edge turns; the openings are always
+    fresh. A step that raised the energy is taken back and halved.
 
     Returns
     -------
@@ -67,7 +79,8 @@ def descend(
     last = np.zeros(edges)
     force = np.zeros(edges)  # of the energy on each edge, before the last step
     d = np.zeros(edges)
-    matrix = np.zeros((edges, edges))
+    values = np.zeros(edges)
+    matrix = np.zeros((edges, edges))  # tangent, or eigenvectors of the Hessian
     kinds = least
     while fields < most:
         fields += 1
@@ -78,12 +91,14 @@ def descend(
         if not np.isfinite(of.pressure):
             return gaps, LOST, fields, tangents, kinds
         residual, drift = imbalance(of, law, panels)
-        # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²
+        # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²; where the
+        # surfaces overlap, C < 0, contact grows all the same
         rise = 0.0
         fall = 0.0
         fresh = np.empty(edges)
         for e in range(edges):
-            fresh[e] = residual[e] * (2 * of.opening[e] - residual[e])
+            critical = of.opening[e] - residual[e]
+            fresh[e] = of.opening[e] * abs(of.opening[e]) - critical * critical
             work = 0.5 * (force[e] + fresh[e]) * last[e]
             rise += work
             fall += abs(work)
@@ -97,10 +112,25 @@ def descend(
             share = min(1.0, 2 * share)
         force = fresh
         longest = share * law.longest
+        alone = 2 * longest if held and runners == 1 else longest
+        limit = _limits(table, alone)
         if held:
             reuses += 1
-            limit = _limits(table, 2 * longest if runners == 1 else longest)
+        else:
+            tangents += 1
+            reuses = 0
+            tangent, _ = tangent_of(of, drift, rules)
+            if equal_speeds:
+                d, matrix = symmetric(of, tangent, law.overlapping)
+            else:
+                values, matrix = np.linalg.eigh(
+                    hessian(np.maximum(of.opening, 0.0), residual, drift, tangent)
+                )
+        if equal_speeds:
             step = running_step(matrix, d, -residual, limit)
+        else:
+            step = flow_step(values, matrix, -force, limit, law.faint)
+        if held:
             turns = False
             for e in range(edges):
                 if abs(step[e]) > 0.2 * longest and step[e] * last[e] <= 0:
@@ -109,24 +139,28 @@ def descend(
                 runners = 0
                 last = np.zeros(edges)
                 continue
-        else:
-            tangents += 1
-            reuses = 0
-            limit = _limits(table, longest)
-            tangent, _ = tangent_of(of, drift, rules)
-            d, matrix = symmetric(of, tangent, law.overlapping)
-            step = running_step(matrix, d, -residual, limit)
         for e in range(edges):
             # Where surfaces would overlap beside an edge there is nothing to weigh: contact grows.
             if of.opening[e] < -law.overlapping:
                 step[e] = limit[e]
         size = np.abs(step).max()
-        if size <= law.coarse and not held and not is_definite(matrix):
-            step = off_saddle(matrix, d, limit)
+        if size <= law.coarse and not held:
+            if equal_speeds:
+                if not is_definite(matrix):
+                    step = off_saddle(matrix, d, limit)
+            elif values[0] < 0:
+                way = leaving_step(values, matrix, limit, _places(table, law.origin))
+                fields += 2
+                onwards = _gain(gaps, way, prescribed, kinds, law, rules, panels)
+                backwards = _gain(gaps, -way, prescribed, kinds, law, rules, panels)
+                if max(onwards, backwards) > 0:
+                    step = way if onwards >= backwards * (1 - _TIE) else -way
             size = np.abs(step).max()
+        if not size < np.inf:
+            return gaps, LOST, fields, tangents, kinds
         runners = 0
         for e in range(edges):
-            if abs(step[e]) > 0.5 * longest:
+            if abs(step[e]) > (0.5 if equal_speeds else 0.25) * longest:
                 runners += 1
         before = gaps
         gaps = moved_gaps(gaps, step)
@@ -136,3 +170,32 @@ def descend(
         if size < law.near:
             return gaps, RESTING, fields, tangents, kinds
     return gaps, UNFINISHED, fields, tangents, kinds
+
+
+@compiled
+def _gain(
+    gaps: Array,
+    step: Array,
+    prescribed: float,
+    kinds: Kinds,
+    law: Law,
+    rules: Rules,
+    panels: Panels,
+) -> float:
+    """Force along ``step`` after it, from a state without force: positive where energy falls."""
+    of = solve(moved_gaps(gaps, step), prescribed, law.hold, kinds, 1, rules, panels)
+    residual, _ = imbalance(of, law, panels)
+    gain = 0.0
+    for e in range(step.shape[0]):
+        gain -= residual[e] * (2 * of.opening[e] - residual[e]) * step[e]
+    return gain
+
+
+@compiled
+def _places(table: Array, origin: float) -> Array:
+    """Distance of every edge to the right of ``origin``, in [0, 2π)."""
+    out = np.empty(2 * table.shape[0])
+    for k in range(table.shape[0]):
+        for side in range(2):
+            out[2 * k + side] = (table[k, LEFT + side] - origin) % (2 * np.pi)
+    return out

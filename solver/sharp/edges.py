@@ -26,6 +26,7 @@ CORRECTED = 0.05  # longest correction of an equilibrium that is looked for near
 _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
 _DESCENT_LIMIT = 100_000
 _RESTS = 20  # how often a descent may come to rest without a minimum that Newton's iteration finds
+_FAINT = 10.0  # forces this small, in units of the field's tolerance, are its error
 _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
 
 
@@ -93,9 +94,7 @@ class EdgeMechanics:
         self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
         # How far an equilibrium may move with the error of the field.
         self.coarse = max(self.settled, 10 * tolerance * self.wave)
-        # Steps above 0.1 λ_min leap over pinned minima. Where two edges race, which minimum is
-        # reached can depend on the step down to 0.05 λ_min, below which no loop was seen to change;
-        # an edge that runs alone takes twice that.
+        # Steps above 0.1 λ_min leap over pinned minima; an edge that runs alone takes twice this.
         self.longest_step = 0.05 * self.wave
         # Narrower patches and gaps are gone: far below the width at which a patch on the sharpest
         # crest first comes to rest, (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8.
@@ -115,6 +114,8 @@ class EdgeMechanics:
             smallest=float(self.smallest),
             overlapping=float(0.1 * max(critical, rough)),
             hold=hold,
+            faint=max(_FAINT * tolerance, 1e-12) * float(critical) ** 2,
+            origin=source.highest,
         )
         self.count = Counters()
 
@@ -165,8 +166,12 @@ class EdgeMechanics:
         )
         return Point(prescribed, field, rate, slope)
 
-    def relax(self, gaps: Array, prescribed: float, reach: float) -> Point | Array:
+    def relax(
+        self, gaps: Array, prescribed: float, reach: float, *, equal_speeds: bool = False
+    ) -> Point | Array:
         """Descend in energy, what is prescribed being fixed, to the next minimum.
+
+        By linear kinetics, or with ``equal_speeds`` by the rule it is compared with.
 
         Returns
         -------
@@ -181,12 +186,14 @@ class EdgeMechanics:
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
+        # Without adhesion the minimum is unique, and the energy's slope vanishes there twice.
+        equal_speeds = equal_speeds or self.critical == 0
         left = _DESCENT_LIMIT
         kinds = _ANY
         rests = 0
         while left > 0:
             gaps, ended, fields, tangents, kinds = descend(
-                gaps, prescribed, left, kinds, self.law, RULES, self.source.panels
+                gaps, prescribed, left, kinds, equal_speeds, self.law, RULES, self.source.panels
             )
             self.count.fields += fields
             self.count.descent_steps += fields

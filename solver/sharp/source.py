@@ -105,6 +105,8 @@ class StressSource:
         Largest |h''|, in units of q0.
     steepest : float
         Largest |h'|.
+    highest : float
+        θ of the highest crest.
     panels : Panels
     """
 
@@ -117,6 +119,7 @@ class StressSource:
         m = np.arange(profile.coefficients.size)
         h = profile.coefficients * profile.q0
         self.m2 = profile.m2
+        self.highest = profile.highest_point[0] * profile.q0
         self.sharpest = float(np.abs(profile.curvatures(8 * top)).max()) / profile.q0
         stress = _on_panels(m * h, x, count)  # symbol |q| of the half-space
         slope = _on_panels(1j * m * m * h, x, count)

@@ -140,9 +140,13 @@ class States:
             hold_energy=self._hold_energy(separation, mean_stress),
         )
 
-    def jump(self, before: ContactState, after: ContactState, branch: Branch) -> Jump:
-        """Jump between two states."""
-        jump = Jump.between(before, after, branch, self.period)
+    def jump(
+        self, before: ContactState, after: ContactState, branch: Branch, other: ContactState
+    ) -> Jump:
+        """Jump between two states; ``other`` is where another rule of descent would have led."""
+        raced = other is not after
+        at_stake = abs(other.energy - after.energy) / self.period
+        jump = Jump.between(before, after, branch, self.period, raced=raced, at_stake=at_stake)
         if self.problem.control.is_load and not after.patches:
             # The load's own work is not counted, which may leave less than nothing.
             jump = replace(jump, energy_drop=before.energy / self.period)

@@ -234,18 +234,18 @@ def test_last_gap_stays_open_as_the_separation_goes_to_zero():
     assert method.fields(state, 256).gap.mean() == pytest.approx(1e-3 * AMPLITUDE, rel=1e-3)
 
 
-def test_two_equal_maxima_touch_and_leave_together():
+def test_two_equal_maxima_touch_together_and_leave_as_in_sharp():
+    """Apart they are unstable before both could leave together: one of them leads."""
     two = Profile(PERIOD, np.array([0, 0, AMPLITUDE / 2], dtype=complex))
-    one = single_wave(AMPLITUDE, PERIOD / 2)
-    gamma = 0.1 * wave(0.2).work_of_adhesion
-    a, b = (
-        run_loop(
-            GridMethod(Problem(p, HALF_SPACE, gamma), nodes=n), max_penetration=0.5, load_steps=10
-        )
-        for p, n in ((two, 1024), (one, 512))
+    problem = Problem(two, HALF_SPACE, 0.1 * wave(0.2).work_of_adhesion)
+    grid, sharp = (
+        run_loop(method, max_penetration=0.5, load_steps=10)
+        for method in (GridMethod(problem, nodes=2048), make_method("sharp", problem))
     )
-    assert set(a.patches.tolist()) == {0, 2}
-    assert a.loss == pytest.approx(b.loss, rel=1e-4)
+    steps = [(0, 2), (2, 1), (1, 0)]
+    for result in (grid, sharp):
+        assert [(j.patches_before, j.patches_after) for j in result.jumps] == steps
+    assert grid.loss == pytest.approx(sharp.loss, rel=5e-3)
 
 
 def test_partial_loop_closes_and_reload_returns_to_the_same_state():

@@ -1,0 +1,207 @@
+"""Rule of descent: linear kinetics of the edges, in both methods, and the way off a saddle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
+from solver.grid.method import GridMethod
+from solver.sharp.balance import imbalance, moved_gaps, tangent_of
+from solver.sharp.field import RULES, choose_kinds, map_gaps, solve
+from solver.sharp.kinetics import flow_step, hessian, leaving_step
+from solver.sharp.method import SharpMethod
+
+SOLID = HalfSpace(1e6, 0.5)
+PHASES = [
+    0.07427745862364432, 2.8303468781729233, -2.2358110930610913, 2.8189476143269747,
+    -1.1822978560010347, -0.4817541292647971, 2.0590161226172397, -0.5705186522445032,
+    0.3116063297162208, -2.9684336381820478, 1.5928698396029661, 0.23966150518651785,
+    -1.0698271771715926, 1.8122509915502087, -1.2365633569567,
+]  # fmt: skip
+
+
+def race() -> Problem:
+    """Profile on which the rule of descent decides the first snap-in."""
+    m = np.arange(2, 17)
+    a = np.zeros(17, dtype=complex)
+    a[2:] = m**-1.3 * np.exp(1j * np.array(PHASES))
+    profile = Profile(0.4e-3 * np.pi, a)
+    return Problem(profile.scaled(1e-6 / profile.h_rms), SOLID, 0.07)
+
+
+# ------------------------------------------------------------------ one step
+
+
+def explicit_flow(
+    matrix: np.ndarray, force: np.ndarray, limit: np.ndarray, steps: int
+) -> np.ndarray:
+    """Explicit Euler steps of ṅ = f - Hn until an edge is at 0.95 of its limit or all rest."""
+    n = np.zeros_like(force)
+    dt = 0.002 / np.abs(np.linalg.eigvalsh(matrix)).max()
+    for _ in range(steps):
+        n = n + dt * (force - matrix @ n)
+        if np.any(np.abs(n) > 0.95 * limit):
+            break
+    return n
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_step_lies_on_the_linear_flow(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 7))
+    root = rng.normal(size=(count, count))
+    matrix = root + root.T  # indefinite
+    force, limit = rng.normal(size=count), rng.uniform(0.05, 0.2, count)
+    values, vectors = np.linalg.eigh(matrix)
+    step = flow_step(values, vectors, force, limit, 0.0)
+    reach = np.abs(step / limit).max()
+    assert 0.9 <= reach <= 1
+    exact = explicit_flow(matrix, force, limit * reach / 0.95, 200_000)
+    np.testing.assert_allclose(step, exact, atol=2e-2 * limit.min())
+
+
+def test_without_a_limit_in_reach_a_step_is_newtons():
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(5, 5))
+    matrix = root @ root.T + np.eye(5)
+    force = rng.normal(size=5)
+    values, vectors = np.linalg.eigh(matrix)
+    step = flow_step(values, vectors, force, np.full(5, 1e3), 0.0)
+    np.testing.assert_allclose(step, np.linalg.solve(matrix, force), rtol=1e-10)
+
+
+def test_an_edge_of_small_force_is_slow():
+    """Two edges that do not feel each other move as their forces are, not equally fast."""
+    values, vectors = np.linalg.eigh(np.diag([-1e-6, -1e-6]))
+    step = flow_step(values, vectors, np.array([1.0, -0.25]), np.array([0.1, 0.1]), 0.0)
+    assert step[1] == pytest.approx(-0.25 * step[0], rel=1e-5)
+
+
+def test_rounding_does_not_pull_at_an_unstable_mode():
+    """A symmetric pull of two equal edges, with an error of 1e-9, moves them equally."""
+    matrix = np.array([[1.0, 2.0], [2.0, 1.0]])  # the antisymmetric mode is unstable
+    values, vectors = np.linalg.eigh(matrix)
+    step = flow_step(values, vectors, np.array([0.3, 0.3 + 1e-9]), np.full(2, 10.0), 0.0)
+    assert step[0] == pytest.approx(step[1], rel=1e-8)
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
+    """Four equal edges on a ring: the way out is the same but for the place of its leader."""
+    ring = -np.eye(4) + 0.3 * (np.roll(np.eye(4), 1, 0) + np.roll(np.eye(4), -1, 0))
+    values, vectors = np.linalg.eigh(ring + 1e-12 * np.diag(np.arange(4.0)))
+    first = np.roll(np.arange(4.0), turn)
+    step = leaving_step(values, vectors, np.full(4, 0.1), first)
+    lead = int(np.argmin(first))
+    reference = leaving_step(values, vectors, np.full(4, 0.1), np.arange(4.0))
+    np.testing.assert_allclose(np.roll(step, -lead), reference, atol=1e-9)
+    assert step[lead] == pytest.approx(0.1)
+
+
+def test_the_hessian_is_the_derivative_of_the_forces():
+    profile = self_affine_profile(0.8, period=2e-3, n0=3, ratio=4, seed=1, h_rms=1e-6)
+    method = SharpMethod(Problem(profile, SOLID, 0.01), accuracy=1e-6)
+    edges, panels = method.edges, method.edges.source.panels
+    gaps = np.array([[0.3, 1.7], [2.1, 4.4], [5.0, 6.4]])
+    kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
+
+    def forces(at: np.ndarray, fields: int):
+        of = solve(
+            at, 0.5 * profile.h_max * profile.q0, edges.law.hold, kinds, fields, RULES, panels
+        )
+        residual, drift = imbalance(of, edges.law, panels)
+        return of, residual, drift, residual * (2 * of.opening - residual)
+
+    of, residual, drift, _ = forces(gaps, 2)
+    tangent, _ = tangent_of(of, drift, RULES)
+    matrix = hessian(of.opening, residual, drift, tangent)
+    np.testing.assert_array_equal(matrix, matrix.T)
+    h = 1e-5
+    for e in range(6):
+        way = np.zeros(6)
+        way[e] = h
+        slope = (forces(moved_gaps(gaps, way), 1)[3] - forces(moved_gaps(gaps, -way), 1)[3]) / h / 2
+        np.testing.assert_allclose(matrix[:, e], slope, atol=2e-4 * np.abs(matrix).max())
+
+
+# ------------------------------------------------------------------ a race
+
+
+@pytest.mark.parametrize("share", [1.0, 0.2])
+def test_a_race_ends_where_gradient_flow_does(share):
+    """Explicit gradient flow with short steps: contact 0.3202 after the snap-in, loss 5.178224."""
+    method = SharpMethod(race())
+    method.edges.law = method.edges.law._replace(longest=share * method.edges.law.longest)
+    result = run_loop(method, max_penetration=0.8, load_steps=20)
+    assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=1e-4)
+    assert result.loss_dimensionless == pytest.approx(5.178224, rel=1e-5)
+
+
+def test_a_race_is_flagged_with_what_is_at_stake():
+    """Equal speeds end elsewhere at the first snap-in, and the loop says so."""
+    result = run_loop(SharpMethod(race()), max_penetration=0.8, load_steps=20)
+    first = result.jumps[0]
+    assert first.raced
+    # the two losses, 5.178 and 5.70, differ by about a tenth; so do the energies of one jump
+    assert 0.01 * result.loss < first.at_stake < result.loss
+    assert result.races >= 1
+    assert result.energy_at_stake == pytest.approx(sum(j.at_stake for j in result.jumps))
+
+
+def test_nothing_races_where_the_rules_agree():
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=5, ratio=8, seed=3, h_rms=1e-6)
+    result = run_loop(SharpMethod(Problem(profile, SOLID, 0.02)), max_penetration=0.9, load_steps=9)
+    assert len(result.jumps) > 5
+    assert result.races == 0
+    assert result.energy_at_stake == 0
+
+
+def test_equal_speeds_end_elsewhere():
+    """The comparison rule reaches contact 0.6011 from the same first touch."""
+    method = SharpMethod(race())
+    method.edges.law = method.edges.law._replace(longest=0.2 * method.edges.law.longest)
+    start, touches = method.nucleation.first_touch()
+    gaps = method.nucleation.seeded(np.empty((0, 2)), touches)
+    found = method.edges.relax(gaps, start, 0.05 * method.edges.wave, equal_speeds=True)
+    while isinstance(found, np.ndarray):
+        found = method.edges.relax(found, start, 0.05 * method.edges.wave, equal_speeds=True)
+    contact = 1 - np.diff(found.field.gaps, axis=1).sum() / (2 * np.pi)
+    assert contact == pytest.approx(0.6011, abs=2e-3)
+
+
+def test_grid_runs_the_same_race():
+    result = run_loop(GridMethod(race(), nodes_per_wave=64), max_penetration=0.8, load_steps=20)
+    assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=2e-3)
+    assert result.loss_dimensionless == pytest.approx(5.178224, rel=5e-3)
+
+
+# ------------------------------------------------------------------ symmetry
+
+
+def equal_waves(n0: int, seed: int, g: float, shift: float = 0.0) -> Problem:
+    """Single harmonic: n0 equal crests."""
+    profile = self_affine_profile(0.8, period=2e-3, n0=n0, ratio=1, seed=seed, h_rms=1e-6)
+    gamma = g * SOLID.modulus * 1e-12 * profile.q0 * n0
+    return Problem(profile.shifted(shift * 2e-3), SOLID, gamma)
+
+
+def loss(problem: Problem, accuracy: float = 1e-3) -> float:
+    method = SharpMethod(problem, accuracy=accuracy)
+    return run_loop(method, max_penetration=0.8, load_steps=10).loss_dimensionless
+
+
+def test_equal_crests_are_left_alike_at_every_accuracy():
+    losses = [loss(equal_waves(5, 189692, 0.0227), accuracy) for accuracy in (1e-5, 1e-7)]
+    assert losses[0] == pytest.approx(losses[1], rel=1e-5)
+
+
+def test_equal_crests_are_left_alike_wherever_they_lie():
+    losses = [loss(equal_waves(5, 700793, 0.0227, shift), 1e-5) for shift in (0.0, 0.1234, 0.771)]
+    assert losses == pytest.approx([losses[0]] * 3, rel=1e-5)
+
+
+def test_grid_leaves_equal_crests_as_sharp_does():
+    problem = equal_waves(4, 499277, 0.00879)
+    grid = run_loop(GridMethod(problem, nodes_per_wave=256), max_penetration=0.8, load_steps=10)
+    assert grid.loss_dimensionless == pytest.approx(loss(problem), rel=5e-3)
