@@ -25,13 +25,21 @@ from ensemble.command.main import COMMANDS, main
 from ensemble.run import launch
 
 ROOT = Path(__file__).parent.parent.parent
-PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/**/*.md"))]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+    *(p for p in sorted(ROOT.glob("docs/**/*.md")) if "_build" not in p.parts),
+]
 
 # Commands that are read by their parser, or whose files are looked for, but that are not run here.
 NOT_RUN = {
     "make run": "sets a machine up; tests/project/test_setup.py",
     "make test": "is this",
     "make setup": "sets a machine up; tests/project/test_setup.py",
+    "make lint": "the linters; .ci/run",
+    "make test ARGS='tests/solver -k profile'": "as make test",
+    "make test ARGS='--durations=10'": "as make test",
+    "make fuzz FOR=600": "ten minutes",
+    "make check-package": "tests/project/test_package.py, slow",
     "jobs/local.sh my.toml": "all cores; tests/project/test_setup.py",
     "adhesis run my.toml --out my.h5 --ranks 9": "nine ranks; tests/ensemble/test_mpi.py",
     "adhesis run my.toml --out my.h5 --redo failed --ranks 8": "as before",
@@ -276,6 +284,8 @@ def test_commands_in_the_text_exist(page: Path) -> None:
         words = snippet.replace("[", " ").replace("]", " ").split()
         if "adhesis" in words[:-1]:
             name, *rest = words[words.index("adhesis") + 1 :]
+            if name in ("COMMAND", "--version"):
+                continue
             assert name in COMMANDS, snippet
             known = parser_of(name)._option_string_actions
             for option in (word for word in rest if word.startswith("--")):
@@ -284,6 +294,11 @@ def test_commands_in_the_text_exist(page: Path) -> None:
             assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
         for path in re.findall(r"^(?:(?:jobs|docs|tests|tools|solver|examples)/[\w/.-]+)", snippet):
             assert (ROOT / path).exists(), snippet
+
+
+def test_the_readme_lists_every_command() -> None:
+    listed = re.findall(r"^\| `adhesis (\w+)", (ROOT / "README.md").read_text(), re.MULTILINE)
+    assert sorted(listed) == sorted(COMMANDS)
 
 
 def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
