@@ -4,6 +4,9 @@ With the contact set Ω given, the stress solves V_ΩΩ σ = (h - s)_Ω. V is po
 Ω that leaves a node free. The opposite-order operator E*|q|/2, restricted to Ω, is the
 preconditioner: with it the number of iterations grows only like log n (see e.g. Rey, Anciaux &
 Molinari, Comput. Mech. 60 (2017) for FFT contact solvers). Two pairs of transforms an iteration.
+
+Where the separation is not fixed (:mod:`solver.control`) a second solution, V_ΩΩ σ₁ = 1, tells how
+the stress follows it: σ = σ₀ - (s - s₀) σ₁, and s from what is prescribed.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.control import Control
 from solver.grid.elasticity import ElasticGrid
 from solver.grid.kernels import advance, dot, turn
 from solver.profile import Array
@@ -28,6 +32,24 @@ _ENERGY_TOLERANCE = 0.05
 
 
 @dataclass
+class Yield:
+    """How a contact gives way where its separation is not fixed.
+
+    Attributes
+    ----------
+    stress, displacement : array, shape (n,)
+        σ₁ in Pa/m and Vσ₁: what a unit of separation takes from the stress.
+    """
+
+    stress: Array
+    displacement: Array
+
+    def copy(self) -> Yield:
+        """Return a copy that shares no array with this one."""
+        return Yield(self.stress.copy(), self.displacement.copy())
+
+
+@dataclass
 class Contact:
     """A contact set with its stress, not necessarily in equilibrium with respect to its edges.
 
@@ -35,6 +57,8 @@ class Contact:
     ----------
     separation : float
         s in m.
+    prescribed : float
+        What the control prescribes, x of :mod:`solver.control`.
     mask : bool array, shape (n,)
         The contact nodes Ω.
     stress : array, shape (n,)
@@ -47,27 +71,41 @@ class Contact:
         In J/m, from below; its error is of second order in the residual.
     energy_error : float
         Estimate from above of that error, in J/m.
+    yields : Yield or None
+        None at fixed separation.
     """
 
     separation: float
+    prescribed: float
     mask: Mask
     stress: Array
     displacement: Array
     residual: float = 0.0
     elastic_energy: float = 0.0
     energy_error: float = 0.0
+    yields: Yield | None = None
 
     def copy(self) -> Contact:
         """Return a copy that shares no array with this one."""
         return Contact(
             self.separation,
+            self.prescribed,
             self.mask.copy(),
             self.stress.copy(),
             self.displacement.copy(),
             self.residual,
             self.elastic_energy,
             self.energy_error,
+            self.yields.copy() if self.yields is not None else None,
         )
+
+    def at(self, prescribed: float, control: Control) -> Contact:
+        """Return a copy, yet to be solved, where x is ``prescribed``."""
+        moved = self.copy()
+        moved.prescribed = prescribed
+        if control.is_fixed:
+            moved.separation = prescribed
+        return moved
 
 
 class ContactSolver:
@@ -80,6 +118,7 @@ class ContactSolver:
         h in m.
     closing_gap : float
         Gap in m that adhesion just closes beside an edge: the unit of residuals.
+    control : Control
 
     Attributes
     ----------
@@ -87,7 +126,10 @@ class ContactSolver:
         Counters.
     """
 
-    def __init__(self, elastic: ElasticGrid, height: Array, closing_gap: float) -> None:
+    def __init__(
+        self, elastic: ElasticGrid, height: Array, closing_gap: float, control: Control
+    ) -> None:
+        self.control = control
         self.elastic = elastic
         self.height = height
         self.closing_gap = closing_gap
@@ -99,7 +141,12 @@ class ContactSolver:
     def empty(self, separation: float) -> Contact:
         """Contact state without contact nodes."""
         n = self.elastic.n
-        return Contact(separation, np.zeros(n, dtype=bool), np.zeros(n), np.zeros(n))
+        prescribed = self.control.prescribed(separation, 0.0)
+        nothing = np.zeros(n)
+        contact = Contact(separation, prescribed, np.zeros(n, dtype=bool), nothing, np.zeros(n))
+        if not self.control.is_fixed:
+            contact.yields = Yield(np.zeros(n), np.zeros(n))
+        return contact
 
     def solve(self, contact: Contact, tolerance: float) -> None:
         """Bring stress, displacement and energy of ``contact`` to its contact set, in place.
@@ -120,11 +167,53 @@ class ContactSolver:
         self.solves += 1
         most = tolerance * self.closing_gap
         energy_tolerance = _ENERGY_TOLERANCE * tolerance * self._closing_energy
-        elastic = self.elastic
         inside = contact.mask.astype(np.float64)
-        stress = contact.stress
-        stress *= inside
         target = self.height - contact.separation
+        stress = contact.stress
+        displacement, contact.residual, gain = self._solve(
+            inside, stress, target, most, energy_tolerance
+        )
+        contact.displacement = displacement
+        contact.energy_error = gain if np.isfinite(gain) else 0.0
+        if contact.yields is not None:
+            self._give_way(contact, contact.yields, inside, most)
+            target = self.height - contact.separation
+            displacement = contact.displacement
+        # max over σ of ∫σ(h - s) - ½∫σv is the elastic energy: errors enter quadratically.
+        contact.elastic_energy = self.elastic.dx * (
+            dot(stress, target) - 0.5 * dot(stress, displacement)
+        )
+
+    def _give_way(self, contact: Contact, gives: Yield, inside: Array, most: float) -> None:
+        """Bring a solved contact to the separation that belongs to what is prescribed, in place."""
+        scale = float(np.abs(self.height).max())
+        gives.displacement, residual, _ = self._solve(
+            inside, gives.stress, np.ones_like(inside), most / scale, np.inf
+        )
+        mean, per_separation = float(contact.stress.mean()), float(gives.stress.mean())
+        control = self.control
+        if control.is_load:
+            if per_separation == 0:
+                return  # no contact carries nothing
+            way = (mean + contact.prescribed) / per_separation
+        else:
+            compliance = 1 / control.stiffness
+            rest = contact.prescribed - contact.separation + mean * compliance
+            way = rest / (1 + per_separation * compliance)
+        contact.stress -= way * gives.stress
+        contact.displacement = contact.displacement - way * gives.displacement
+        contact.separation += way
+        contact.residual += abs(way) * residual
+
+    def _solve(
+        self, inside: Array, stress: Array, target: Array, most: float, energy_tolerance: float
+    ) -> tuple[Array, float, float]:
+        """Bring ``stress``, in place, to where its displacement is the target on Ω.
+
+        Returns the displacement, the largest residual, and what the last iteration gained, in J/m.
+        """
+        elastic = self.elastic
+        stress *= inside
         displacement = elastic.displacement(stress).copy()
         residual = (target - displacement) * inside
         direction = np.zeros_like(residual)
@@ -154,10 +243,4 @@ class ContactSolver:
                 f"conjugate gradients stalled at a residual of {largest:.3e} m "
                 f"(wanted {most:.3e} m, {int(inside.sum())} contact nodes)"
             )
-        contact.displacement = displacement
-        contact.residual = largest
-        contact.energy_error = gain if np.isfinite(gain) else 0.0
-        # max over σ of ∫σ(h - s) - ½∫σv is the elastic energy: errors enter quadratically.
-        contact.elastic_energy = elastic.dx * (
-            dot(stress, target) - 0.5 * dot(stress, displacement)
-        )
+        return displacement, largest, gain

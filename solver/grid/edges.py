@@ -106,6 +106,9 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
             s_grow[edge] = compliance(w[k], near_gap, others)
             s_recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
 
+    give, opening = lattice.extra_compliance(contact, outer)
+    s_grow += give * opening**2
+    s_recede += give * opening**2  # a node that leaves has the opening of the one beside it
     t = contact.displacement[outer] - lattice.height[outer] + contact.separation
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < overlap_below

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from solver.control import Control
 from solver.grid.compliance import EdgeCompliance
 from solver.grid.contact import EDGE_COMPLIANCE, Contact
 from solver.grid.elasticity import ElasticGrid
@@ -25,6 +27,9 @@ class Lattice:
         h in m.
     adhesion : array
         γ sqrt(1 + h'²) in J/m².
+    control : Control
+    h_max : float
+        In m.
     origin : int
         Node at the highest crest.
     """
@@ -33,6 +38,8 @@ class Lattice:
     compliance: EdgeCompliance
     height: Array
     adhesion: Array
+    control: Control
+    h_max: float
     origin: int = 0
 
     @classmethod
@@ -45,6 +52,8 @@ class Lattice:
             EdgeCompliance(elastic.kernel()),
             profile.heights(n),
             problem.work_of_adhesion * np.sqrt(1 + profile.slopes(n) ** 2),
+            problem.control,
+            profile.h_max,
             round(profile.highest_point[0] / elastic.dx) % n,
         )
 
@@ -67,6 +76,23 @@ class Lattice:
         closing = float(np.sqrt(2 * work_of_adhesion * EDGE_COMPLIANCE * self.dx / modulus))
         return max(closing, 0.125 * self.dx**2 * curvature)
 
+    def extra_compliance(self, contact: Contact, nodes: NDArray[np.intp]) -> tuple[float, Array]:
+        """What giving way adds to the compliance of nodes beside an edge, c g gᵀ; 0 at fixed s.
+
+        g = ∂t/∂s with the contact set held, by reciprocity also the share of a node's pull that
+        reaches the mean stress; c = dx/(λ (k - ∂p̄/∂s)).
+        """
+        if contact.yields is None or not contact.mask.any():
+            return 0.0, np.zeros(nodes.size)
+        k, held = self.control.stiffness, float(contact.yields.stress.mean())
+        opening = 1 - contact.yields.displacement[nodes]
+        return self.dx / (self.elastic.period * (k + held)), opening
+
+    def conjugate(self, contact: Contact) -> float:
+        """Y of :mod:`solver.control`: p̄ in Pa, under a load s - h_max in m."""
+        mean_stress = float(contact.stress.mean())
+        return self.control.conjugate(contact.separation, mean_stress, self.h_max)
+
     def gap(self, contact: Contact) -> Array:
         """Gap t = v - h + s in m at every node."""
         return contact.displacement - self.height + contact.separation
@@ -76,5 +102,16 @@ class Lattice:
         return -self.dx * float(np.sum(self.adhesion[contact.mask]))
 
     def energy(self, contact: Contact) -> float:
-        """U in J/m, per period."""
-        return contact.elastic_energy + self.adhesion_energy(contact)
+        """W of :mod:`solver.control` in J/m, per period: U at fixed separation.
+
+        Under a tension nothing is as low as no contact.
+        """
+        energy = contact.elastic_energy + self.adhesion_energy(contact)
+        if self.control.is_fixed:
+            return energy
+        if self.control.is_load and contact.prescribed > 0 and not contact.mask.any():
+            return -np.inf
+        mean_stress = float(contact.stress.mean())
+        return self.control.potential(
+            energy, contact.separation, mean_stress, self.h_max, self.elastic.period
+        )

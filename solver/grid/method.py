@@ -102,7 +102,7 @@ class GridMethod(Method):
         self.nodes = n
         self.lattice = lattice = Lattice.of(problem, n)
         closing = lattice.closing_gap(problem.work_of_adhesion, float(np.sqrt(profile.m4)))
-        self.solver = ContactSolver(lattice.elastic, lattice.height, closing)
+        self.solver = ContactSolver(lattice.elastic, lattice.height, closing, problem.control)
         self.relaxation = Relaxation(
             lattice,
             self.solver,
@@ -114,22 +114,26 @@ class GridMethod(Method):
 
     # ------------------------------------------------------------------ contract
 
-    def follow(self, state: ContactState, separation: float) -> Path:
-        """Follow the quasi-static path from ``state`` to ``separation`` (m).
+    def follow(self, state: ContactState, prescribed: float) -> Path:
+        """Follow the quasi-static path from ``state`` to where x is ``prescribed``.
 
         See :class:`~solver.method.Method`. A state without contact stays without contact down to
         s = h_max, where the surfaces touch.
         """
-        branch: Branch = "loading" if separation <= state.separation else "unloading"
+        control = self.problem.control
+        branch: Branch = "unloading"
+        if prescribed <= self.problem.prescribed_in(state):
+            branch = "loading"
         steps = Steps(self.problem, self.relaxation, self.accuracy, branch, self.count)
         h_max = self.problem.profile.h_max
         if state.patches == 0:
-            if separation > h_max:
-                return Path((self.detached(separation),), ())
+            if prescribed > control.prescribed(h_max, 0.0):
+                apart = state.separation if control.is_load else prescribed
+                return Path((self.detached(apart),), ())
             contact = steps.first_touch(h_max)
         else:
             contact = self._contact(state)
-        steps.run(contact, separation)
+        steps.run(contact, prescribed)
         return Path(tuple(steps.states), tuple(steps.jumps))
 
     def fields(self, state: ContactState, n: int) -> Fields:
@@ -188,6 +192,7 @@ class GridMethod(Method):
     def _contact(self, state: ContactState) -> Contact:
         """Contact of a state of this method, solved from its contact set alone."""
         contact = self.solver.empty(state.separation)
+        contact.prescribed = self.problem.prescribed_in(state)
         if state.patches:
             contact.mask = mask_of(self.lattice, state)
             self.solver.solve(contact, self.relaxation.tight)

@@ -43,6 +43,7 @@ def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     width, left, right = edges.width[:count], edges.gap[:count], edges.gap[count:]
     t = contact.displacement[edges.outer] - lattice.height[edges.outer] + contact.separation
     pull = contact.stress[edges.inner]
+    give, opening = lattice.extra_compliance(contact, edges.outer)
     found: list[Pair] = []
 
     def near(one: int, two: int, cost: Array, nodes: Indices) -> bool:
@@ -53,7 +54,9 @@ def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     def price(one: int, two: int, direction: int, s: Array) -> None:
         nodes = edges.outer if direction > 0 else edges.inner
         adhesive = float(adhesion[nodes[one]] + adhesion[nodes[two]])
-        s11, s12, s22 = float(s[0, 0]), float(s[0, 1]), float(s[1, 1])
+        g1, g2 = float(opening[one]), float(opening[two])
+        s11, s22 = float(s[0, 0]) + give * g1 * g1, float(s[1, 1]) + give * g2 * g2
+        s12 = float(s[0, 1]) + give * g1 * g2
         if direction > 0:
             a, b = float(t[one]), float(t[two])
             form = (s22 * a * a - 2 * s12 * a * b + s11 * b * b) / (s11 * s22 - s12 * s12)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from solver.grid.edges import patch_ranges
 from solver.grid.relax import Relaxation
 from solver.grid.states import state_of
 from solver.jumps import Branch, Jump
-from solver.method import ContactState
+from solver.method import ContactState, PathError
 from solver.problem import Problem
 
 
@@ -50,9 +50,15 @@ class Steps:
         self.count = count
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
+        self.reached = np.nan  # what was prescribed in the last state
         self.energy = self.lattice.energy
         self.period = problem.profile.period
-        self.h_max = problem.profile.h_max
+        self.problem = problem
+        control, h_max = problem.control, problem.profile.h_max
+        # Range of what is prescribed.
+        self.scale = h_max if control.is_fixed else problem.stress_scale
+        if not (control.is_fixed or control.is_load):
+            self.scale = h_max + problem.stress_scale / control.stiffness
         self.adhesion_scale = problem.work_of_adhesion * self.period
 
     def first_touch(self, separation: float) -> Contact:
@@ -72,20 +78,26 @@ class Steps:
             contact = self.solver.empty(separation)
         return contact
 
-    def run(self, contact: Contact, separation: float) -> None:
-        """Go from a relaxed contact to ``separation``, appending states and jumps."""
-        start = contact.separation
-        step = separation - start
+    def run(self, contact: Contact, prescribed: float) -> None:
+        """Go from a relaxed contact to x = ``prescribed``, appending states and jumps.
+
+        Raises
+        ------
+        PathError
+            If the contact runs into full contact, as it may where the separation is not fixed.
+        """
+        control = self.lattice.control
+        step = prescribed - contact.prescribed
         # Below this stride a jump is run to its end: only then is it known how well it is located.
-        self.least = self.accuracy * self.h_max
-        while contact.separation != separation:
-            remaining = separation - contact.separation
+        self.least = self.accuracy * self.scale
+        while contact.prescribed != prescribed:
+            remaining = prescribed - contact.prescribed
             if abs(step) >= abs(remaining) * (1 - 1e-9):
-                step, target = remaining, separation
+                step, target = remaining, prescribed
             else:
-                target = contact.separation + step
-            if abs(target - separation) < 1e-12 * self.h_max:
-                target = separation
+                target = contact.prescribed + step
+            if abs(target - prescribed) < 1e-12 * self.scale:
+                target = prescribed
             after, located = self._substep(contact, target, abs(step) > self.least)
             if after is None:
                 self.count.bisections += 1
@@ -93,11 +105,15 @@ class Steps:
                 continue
             self.count.substeps += 1
             if not located:
-                self.states.append(state_of(self.lattice, after))
+                self._append(after)
             contact = after
+            if not control.is_fixed and np.count_nonzero(~contact.mask) <= 1:
+                raise PathError(self.problem.full_contact(target))
+            if control.is_load and not contact.mask.any():
+                return  # the solid has fallen off
             step *= 2
-        if not self.states or self.states[-1].separation != separation:
-            self.states.append(state_of(self.lattice, contact))
+        if not self.states or self.reached != prescribed:
+            self._append(contact)
 
     def _substep(
         self, contact: Contact, target: float, divisible: bool
@@ -107,19 +123,18 @@ class Steps:
         No contact: the step must be halved. A jump's two states are appended here.
         """
         accuracy, relaxation = self.accuracy, self.relaxation
-        stride = abs(target - contact.separation)
-        frozen = contact.copy()
-        frozen.separation = target
+        stride = abs(target - contact.prescribed)
+        frozen = contact.at(target, self.lattice.control)
         if self.adhesion_scale == 0:
             return relaxation.relax_without_adhesion(frozen), False
         self.solver.solve(frozen, relaxation.tight)
         energy = self.energy(frozen)
-        stress = float(frozen.stress.mean())
+        conjugate = self.lattice.conjugate(frozen)
         work = self.period * stride
         noise = 1e-5 * accuracy * self.adhesion_scale
 
         def jumped(now: float, relaxing: Contact) -> bool:
-            change = abs(stress - float(relaxing.stress.mean()))
+            change = abs(conjugate - self.lattice.conjugate(relaxing))
             return energy - now - work * change > noise
 
         flips = relaxation.flips
@@ -128,11 +143,16 @@ class Steps:
             return None, False
         flips = relaxation.flips - flips
         drop = energy - self.energy(relaxed)
-        change = stress - float(relaxed.stress.mean())
+        change = conjugate - self.lattice.conjugate(relaxed)
         if jumped(self.energy(relaxed), relaxed):
             allowed = max(2 * accuracy * drop, 0.02 * accuracy * self.adhesion_scale)
-            if work * abs(change) > allowed and stride > 0.01 * accuracy * self.h_max:
-                self.least = min(0.5 * stride, allowed / (self.period * abs(change)))
+            least = 0.01 * accuracy * self.scale
+            if self.lattice.control.is_load and not relaxed.mask.any():
+                # Where contact is lost counts, and s goes like a square root of the load there.
+                allowed, least = 0.0, 0.01 * accuracy * least
+            if work * abs(change) > allowed and stride > least:
+                wanted = allowed / (self.period * abs(change)) if allowed else least
+                self.least = min(0.5 * stride, wanted)
                 return None, False
             before = state_of(self.lattice, frozen)
             self.states.append(before)
@@ -143,12 +163,23 @@ class Steps:
         unrest = (
             0.25 * abs(smooth) * min(1.0, 2 * patch_ranges(frozen.mask)[0].size / max(flips, 1))
         )
-        allowed = 0.3 * accuracy * self.adhesion_scale * stride / self.h_max + unrest
+        allowed = 0.3 * accuracy * self.adhesion_scale * stride / self.scale + unrest
         if abs(drop - smooth) > allowed and divisible:
             return None, False
         return relaxed, False
 
-    def _jump(self, before: ContactState, after: Contact) -> None:
-        state = state_of(self.lattice, after)
+    def _append(self, contact: Contact) -> ContactState:
+        state = state_of(self.lattice, contact)
         self.states.append(state)
-        self.jumps.append(Jump.between(before, state, self.branch, self.period))
+        self.reached = contact.prescribed
+        return state
+
+    def _jump(self, before: ContactState, after: Contact) -> None:
+        lost = self.lattice.control.is_load and not after.mask.any()
+        if lost:
+            after.separation = before.separation
+        jump = Jump.between(before, self._append(after), self.branch, self.period)
+        if lost:
+            # The load's own work is not counted (solver.control).
+            jump = replace(jump, energy_drop=before.energy / self.period)
+        self.jumps.append(jump)

@@ -38,14 +38,19 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
     period = lattice.elastic.period
     left, right = left + wrapped * period, right + wrapped * period
     order = np.argsort(left, kind="stable")
+    mean_stress = float(contact.stress.mean())
+    control, held = lattice.control, 0.0
+    if not control.is_fixed:
+        held = control.potential(0.0, contact.separation, mean_stress, lattice.h_max, period)
     area = float(width.sum()) - 2 * EDGE_OFFSET * first.size
     return ContactState(
         separation=contact.separation,
         edges=np.column_stack((left, right))[order],
-        mean_stress=float(contact.stress.mean()),
+        mean_stress=mean_stress,
         elastic_energy=contact.elastic_energy,
         adhesion_energy=lattice.adhesion_energy(contact),
         contact_fraction=max(0.0, area / lattice.n),
+        hold_energy=held,
         internal=_Patches(first, width),
     )
 

@@ -6,6 +6,8 @@ What is claimed, and why the bounds are what they are (:mod:`solver.validate.jud
 *   energies along the branch: the adhesion energy 2γe of the resolution e at both edges;
 *   a small contact is not quite a parabola's: with ψ = πa/λ the repulsion is short by less than
     ψ²/3 of itself, the tension over by less than ψ²/6 (1 + ψ²), exactly from the two closed forms;
+*   a stiffness or a load keeps the promise of a fixed separation, but that the load at which
+    contact is lost is known to the error of the elastic solution, and s there to its square root;
 *   almost full contact differs from full contact, by reciprocity ½⟨σh⟩ = U_full + ½⟨σ_full t⟩
     exactly, so by no more than ½ s max|σ_full| over the gaps.
 """
@@ -13,9 +15,11 @@ What is claimed, and why the bounds are what they are (:mod:`solver.validate.jud
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from solver.control import Control
 from solver.loop import run_loop
 from solver.method import ContactState
 from solver.problem import Problem
@@ -33,6 +37,7 @@ from solver.validate.judge import (
     MODULUS,
     PERIOD,
     STANDARDS,
+    STIFFNESSES,
     Judge,
     Row,
     joined,
@@ -280,6 +285,40 @@ def parabola(judge: Judge) -> Iterator[Row]:
     yield judge.row("parabola: pull-off load", error, -bound * PERIOD / load)
 
 
+def controls(judge: Judge) -> Iterator[Row]:
+    """The wave held by a stiffness, and under a load."""
+    wave = wave_of(0.2)
+    p_star = wave.full_contact_stress
+    for relative in STIFFNESSES:
+        stiffness = relative * p_star / wave.amplitude
+        exact = wave.loop_under(stiffness)
+        problem = replace(problem_of(wave), control=Control(stiffness))
+        result = run_loop(
+            judge.method(problem),
+            max_penetration=0.3 if stiffness else None,
+            max_stress=None if stiffness else 0.1 * p_star,
+            load_steps=2,
+        )
+        held = f"wave held by k = {relative:g} p*/A" if stiffness else "wave under a load"
+        # Where contact is lost s goes like a square root of what is prescribed, and the loop of a
+        # load is closed there: the load is known to the error of the elastic solution.
+        late = 0.0
+        if stiffness == 0:
+            a = wave.half_width_under(0.0, exact.fold_mean_stress + judge.standard.stress * p_star)
+            way = exact.fold_separation - float(wave.separation(a))
+            late = abs(way * exact.fold_mean_stress) / exact.loss
+        for what, value, bound in (
+            ("sum of drops", result.loss_from_drops, judge.standard.loss),
+            ("loop integral", result.loss, judge.standard.loop_integral),
+        ):
+            yield judge.row(f"{held}: loss, {what}", value / exact.loss - 1, bound + late)
+        last = np.flatnonzero(result.patches)[-1]
+        off = (result.mean_stress[last] - exact.fold_mean_stress) / p_star
+        s = np.array([exact.fold_separation])
+        slack = judge.slack(wave.mean_stress_at, np.array([exact.fold_half_width]), s)[0] / p_star
+        yield judge.row(f"{held}: p̄_out / p*", off, 2 * slack)
+
+
 def audit(judge: Judge) -> Iterator[Row]:
     """Energy audit: loop integral = sum of drops."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=2, ratio=16, seed=1, h_rms=1e-6)
@@ -297,4 +336,4 @@ def audit(judge: Judge) -> Iterator[Row]:
     )
 
 
-CLAIMS = (losses, order, branch, fold, westergaard, full_contact, punch, parabola, audit)
+CLAIMS = (losses, order, branch, fold, westergaard, full_contact, punch, parabola, controls, audit)

@@ -26,6 +26,7 @@ from solver.references.single_wave import SingleWave
 from solver.registry import MethodName, make_method
 
 ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+STIFFNESSES = (10.0, 1.0, 0.1, 0.0)  # of what holds the wave, in p*/A; 0 is a load
 GRIDS = (256, 512, 1024, 2048, 4096)
 AMPLITUDE, PERIOD = 1e-9, 1e-3
 HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)

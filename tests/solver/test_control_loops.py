@@ -64,6 +64,19 @@ def test_rough_loops_are_audited_under_every_control(rough, relative):
     assert min(j.energy_drop for j in loop.jumps if j not in lost) >= 0
 
 
+@pytest.mark.parametrize("relative", [1.0, 0.0])
+def test_the_two_methods_agree_under_every_control(relative):
+    profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=4, seed=2, h_rms=1e-6)
+    unit = Problem(profile, HALF_SPACE, 0.0).stress_scale / profile.h_max
+    problem = Problem(profile, HALF_SPACE, 0.01, Control(relative * unit))
+    turn = {"max_stress": 0.3 * problem.stress_scale} if relative == 0 else {"max_penetration": 0.4}
+    grid = run_loop(make_method("grid", problem, nodes_per_wave=128), load_steps=4, **turn)
+    sharp = run_loop(make_method("sharp", problem), load_steps=4, **turn)
+    assert abs(grid.audit_residual) < 2e-3
+    assert grid.loss == pytest.approx(sharp.loss, rel=0.01)
+    assert grid.pull_off_stress == pytest.approx(sharp.pull_off_stress, rel=0.01)
+
+
 def test_a_stiff_machine_gives_the_loop_at_fixed_separation(rough):
     unit = Problem(rough, HALF_SPACE, 0.0).stress_scale / rough.h_max
     fixed = loop_of(rough, 0.01, np.inf, 0.6)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from adhesis import Problem, self_affine_profile, single_wave
+from solver.control import Control
 from solver.grid.compliance import EdgeCompliance
 from solver.grid.contact import Contact, ContactSolver
 from solver.grid.edges import patch_ranges, survey
@@ -99,8 +100,8 @@ def test_iterations_hardly_grow_with_the_grid():
 
 def test_stalled_iteration_is_reported():
     elastic = ElasticGrid(64, 1.0, 1.0)
-    solver = ContactSolver(elastic, np.cos(np.arange(64.0)), 1.0)
-    contact = Contact(0.1, np.ones(64, dtype=bool), np.zeros(64), np.zeros(64))
+    solver = ContactSolver(elastic, np.cos(np.arange(64.0)), 1.0, Control())
+    contact = Contact(0.1, 0.1, np.ones(64, dtype=bool), np.zeros(64), np.zeros(64))
     # Full contact at a mean gap: no solution exists.
     with pytest.raises(RuntimeError, match="full contact has no solution"):
         solver.solve(contact, 1e-12)
@@ -135,7 +136,7 @@ def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
     elastic = ElasticGrid(n, 2.0 * n, 1e6)
     kernel = elastic.kernel()
     compliance = EdgeCompliance(kernel)
-    lattice = Lattice(elastic, compliance, np.zeros(n), np.zeros(n))
+    lattice = Lattice(elastic, compliance, np.zeros(n), np.zeros(n), Control(), 1.0)
     errors = []
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -148,7 +149,7 @@ def test_compliance_agrees_with_the_schur_complement_of_random_contact_sets():
         mask = np.zeros(n, dtype=bool)
         for a, b in cuts.reshape(-1, 2):
             mask[a:b] = True
-        contact = Contact(1.0, mask, -np.ones(n) * mask, np.zeros(n))
+        contact = Contact(1.0, 1.0, mask, -np.ones(n) * mask, np.zeros(n))
         # Unit gap, unit tension, no adhesion: the prices are S itself.
         edges = survey(contact, lattice, -1.0)
         for k in range(edges.side.size):
