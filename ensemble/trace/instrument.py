@@ -138,4 +138,6 @@ def _tip_radius(topography: Any) -> float | None:
 
 def _one_line(error: Exception) -> str:
     text = " ".join(str(error).split()) or type(error).__name__
+    if text.startswith("tried "):
+        return "none of the readers knows it"
     return text if len(text) < 160 else text[:157] + "..."
