@@ -18,7 +18,7 @@ from solver.profile import Profile
 
 # Loops beyond this many waves are compared at a coarser cut-off when a doubt is measured.
 _MOST_WAVES_OF_VARIANTS = 8000
-_SECONDS_TO_HINT = 120.0
+_SECONDS_TO_HINT, _FEWEST_WAVES = 120.0, 50
 
 # CPU seconds of a loop by `sharp`, 40 load steps: measured from 320 waves and 6 patches (0.9 s) to
 # 20,000 waves and 8 patches (35 s); a guess within a factor of about three.
@@ -270,10 +270,12 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
     factor = 2.0
     while plan.wall * factor**-_WAVES_POWER > _SECONDS_TO_HINT / 2 and factor < 64:
         factor *= 2
-    hints = [
-        f"--cut-off {factor * prepared.cut_off * 1e6:.2g}um ({plan.waves / factor:.0f} waves) "
-        f"would take about {clock(plan.wall * factor**-_WAVES_POWER)}"
-    ]
+    hints = []
+    if plan.waves / factor >= _FEWEST_WAVES:
+        hints.append(
+            f"--cut-off {factor * prepared.cut_off * 1e6:.2g}um ({plan.waves / factor:.0f} waves) "
+            f"would take about {clock(plan.wall * factor**-_WAVES_POWER)}"
+        )
     if not quick:
         tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]
         saved = sum(plan.seconds[name] for name in tables) / max(plan.processes, 1)
