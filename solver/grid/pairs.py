@@ -16,7 +16,7 @@ from solver.grid.lattice import Lattice
 from solver.profile import Array
 
 # More than |S_12|/S_11 of any pair (0.3 across a patch of three nodes).
-_COUPLING = 0.6
+COUPLING = 0.6
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,13 @@ class Pair:
         return int(edges.inner[one]), int(edges.inner[two]), self.direction
 
 
-def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
-    """Price the pairs of edges of every patch and of every gap of a contact set (J/m)."""
+def pairs(
+    contact: Contact, edges: Edges, lattice: Lattice, coupling: float = COUPLING
+) -> list[Pair]:
+    """Price the pairs of edges of every patch and of every gap of a contact set (J/m).
+
+    Only those are priced that could pay if S coupled their edges by ``coupling``.
+    """
     count = edges.side.size // 2
     dx, adhesion, compliance = lattice.dx, lattice.adhesion, lattice.compliance
     width, left, right = edges.width[:count], edges.gap[:count], edges.gap[count:]
@@ -49,7 +54,7 @@ def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     def near(one: int, two: int, cost: Array, nodes: Indices) -> bool:
         """Whether the pair can pay at all: S couples its edges by less than half."""
         adhesive = adhesion[nodes[one]] + adhesion[nodes[two]]
-        return bool(cost[one] + cost[two] < _COUPLING * dx * adhesive)
+        return bool(cost[one] + cost[two] < coupling * dx * adhesive)
 
     def price(one: int, two: int, direction: int, s: Array) -> None:
         nodes = edges.outer if direction > 0 else edges.inner

@@ -198,15 +198,14 @@ def test_moving_an_edge_by_one_node_costs_what_the_survey_says():
 
 
 @pytest.mark.parametrize("level", [0.3e-6, 0.8e-6])
-def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level, monkeypatch):
-    monkeypatch.setattr("solver.grid.pairs._COUPLING", np.inf)  # price them all
+def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level):
     method = rough()
     contact = method.solver.empty(0.8 * level)
     contact.mask = method.lattice.height > level
     method.solver.solve(contact, 1e-6)
     edges = method.relaxation.edges(contact)
     dx = method.lattice.dx
-    found = pairs(contact, edges, method.lattice)
+    found = pairs(contact, edges, method.lattice, coupling=np.inf)  # price them all
     assert {p.direction for p in found} == {1, -1}
     now = exact_energy(method, contact.mask, contact.separation)
     unit = 2 * dx * method.problem.work_of_adhesion
