@@ -145,7 +145,7 @@ class States:
     ) -> Jump:
         """Jump between two states; ``other`` is where another rule of descent would have led."""
         raced = other is not after
-        at_stake = abs(other.energy - after.energy) / self.period
+        at_stake = abs(other.potential - after.potential) / self.period
         jump = Jump.between(before, after, branch, self.period, raced=raced, at_stake=at_stake)
         if self.problem.control.is_load and not after.patches:
             # The load's own work is not counted, which may leave less than nothing.
