@@ -5,6 +5,9 @@ the compiler's settings: after a change, callers would silently keep old code. A
 where it reads. So code is kept by :mod:`solver.code_cache`, in a folder named after the sources of
 all modules with compiled functions, the versions of numba and LLVM, the settings that change code,
 and the processor. Where no folder can be used, each process compiles anew.
+
+numba links the code of a function into all its callers and optimises it there once more. Here that
+is left to short functions; long ones are called under their symbol's name (:class:`_Kept`).
 """
 
 from __future__ import annotations
@@ -13,9 +16,11 @@ import hashlib
 import os
 import pickle
 import platform
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
 
@@ -37,6 +42,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 config: Any = _config  # its attributes are made at run time
 
 # numba's settings that change code, as numba.core.config names them
+# Functions of up to so many instructions are copied into their callers, where they may be inlined.
+# Longer ones are called: or each caller would optimise them all over again, and its own callers
+# them and it, which takes four fifths of the time to compile.
+_LONGEST_COPIED = 300
 _SETTINGS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML", "BOUNDSCHECK"),
     *("DEBUGINFO_DEFAULT", "EXTEND_VARIABLE_LIFETIMES", "LLVM_REFPRUNE_PASS"),
@@ -64,8 +73,20 @@ def compiled_finite_sums(function: F) -> F:
 
 
 def _compile(function: F, **options: Any) -> F:
+    options["no_cfunc_wrapper"] = True  # that is for calls from C
     dispatcher: Any = numba.njit(**options)(function)
     dispatcher._cache = _Kept(function)
+    template = dispatcher.get_call_template
+
+    def of_any_value(args: Any, kws: Any) -> Any:
+        unliteral: Any = numba.types.unliteral
+        return template(
+            tuple(unliteral(arg) for arg in args),
+            {name: unliteral(arg) for name, arg in kws.items()},
+        )
+
+    # otherwise a function is compiled once more for each number that stands in a call
+    dispatcher.get_call_template = of_any_value
     compiled_function: F = dispatcher
     return compiled_function
 
@@ -119,11 +140,38 @@ def kept_in_installation() -> Iterator[None]:
         _target.pop()
 
 
+@dataclass(frozen=True)
+class _Call:
+    """A function with a signature that other compiled code calls under a symbol's name."""
+
+    module: str
+    function: str
+    signature: tuple[Any, ...]
+    symbol: str
+
+    def is_ready(self) -> bool:
+        """Load it, or compile it; whether it has the name under which it is called."""
+        dispatcher: Any = getattr(sys.modules[self.module], self.function)
+        dispatcher.compile(self.signature)
+        found = dispatcher.overloads[self.signature].fndesc.llvm_func_name
+        return bool(found == self.symbol)
+
+
+def _calls_in(library: Any) -> list[_Call]:
+    """Return the calls in a library's code, its own and those in code that was copied into it."""
+    calls: dict[_Call, None] = {}
+    for other in library._linking_libraries:
+        known = getattr(other, "adhesis_calls", None)  # numba's own functions have none
+        calls.update(dict.fromkeys(_calls_in(other) if known is None else known))
+    return list(calls)
+
+
 class _Kept:
     """What numba's dispatcher asks of a cache, for one function."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._module, self._function = function.__module__, function.__qualname__
+        self._name = f"{self._module}.{self._function}"
 
     @property
     def cache_path(self) -> str:
@@ -140,17 +188,44 @@ class _Kept:
             return None
         target.refresh()
         try:
-            state = pickle.loads(content)
+            symbols, calls, copied, state = pickle.loads(content)
+            # code that this code calls must be there before it, under the name that it calls
+            ready = all(call.is_ready() for call in calls)
         except Exception:  # a damaged file can raise anything; it is compiled and written anew
             return None
-        return CompileResult._rebuild(target, *state)  # type: ignore[no-untyped-call]
+        if not ready:
+            return None
+        target.codegen()._engine._defined_symbols.update(symbols)
+        result: Any = CompileResult._rebuild(target, *state)  # type: ignore[no-untyped-call]
+        self._note(result, signature, calls, copied)
+        return result
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep the code of a signature."""
-        if result.library.has_dynamic_globals:
+        library = result.library
+        if library.has_dynamic_globals:
             raise RuntimeError(f"{self._name} holds an address of this process and cannot be kept")
-        content: bytes = dumps(result._reduce())  # type: ignore[no-untyped-call]
+        calls = _calls_in(library)
+        own = library.get_function(result.fndesc.llvm_func_name)
+        copied = sum(1 for block in own.blocks for _ in block.instructions) <= _LONGEST_COPIED
+        if not copied:
+            library._shared_module = binding.parse_assembly("")  # what callers link in
+        self._note(result, signature, calls, copied)
+        symbols = [
+            function.name
+            for function in library._final_module.functions
+            if not function.is_declaration and function.linkage == binding.Linkage.external
+        ]
+        state = result._reduce()
+        content: bytes = dumps((symbols, calls, copied, state))  # type: ignore[no-untyped-call]
         _files().write(self._file(signature), content)
+
+    def _note(self, result: Any, signature: Any, calls: list[_Call], copied: bool) -> None:
+        """Leave with the code what those call who call it."""
+        if not copied:
+            symbol = result.fndesc.llvm_func_name
+            calls = [_Call(self._module, self._function, tuple(signature), symbol)]
+        result.library.adhesis_calls = calls
 
     def flush(self) -> None:
         """Nothing to forget: a change has another folder."""

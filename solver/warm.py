@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from solver.code_cache import installed_folder
@@ -60,7 +62,7 @@ def warm(
     Compilation
         How many functions were compiled now, and the time that it took.
     """
-    with watch_compilation(tell) as seen:
+    with watch_compilation(tell) as seen, _without_collecting():
         for method in methods:
             if to_installation:
                 with kept_in_installation():
@@ -69,6 +71,18 @@ def warm(
                 _small_loops(method)
             _mark(method, to_installation)
     return seen
+
+
+@contextmanager
+def _without_collecting() -> Iterator[None]:
+    """Spare the search for circles among the millions of objects of the compiler."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def compiled_in(method: str) -> Path | None:
