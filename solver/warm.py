@@ -106,11 +106,16 @@ def _mark(method: str, to_installation: bool) -> None:
         files.write(_marker(method), json.dumps(words, indent=1).encode())
 
 
+def small_problem(work_of_adhesion: float) -> Problem:
+    """A problem with few waves, whose loops take a moment."""
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=3, h_rms=1e-6)
+    return Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
+
+
 def _small_loops(method: str) -> None:
     """Loops that call all compiled functions with all types of arguments that loops call them."""
     for work_of_adhesion in (0.04, 0.0):
-        profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=3, h_rms=1e-6)
-        problem = Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
+        problem = small_problem(work_of_adhesion)
         chosen = (
             make_method("grid", problem, nodes_per_wave=8)
             if method == "grid"

@@ -23,6 +23,7 @@ from solver.method import (
     Path,
     PathError,
 )
+from solver.one_thread import on_one_thread
 from solver.problem import Problem
 from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point
 from solver.sharp.follow import Follower, Resolution, Target
@@ -117,6 +118,7 @@ class SharpMethod(Method):
             **asdict(self.edges.count),
         )
 
+    @on_one_thread
     def fields(self, state: ContactState, n: int) -> Fields:
         """Stress, displacement and gap of ``state`` on n nodes, by quadrature over the gaps."""
         field = None
@@ -130,6 +132,7 @@ class SharpMethod(Method):
             return []
         return openings_of(self.edges.field(state.internal, self.states.place(state)), self.q0)
 
+    @on_one_thread
     def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the quasi-static path; see the contract."""
         branch: Branch = "unloading"

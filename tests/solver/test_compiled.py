@@ -6,6 +6,7 @@ import ast
 import importlib
 import pkgutil
 import shutil
+import sys
 import types
 import warnings
 from pathlib import Path
@@ -229,3 +230,39 @@ def test_kept_code_gives_the_same_bits(places, monkeypatch):
     with module.watch_compilation() as seen:
         again = module.compiled_finite_sums(dot.py_func)(a, b)
     assert (seen.functions, again) == (0, first)
+
+
+def inner(x):
+    return x + 1
+
+
+def outer(x):
+    return 2 * inner(x)
+
+
+@pytest.mark.parametrize("lost", [False, True], ids=["kept", "lost"])
+def test_code_that_is_called_and_not_copied_comes_with_its_caller(places, monkeypatch, lost):
+    """And if it is missing, or another process has put other code there, both are compiled anew."""
+    monkeypatch.setattr(module, "_LONGEST_COPIED", 0)
+    plain, here = inner, sys.modules[__name__]
+
+    def call() -> int:
+        use_new_files(monkeypatch)
+        monkeypatch.setattr(here, "inner", module.compiled(plain))
+        with module.watch_compilation() as seen:
+            assert module.compiled(outer)(4) == 10
+        return seen.functions
+
+    assert call() == 2
+    if lost:
+        (callee,) = (places[1] / "key").glob("*.inner-*")
+        callee.unlink()
+    assert call() == (2 if lost else 0)
+    assert call() == 0
+
+
+def test_numbers_in_a_call_make_no_code_of_their_own(places, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "inner", module.compiled(inner))
+    ahead = module.compiled(lambda: inner(1) + inner(2))
+    assert ahead() == 5
+    assert len(inner.signatures) == 1

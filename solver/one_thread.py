@@ -1,0 +1,37 @@
+"""Linear algebra on one thread, wherever the process was started.
+
+The libraries beneath numpy and scipy start a thread a core for matrices of some tens of rows. They
+gain nothing there, wait for one another on a busy machine, and the number of threads changes the
+last bits of a sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, wraps
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def on_one_thread(function: F) -> F:
+    """Let linear algebra use one thread while ``function`` runs, and as before afterwards."""
+
+    @wraps(function)
+    def limited(*args: Any, **kwargs: Any) -> Any:
+        with _libraries().limit(limits=1):
+            return function(*args, **kwargs)
+
+    limited_function: Any = limited
+    answer: F = limited_function
+    return answer
+
+
+@cache
+def _libraries() -> Any:
+    # The search finds what is loaded: compiled code loads these at its first call.
+    import scipy.linalg.cython_blas
+    import scipy.linalg.cython_lapack  # noqa: F401
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -1,0 +1,50 @@
+"""From Python, without variables of the environment, linear algebra uses one thread."""
+
+from __future__ import annotations
+
+import pytest
+from scipy.linalg import cython_lapack  # noqa: F401  # a library of its own
+from threadpoolctl import ThreadpoolController
+
+from solver.loop import run_loop
+from solver.registry import make_method
+from solver.sharp.edges import EdgeMechanics
+from solver.warm import small_problem
+
+
+def threads() -> set[int]:
+    libraries = ThreadpoolController().select(user_api="blas").info()
+    assert libraries
+    return {library["num_threads"] for library in libraries}
+
+
+def test_a_loop_and_its_fields_use_one_thread_and_leave_the_number_as_it_was(monkeypatch):
+    seen: list[set[int]] = []
+    solve, equilibrium = EdgeMechanics.field, EdgeMechanics.equilibrium
+
+    def watched(original):
+        def call(*args, **kwargs):
+            if len(seen) < 3:
+                seen.append(threads())
+            return original(*args, **kwargs)
+
+        return call
+
+    monkeypatch.setattr(EdgeMechanics, "equilibrium", watched(equilibrium))
+    with ThreadpoolController().limit(limits=2):
+        if threads() != {2}:
+            pytest.skip("this linear algebra has no threads")
+        method, states = make_method("sharp", small_problem(0.04)), []
+        run_loop(
+            method,
+            max_penetration=0.5,
+            load_steps=1,
+            on_state=lambda _, state: states.append(state),
+        )
+        assert seen == [{1}] * 3
+        assert threads() == {2}
+        seen.clear()
+        monkeypatch.setattr(EdgeMechanics, "field", watched(solve))
+        method.fields(max(states, key=lambda state: state.patches), 256)
+        assert seen == [{1}]
+        assert threads() == {2}
