@@ -9,11 +9,16 @@ import numpy as np
 from solver.jumps import Branch
 from solver.method import ContactState
 from solver.profile import Array
-from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point, outward
 from solver.sharp.states import States, Trace
 from solver.sharp.touch import Nucleation, Touch
 
 _RAN = 0.05  # an edge that went further than this, in λ_min, ran
+_HELD_BACK = 0.03  # runners that take less than this share of C_c² from each other do not race
+_ELSEWHERE = 0.01  # edges this far apart, in λ_min, are those of different minima
+
+Rival = Point | None | FullContact
+"""Where equal speeds led: a minimum, no contact, or full contact (under a load)."""
 
 
 class Jumps:
@@ -43,13 +48,20 @@ class Jumps:
         Returns the minimum as it was found: next to a fold it may not be found again from its own
         edges. None if no contact is left.
         """
-        point, ran = self._settle(start, at, branch, touches or [])
+        rivals: list[Rival] = []
+        point = self._descend(start, at, touches or [], rivals)
+        while branch == "loading" and point is not None:
+            ready = self.nucleation.ready(self.nucleation.minima(point.field))
+            grown = self._descend(point.field.gaps, at, ready, rivals) if ready else None
+            if grown is None or self._same(grown.field.gaps, point.field.gaps):
+                break
+            point = grown
         after = self._after(before, point, at)
         other = after
-        if ran:
+        if rivals:
             try:
-                rival, _ = self._settle(start, at, branch, touches or [], equal_speeds=True)
-            except FullContact:  # elsewhere, and it has no energy that could be compared
+                rival = self._settle(rivals[0], at, branch)
+            except FullContact:  # elsewhere, but with no energy that could be compared
                 other = replace(after)
             else:
                 if not self._alike(rival, point):
@@ -62,58 +74,85 @@ class Jumps:
         """State that a descent led to."""
         return self.states.after_loss(before, at) if point is None else self.states.of_point(point)
 
-    def _settle(
-        self,
-        start: Array,
-        at: float,
-        branch: Branch,
-        touches: list[Touch],
-        *,
-        equal_speeds: bool = False,
-    ) -> tuple[Point | None, bool]:
-        """Descend from the gaps ``start`` until nothing touches any more.
-
-        Returns the minimum, None if no contact is left, and whether several edges ran.
-        """
-        point, ran = self._descend(start, at, touches, equal_speeds)
+    def _settle(self, point: Rival, at: float, branch: Branch) -> Point | None:
+        """Go on with equal speeds, from a minimum that they reached, until nothing touches."""
+        if isinstance(point, FullContact):
+            raise point
         while branch == "loading" and point is not None:
             ready = self.nucleation.ready(self.nucleation.minima(point.field))
             if not ready:
                 break
-            grown, more = self._descend(point.field.gaps, at, ready, equal_speeds)
+            seeded = self.nucleation.seeded(point.field.gaps, ready)
+            grown = self._relax(seeded, at, equal_speeds=True)
             if grown is None or self._same(grown.field.gaps, point.field.gaps):
                 break
-            point, ran = grown, ran or more
-        return point, ran
+            point = grown
+        return point
 
     def _alike(self, one: Point | None, other: Point | None) -> bool:
         """Whether two descents led to one minimum."""
         if one is None or other is None:
             return one is other
-        return self._same(one.field.gaps, other.field.gaps)
+        here, there = one.field.gaps, other.field.gaps
+        apart = max(_ELSEWHERE * self.edges.wave, 10 * self.edges.coarse)
+        return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
     def _same(self, one: Array, other: Array) -> bool:
         """Whether two equilibria are one to the accuracy at which they are known."""
         return one.shape == other.shape and bool(np.abs(one - other).max() < 10 * self.edges.coarse)
 
     def _descend(
-        self, gaps: Array, at: float, touches: list[Touch], equal_speeds: bool
-    ) -> tuple[Point | None, bool]:
-        """Descend to the next minimum of the energy, as :meth:`_settle` does."""
+        self, gaps: Array, at: float, touches: list[Touch], rivals: list[Rival]
+    ) -> Point | None:
+        """Descend to the next minimum of the energy; None when no contact is left.
+
+        Where edges may have raced, a minimum that equal speeds lead to instead is added to
+        ``rivals``, unless there is one.
+        """
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
-        ran = False
+        point = self._relax(gaps, at)
+        if not rivals and self._may_have_raced(gaps, point):
+            try:
+                rival = self._relax(gaps, at, equal_speeds=True)
+            except FullContact as full:
+                rivals.append(full)
+            else:
+                if not self._alike(rival, point):
+                    rivals.append(rival)
+        return point
+
+    def _relax(self, gaps: Array, at: float, *, equal_speeds: bool = False) -> Point | None:
         while len(gaps):
             found = self.edges.relax(
                 gaps, at, CORRECTED * self.edges.wave, equal_speeds=equal_speeds
             )
             if isinstance(found, Point):
-                return found, ran or self._several_ran(gaps, found.field.gaps)
-            ran = True
+                return found
             gaps = found
-        return None, ran
+        return None
 
-    def _several_ran(self, before: Array, after: Array) -> bool:
-        """Whether more than one edge went further than edges near equilibrium do."""
-        way = np.abs(after - before)
-        return int(np.count_nonzero(way > _RAN * self.edges.wave)) > 1
+    def _may_have_raced(self, start: Array, end: Point | None) -> bool:
+        """Whether the order in which edges ran from ``start`` can have decided where they ended.
+
+        It can where they hold each other back: edges that only help each other on reach the same
+        minimum in any order. So the force is asked for that the runners took from each other, to
+        first order in their ways and with the tangent at the end. Where patches or gaps went, that
+        cannot be asked.
+        """
+        if end is None:
+            return len(start) > 1
+        gaps = end.field.gaps
+        if gaps.shape != start.shape:
+            return True
+        side = outward(gaps)
+        way = side * (gaps - start).ravel()
+        runners = np.flatnonzero(np.abs(way) > _RAN * self.edges.wave)
+        if len(runners) < 2:
+            return False
+        opening = end.field.solution.opening
+        stiffness = opening[:, None] * end.field.derivatives[0] * side
+        taken = (stiffness + stiffness.T) * np.sign(way)[:, None] * way
+        np.fill_diagonal(taken, 0.0)
+        held_back = np.maximum(taken[np.ix_(runners, runners)], 0.0).sum(axis=1)
+        return bool(held_back.max() > _HELD_BACK * self.edges.critical**2)
