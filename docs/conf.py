@@ -45,7 +45,7 @@ sphinx_gallery_conf = {
     "examples_dirs": str(ROOT / "examples"),
     "gallery_dirs": "gallery",
     "filename_pattern": r"/\d_",
-    "ignore_pattern": r"measured_profile|__init__",
+    "ignore_pattern": r"(^|/)(?!\d_)[^/]*\.py$",  # programs with options of their own
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
     "remove_config_comments": True,
