@@ -389,10 +389,7 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
     Y is p, under a load q0 s.
     """
     edges = 2 * of.slope.shape[0]
-    load, area = _singular_loads(
-        of.table, of.slope, of.kinds, of.offset, rules.counts, rules.start, rules.square,
-        rules.eta, rules.b, of.theta, of.weight, of.matrix, rules.w,
-    )  # fmt: skip
+    load, area = _singular_loads(of, rules)
     solve_factored(of.factor, load)
     p = area
     for i in range(load.shape[0]):
@@ -591,26 +588,16 @@ def edge_openings(
 
 
 @compiled
-def _singular_loads(
-    table: Array,
-    slope: Array,
-    kinds: Kinds,
-    offset: Kinds,
-    counts: Kinds,
-    start: Kinds,
-    square: Kinds,
-    eta: Array,
-    b: Array,
-    theta: Array,
-    weight: Array,
-    matrix: Array,
-    w: Array,
-) -> tuple[Array, Array]:
+def _singular_loads(of: Solution, rules: Rules) -> tuple[Array, Array]:
     """Right-hand sides of the regular part of the solution singular at each edge, and its area.
 
     The opening sqrt((1∓η)/(1±η)) of the own gap has the density 1/(1±η) at the nodes and, as the
     rule is exact for polynomials only, a further weight π/(M+1) at the edge itself.
     """
+    table, slope, kinds, offset = of.table, of.slope, of.kinds, of.offset
+    theta, weight, matrix = of.theta, of.weight, of.matrix
+    counts, start, square = rules.counts, rules.start, rules.square
+    eta, b, w = rules.eta, rules.b, rules.w
     n = theta.shape[0]
     gaps = table.shape[0]
     load = np.empty((n, 2 * gaps))
