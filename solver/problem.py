@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,11 @@ from solver.control import Control
 from solver.material import HalfSpace
 from solver.profile import Profile
 from solver.state import ContactState
+
+
+def stress_scale(half_space: HalfSpace, period: float, h_max: Any) -> Any:
+    """E* q0 h_max / 2 in Pa for h_max in m (a number or an array): p̄ is σ~ times this."""
+    return 0.5 * half_space.modulus * (2 * np.pi / period) * h_max
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +63,7 @@ class Problem:
     @property
     def stress_scale(self) -> float:
         """E* q0 h_max / 2 in Pa: the mean stress is σ~ times this (the paper's σ~)."""
-        return 0.5 * self.half_space.modulus * self.profile.q0 * self.profile.h_max
+        return float(stress_scale(self.half_space, self.profile.period, self.profile.h_max))
 
     @property
     def loss_scale(self) -> float:

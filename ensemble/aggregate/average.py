@@ -148,7 +148,11 @@ def _curve_scales(campaign: Campaign, cells: Sequence[Cell]) -> dict[str, dict[s
     stress = [1 / stress_scale(campaign, cell.values["h_max"]) for cell in cells]
     slope = [s / np.sqrt(cell.values["m2"]) for s, cell in zip(stress, cells, strict=True)]
     return {
-        "mean_stress": {"mean_stress": ones, "stress": stress, "stress_slope": slope},
+        "mean_stress": {
+            "mean_stress": ones,
+            "mean_stress_dimensionless": stress,
+            "mean_stress_over_slope": slope,
+        },
         "contact_fraction": {"contact_fraction": ones},
         "patches": {"patches": ones},
         "energy": {"energy": ones},

@@ -13,6 +13,7 @@ from ensemble.campaign.tables import Campaign
 from ensemble.errors import InputError
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED
+from solver import problem
 from solver.material import HalfSpace
 from solver.profile import Array
 
@@ -23,6 +24,7 @@ _PER_TASK = (
     *("loss", "loss_dimensionless", "loss_from_drops", "loss_small_scale", "loss_large_scale"),
     *("audit_residual", "pull_off_penetration", "pull_off_stress"),
     *("wall_time", "cpu_time", "states", "jump_count"),
+    *("loss_error", "races", "energy_at_stake"),
 )
 _WITH_INTERVAL = (
     "loss",
@@ -50,12 +52,14 @@ class Cell:
     realisation, seed : int array, shape (done,)
     values : dict of array, each of shape (done,)
         Per-task numbers under the names of the results file, and ``small_scale_share``
-        (loss_small_scale / loss_from_drops).
+        (loss_small_scale / loss_from_drops); ``loss_error_dimensionless``,
+        ``energy_at_stake_dimensionless`` (in W~).
     estimates : dict of Estimate
         The same, averaged. Only losses and pull-off have an interval.
     curves : dict of Curve
-        ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``stress`` (σ~),
-        ``stress_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``, ``energy`` (J/m).
+        ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
+        (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,
+        ``energy`` (J/m).
     """
 
     hurst: float
@@ -97,6 +101,9 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         values["small_scale_share"] = np.divide(
             values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
         )
+        scale = stress_scale(results.campaign, values["h_max"]) * values["h_max"]
+        for name in ("loss_error", "energy_at_stake"):
+            values[f"{name}_dimensionless"] = values[name] / scale
         failed = int(np.sum(status[mine] == FAILED))
         cells.append(
             Cell(
@@ -128,6 +135,6 @@ def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
 
 
 def stress_scale(campaign: Campaign, h_max: Array) -> Array:
-    """E* q0 h_max / 2 in Pa, for every h_max in m: σ~ is the mean stress over this."""
+    """Mean stress in Pa at σ~ = 1, for every h_max in m."""
     half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
-    return 0.5 * half_space.modulus * (2 * np.pi / campaign.profile.period) * h_max
+    return np.asarray(problem.stress_scale(half_space, campaign.profile.period, h_max))

@@ -56,7 +56,7 @@ class Companion:
 
 
 @dataclass(frozen=True)
-class Difference:
+class LossDifference:
     """Dimensionless loss of a companion less that of the campaign, over the pairs of one cell."""
 
     here: Estimate
@@ -103,11 +103,11 @@ def kind_of(keys: Sequence[str]) -> Kind:
     return "other"
 
 
-def difference(here: Cell, there: Cell) -> Difference | None:
+def difference(here: Cell, there: Cell) -> LossDifference | None:
     """Compare the losses of the realisations that both have finished; None without any."""
     _, mine, theirs = np.intersect1d(here.seed, there.seed, assume_unique=True, return_indices=True)
     if not mine.size:
         return None
     one = here.values["loss_dimensionless"][mine]
     two = there.values["loss_dimensionless"][theirs]
-    return Difference(*estimates(np.array([one, two, two - one])))
+    return LossDifference(*estimates(np.array([one, two, two - one])))

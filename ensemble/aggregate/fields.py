@@ -21,7 +21,7 @@ from solver.profile import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class DeformedShape:
     """Fields of one realisation.
 
     Attributes
@@ -62,7 +62,7 @@ class FieldStatistics:
     gap_density : array, shape (cells, 2, penetrations, gap bins)
     in_contact : int array, shape (cells, 2, penetrations)
         Realisations averaged in the last two.
-    shapes : tuple of Shape or None
+    shapes : tuple of DeformedShape or None
         Of the first finished realisation that kept its fields.
     """
 
@@ -76,7 +76,7 @@ class FieldStatistics:
     psd_displacement: Array
     gap_density: Array
     in_contact: NDArray[np.int64]
-    shapes: tuple[Shape | None, ...]
+    shapes: tuple[DeformedShape | None, ...]
 
 
 def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> FieldStatistics:
@@ -145,9 +145,9 @@ def _average(
         return total / count[..., None], count
 
 
-def _shapes(results: Results, rows: Sequence[NDArray[np.intp]]) -> tuple[Shape | None, ...]:
+def _shapes(results: Results, rows: Sequence[NDArray[np.intp]]) -> tuple[DeformedShape | None, ...]:
     kept = results.column(KEPT)
-    out: list[Shape | None] = []
+    out: list[DeformedShape | None] = []
     for mine in rows:
         places = np.flatnonzero(np.isin(kept, mine))
         if not places.size:
@@ -156,7 +156,7 @@ def _shapes(results: Results, rows: Sequence[NDArray[np.intp]]) -> tuple[Shape |
         place = slice(int(places[0]), int(places[0]) + 1)
         row = int(kept[places[0]])
         out.append(
-            Shape(
+            DeformedShape(
                 row=row,
                 h_max=float(results.column("h_max", slice(row, row + 1))[0]),
                 height=results.column("field_height", place)[0].astype(float),

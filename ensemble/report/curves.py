@@ -14,8 +14,8 @@ from solver.method import BRANCHES
 # curve -> (unit, what it is)
 QUANTITIES = {
     "mean_stress": ("Pa", "mean stress, compression positive"),
-    "stress": ("1", "dimensionless mean stress 2 p/(E* q0 h_max)"),
-    "stress_slope": ("1", "dimensionless mean stress over the root mean square slope"),
+    "mean_stress_dimensionless": ("1", "dimensionless mean stress 2 p/(E* q0 h_max)"),
+    "mean_stress_over_slope": ("1", "dimensionless mean stress over the root mean square slope"),
     "contact_fraction": ("1", "contact fraction A/A0"),
     "patches": ("1", "number of contact patches in one period"),
     "energy": ("J m-1", "elastic and adhesion energy of one period per unit depth"),

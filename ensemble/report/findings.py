@@ -1,13 +1,93 @@
-"""What the numbers say, as sentences: agreement with the paper, audit, and what is missing."""
+"""What the numbers say, as sentences: trends, agreement with the paper, errors, what is missing."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.cells import Cell
 from ensemble.aggregate.fields import fitted_slope
 from ensemble.report import paper
+from ensemble.task.doubt import bound, doubtful
+
+# Root mean square slope above which linear elasticity of small slopes is doubtful.
+STEEP = 0.3
+
+
+def verdict(data: Aggregate) -> list[str]:
+    """Three sentences: what came out, how well the mean is known, how well each loop is."""
+    return [_outcome(data), _statistical(data), _numerical(data)]
+
+
+def _outcome(data: Aggregate) -> str:
+    cells = sorted(
+        (cell for cell in data.cells if cell.done),
+        key=lambda cell: cell.estimates["loss_dimensionless"].mean,
+    )
+    end = data.campaign.cycle.max_penetration
+    top = f"A loop to Δ/h_max = {end:g} and back until detached loses"
+    if len(cells) == 1:
+        return f"{top} {_loss(cells[0])} on average ({_name(cells[0])})."
+    low, high = cells[0], cells[-1]
+    share = [cell.estimates["small_scale_share"].mean for cell in cells]
+    return (
+        f"{top}, on average over realisations, from {_loss(low)} ({_name(low)}) to {_loss(high)} "
+        f"({_name(high)}); {100 * min(share):.0f} to {100 * max(share):.0f} % of it is lost where "
+        "edges run inside patches."
+    )
+
+
+def _loss(cell: Cell) -> str:
+    dimensionless, loss = cell.estimates["loss_dimensionless"].mean, cell.estimates["loss"].mean
+    return f"W~ = {dimensionless:.3g}, {1e3 * loss:.3g} mJ/m²"
+
+
+def _statistical(data: Aggregate) -> str:
+    halves = [
+        (found.high - found.low) / 2 / abs(found.mean)
+        for cell in data.cells
+        if cell.done > 1 and (found := cell.estimates["loss_dimensionless"]).mean
+    ]
+    counts = sorted({cell.done for cell in data.cells if cell.done})
+    many = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
+    plural = "realisations" if counts[-1] > 1 else "realisation"
+    if not halves:
+        return f"With {many} {plural} of each (H, γ), how well the mean is known cannot be said."
+    width = (
+        f"{100 * min(halves):.2g} to {100 * max(halves):.2g} %"
+        if len(halves) > 1
+        else f"{100 * halves[0]:.2g} %"
+    )
+    return (
+        f"With {many} {plural} of each (H, γ), the 95 % interval of the mean loss is its mean "
+        f"± {width}."
+    )
+
+
+def _numerical(data: Aggregate) -> str:
+    loss, audit = _all(data, "loss"), np.abs(_all(data, "audit_residual"))
+    error, races = _all(data, "loss_error"), _all(data, "races")
+    parts = [f"the energy audit of each loop closes within {100 * audit.max():.2g} %"]
+    if np.isfinite(error).all():
+        share = np.divide(error, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
+        parts.insert(
+            0, f"the estimated numerical error of a loss is at most {100 * share.max():.2g} % of it"
+        )
+    if np.isfinite(races).all():
+        raced = int(np.sum(races > 0))
+        stake = _all(data, "energy_at_stake")
+        most = np.max(np.divide(stake, np.abs(loss), out=np.zeros_like(loss), where=loss != 0))
+        parts.append(
+            f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
+            f"elsewhere (at most {100 * most:.2g} % of a loop's loss at stake)"
+            if raced
+            else "no jump would have ended elsewhere by another rule of descent"
+        )
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def missing(data: Aggregate) -> list[str]:
@@ -23,21 +103,22 @@ def missing(data: Aggregate) -> list[str]:
         out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.")
     empty = [_name(cell) for cell in data.cells if not cell.done]
     if empty:
-        out.append(f"No task is finished yet for {'; '.join(empty)}.")
+        out.append(f"No task is finished yet for {_listed(empty)}.")
     few = [_name(cell) for cell in data.cells if cell.done == 1]
     if few:
-        out.append(f"Only one realisation, hence no spread, for {'; '.join(few)}.")
+        out.append(f"Only one realisation, hence no spread, for {_listed(few)}.")
     return out
 
 
 def agreement(data: Aggregate) -> list[str]:
-    """Sentences on what agrees with the paper, and what does not."""
+    """Sentences on what the averages say; beside the paper's if the campaign is the paper's."""
+    of_paper = paper.is_the_papers(data.campaign)
     return [
-        *_table_1(data),
-        *_slopes(data),
-        *_growth(data),
-        *_order_in_slope(data),
-        *_unloading_exceeds_loading(data),
+        *(_table_1(data) if of_paper else []),
+        *(_slopes(data) if of_paper else []),
+        *_growth(data, of_paper),
+        *_order_in_slope(data, of_paper),
+        *_unloading_exceeds_loading(data, of_paper),
         *_spectrum(data),
     ]
 
@@ -45,35 +126,48 @@ def agreement(data: Aggregate) -> list[str]:
 def readings(data: Aggregate) -> list[str]:
     """Which campaign comes nearest to the paper's table, of this one and those beside it."""
     deviations = []
-    for name, cells in (
-        (data.path.name, data.cells),
-        *((companion.path.name, companion.cells) for companion in data.companions),
+    for name, campaign, cells in (
+        (data.path.name, data.campaign, data.cells),
+        *((other.path.name, other.campaign, other.cells) for other in data.companions),
     ):
-        found = [
-            cell.estimates["loss_dimensionless"].mean / value - 1
-            for cell in cells
-            if cell.done and (value := paper.table_1(cell.hurst, cell.work_of_adhesion)) is not None
-        ]
+        if not paper.is_the_papers(campaign):
+            continue
+        found = _deviations(cells)
         if found:
-            deviations.append((float(np.sqrt(np.mean(np.square(found)))), name))
+            deviations.append((float(np.sqrt(np.mean(np.square(found)))), name, len(found)))
     if len(deviations) < 2:
         return []
     deviations.sort()
-    listing = "; ".join(f"{name} {100 * deviation:.1f} %" for deviation, name in deviations)
+    listing = "; ".join(
+        f"{name} {100 * deviation:.1f} % ({count} values)" for deviation, name, count in deviations
+    )
     return [
-        f"Nearest to the known values of the paper's Table 1: {deviations[0][1]} (root mean square "
-        f"deviation: {listing})."
+        f"Nearest to the paper's Table 1: {deviations[0][1]} (root mean square deviation: "
+        f"{listing})."
     ]
 
 
 def quality(data: Aggregate) -> list[str]:
-    """Sentences on the energy audit and on what the file's shape cut off."""
-    audit = np.concatenate([cell.values["audit_residual"] for cell in data.cells])
+    """Sentences on the error of the losses, and on what the file's shape cut off."""
+    audit = _all(data, "audit_residual")
     out = [
         "Energy audit: loop integral and sum of the drops differ by "
         f"{100 * np.sqrt(np.mean(audit**2)):.2g} % of the loss (root mean square over loops), "
         f"{100 * np.max(np.abs(audit)):.2g} % in the worst loop."
     ]
+    most = bound(data.campaign.solver.accuracy)
+    wrong = doubts(data)
+    if wrong:
+        out.append(
+            f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
+            f"their estimated error exceeds {100 * most:.2g} % of the loss: {_listed(wrong)}."
+        )
+    steep = [_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
+    if steep:
+        out.append(
+            f"WARNING: the root mean square slope exceeds {STEEP:g} for {_listed(steep)}: linear "
+            "elasticity of small slopes, on which everything here rests, is doubtful there."
+        )
     truncated = int(data.jumps.truncated.sum())
     if truncated:
         out.append(
@@ -90,32 +184,50 @@ def quality(data: Aggregate) -> list[str]:
     return out
 
 
-def _table_1(data: Aggregate) -> list[str]:
-    out = []
-    known = 0
+def doubts(data: Aggregate) -> list[str]:
+    """Loops whose own checks say that their loss is off by a share that counts, worst first."""
+    found = []
     for cell in data.cells:
-        value = paper.table_1(cell.hurst, cell.work_of_adhesion)
-        if value is None or not cell.done:
-            continue
-        known += 1
-        loss = cell.estimates["loss_dimensionless"]
-        inside = loss.low <= value <= loss.high
-        where = (
-            "no interval can be given"
-            if np.isnan(loss.low)
-            else f"the paper's value lies {'inside' if inside else 'outside'} the 95 % interval "
-            f"{loss.low:.4g} … {loss.high:.4g}"
-        )
-        out.append(
-            f"Table 1, {_name(cell)}: W~ = {loss.mean:.4g} against {value:g} in the paper "
-            f"({100 * (loss.mean / value - 1):+.1f} %); {where}."
-        )
-    if known < paper.TABLE_1_CELLS:
-        out.append(
-            f"Of the {paper.TABLE_1_CELLS} losses of the paper's Table 1 only "
-            f"{len(paper.TABLE_1)} is known here; the others are left blank."
-        )
-    return out
+        loss = cell.values["loss"]
+        audit = np.abs(cell.values["audit_residual"])
+        error = np.nan_to_num(cell.values["loss_error"])
+        wrong = doubtful(data.campaign.solver.accuracy, loss, audit, error)
+        for k in np.flatnonzero(wrong):
+            share = max(audit[k], error[k] / abs(loss[k]) if loss[k] else np.inf)
+            text = f"row {cell.rows[k]}, {_name(cell)} ({100 * share:.2g} %)"
+            found.append((-share, text))
+    return [text for _, text in sorted(found)]
+
+
+def _table_1(data: Aggregate) -> list[str]:
+    found = _deviations(data.cells)
+    if not found:
+        return []
+    known = [
+        (cell.estimates["loss_dimensionless"], value)
+        for cell in data.cells
+        if cell.done
+        and (value := paper.table_1(cell.hurst, cell.work_of_adhesion)) is not None
+        and np.isfinite(cell.estimates["loss_dimensionless"].low)
+    ]
+    inside = sum(loss.low <= value <= loss.high for loss, value in known)
+    intervals = (
+        f"; {inside} of {len(known)} lie inside the 95 % interval of the mean here" if known else ""
+    )
+    low, high, rms = 100 * min(found), 100 * max(found), 100 * np.sqrt(np.mean(np.square(found)))
+    return [
+        f"Of the {len(paper.TABLE_1)} losses of the paper's Table 1 {len(found)} have a cell here: "
+        f"W~ is off by {low:+.1f} % to {high:+.1f} %, root mean square {rms:.1f} %{intervals}."
+    ]
+
+
+def _deviations(cells: Sequence[Cell]) -> list[float]:
+    """Relative deviations of the mean W~ from the values that the paper gives."""
+    return [
+        cell.estimates["loss_dimensionless"].mean / value - 1
+        for cell in cells
+        if cell.done and (value := paper.table_1(cell.hurst, cell.work_of_adhesion)) is not None
+    ]
 
 
 def _slopes(data: Aggregate) -> list[str]:
@@ -130,28 +242,28 @@ def _slopes(data: Aggregate) -> list[str]:
     return [f"Mean square slope m2 here and in the paper: {', '.join(parts)}."] if parts else []
 
 
-def _growth(data: Aggregate) -> list[str]:
+def _growth(data: Aggregate, of_paper: bool) -> list[str]:
     if not data.paired:
         return []
     up = [pair for pair in data.paired if pair.loss.mean > 0]
     sure = [pair for pair in up if pair.loss.low > 0]
     if len(sure) == len(data.paired):
         return [
-            "The loss grows with γ at every H, profile by profile, beyond the 95 % interval; the "
-            "paper says the same."
+            "The loss grows with γ at every H, profile by profile, beyond the 95 % interval"
+            f"{'; the paper says the same' if of_paper else ''}."
         ]
-    down = "; ".join(
+    down = [
         f"H = {pair.hurst:g}, γ = {pair.lower:g} to {pair.upper:g} J/m²"
         for pair in data.paired
         if pair not in sure
-    )
+    ]
     return [
         f"The mean loss grows with γ in {len(up)} of {len(data.paired)} steps of γ; not beyond the "
-        f"95 % interval in: {down}."
+        f"95 % interval in: {_listed(down)}."
     ]
 
 
-def _order_in_slope(data: Aggregate) -> list[str]:
+def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:
     """Whether the loss is monotone in m2; the paper's table is not."""
     out = []
     for gamma in data.works_of_adhesion:
@@ -163,24 +275,26 @@ def _order_in_slope(data: Aggregate) -> list[str]:
         monotone = bool(np.all(steps > 0) or np.all(steps < 0))
         word = ("falls" if steps[0] < 0 else "grows") if monotone else "is not monotone"
         out.append(f"{word} {'with' if monotone else 'in'} m2 at γ = {gamma:g} J/m²")
-    return [f"The mean loss {', '.join(out)}; the paper's table is not monotone."] if out else []
+    rest = "; the paper's table is not monotone" if of_paper else ""
+    return [f"The mean loss {_listed(out, ', ')}{rest}."] if out else []
 
 
-def _unloading_exceeds_loading(data: Aggregate) -> list[str]:
+def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:
     ratios = [(cell, ratio) for cell in data.cells if (ratio := area_ratio(cell)) is not None]
     if not ratios:
         return []
     where = "At equal load, on unloading up to the largest tension, the contact is"
     below = [cell for cell, ratio in ratios if ratio < 1]
     if below:
-        names = "; ".join(_name(cell) for cell in below)
+        names = _listed([_name(cell) for cell in below])
         return [f"{where} not everywhere larger than on loading: {names}."]
     least = min(ratio for _, ratio in ratios)
     apart = [_name(cell) for cell in data.cells if cell.done and area_ratio(cell) is None]
-    rest = f" (no load in common away from the turning point: {'; '.join(apart)})" if apart else ""
+    rest = f" (no load in common away from the turning point: {_listed(apart)})" if apart else ""
+    says = "; the paper says the same" if of_paper else ""
     return [
-        f"{where} larger than on loading everywhere, by a factor of at least {least:.2f}{rest}; "
-        "the paper says the same."
+        f"{where} larger than on loading everywhere, by a factor of at least {least:.2f}{rest}"
+        f"{says}."
     ]
 
 
@@ -201,7 +315,7 @@ def _spectrum(data: Aggregate) -> list[str]:
     return [
         "Slope of the loading spectrum of the deformed surface at small wave numbers and "
         f"Δ/h_max = {fields.penetration[-1]:.2f}, fitted, against Persson's -(2+H): "
-        f"{'; '.join(parts)}."
+        f"{_listed(parts)}."
     ]
 
 
@@ -230,10 +344,10 @@ def area_ratio(cell: Cell) -> float | None:
     """
     if not cell.done:
         return None
-    stress_up = cell.curves["loading_stress"].mean
+    stress_up = cell.curves["loading_mean_stress_dimensionless"].mean
     area_up = cell.curves["loading_contact_fraction"].mean
-    stop = int(np.argmin(cell.curves["unloading_stress"].mean)) + 1
-    stress_down = cell.curves["unloading_stress"].mean[:stop]
+    stop = int(np.argmin(cell.curves["unloading_mean_stress_dimensionless"].mean)) + 1
+    stress_down = cell.curves["unloading_mean_stress_dimensionless"].mean[:stop]
     area_down = cell.curves["unloading_contact_fraction"].mean[:stop]
     wanted = (area_up > 0.1 * area_up[-1]) & (area_up < 0.95 * area_up[-1])
     wanted &= (stress_up >= stress_down.min()) & (stress_up <= stress_down.max())
@@ -242,6 +356,20 @@ def area_ratio(cell: Cell) -> float | None:
     order = np.argsort(stress_down)
     unloading = np.interp(stress_up[wanted], stress_down[order], area_down[order])
     return float(np.min(unloading / area_up[wanted]))
+
+
+def _listed(texts: Sequence[str], between: str = "; ", most: int = 4) -> str:
+    """The first of a list, and how many more there are."""
+    rest = len(texts) - most
+    return between.join(texts) if rest <= 0 else f"{between.join(texts[:most])} and {rest} more"
+
+
+def _all(data: Aggregate, name: str) -> NDArray[np.float64]:
+    return np.concatenate([cell.values[name] for cell in data.cells])
+
+
+def _rms_slope(cell: Cell) -> float:
+    return float(np.sqrt(cell.estimates["m2"].mean))
 
 
 def _name(cell: Cell) -> str:

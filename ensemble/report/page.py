@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+
+import numpy as np
 
 from ensemble.aggregate import statistics
 from ensemble.aggregate.average import Aggregate
 from ensemble.report import findings, paper
 from ensemble.report.figures.catalogue import Illustration
-from ensemble.report.tables import losses as tables
-from ensemble.report.tables import states as state_tables
-
-Drawn = Mapping[str, str]
-"""Stem of a figure -> name of its PNG file, beside the page."""
+from ensemble.report.tables import losses as loss_tables
+from ensemble.report.tables import mechanisms as mechanism_tables
 
 
 def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustration]]]) -> str:
@@ -26,19 +25,29 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         "companions".
     """
     figures = dict(sections)
-    losses = tables.losses(data)
+    of_paper = paper.is_the_papers(data.campaign)
+
+    def show(section: str) -> list[str]:
+        return [_shown(item, of_paper) for item in figures.get(section, ())]
+
+    losses = loss_tables.losses(data)
     out = [
         f"# Hysteresis loops of `{data.path.name}`",
-        _summary(data),
+        " ".join(findings.verdict(data)),
         *_bullets(findings.missing(data)),
+        _summary(data),
         "## Losses",
         losses.markdown(),
-        _footnote(),
-        *_show(figures.get("losses", ())),
-        "## What agrees with the paper, and what does not",
-        *_bullets(findings.agreement(data)),
+        _footnote(data),
+        *show("losses"),
     ]
-    growth = tables.paired(data)
+    beside = loss_tables.beside_the_paper(data)
+    if beside.rows:
+        out += ["## What agrees with the paper, and what does not", beside.markdown()]
+    else:
+        out += ["## What the averages say"]
+    out += _bullets(findings.agreement(data))
+    growth = loss_tables.paired(data)
     if growth.rows:
         out += [
             "### Growth of the loss with γ, profile by profile",
@@ -49,14 +58,14 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         out += [
             "## Beside other campaigns",
             "The same realisations of both campaigns, profile by profile.",
-            tables.companions(data).markdown(),
+            loss_tables.companions(data).markdown(),
             *_bullets(findings.readings(data)),
-            *_show(figures.get("companions", ())),
+            *show("companions"),
         ]
-    out += ["## Loops", *_show(figures.get("loops", ()))]
+    out += ["## Loops", *show("loops")]
     if figures.get("fields"):
-        out += ["## Shapes, spectra and distributions", *_show(figures["fields"])]
-        slopes = state_tables.slopes(data, ("loading",))
+        out += ["## Shapes, spectra and distributions", *show("fields")]
+        slopes = mechanism_tables.slopes(data, ("loading",))
         if slopes.rows:
             out += [
                 "### Slope of the spectrum of the deformed surface on loading",
@@ -70,13 +79,13 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         "A jump is *small scale* if edges only run inside existing patches (spreading, receding), "
         "and *large scale* if patches come or go (snap-in, merging, splitting, vanishing, "
         "pull-off).",
-        state_tables.mechanisms(data).markdown(),
-        *_show(figures.get("mechanisms", ())),
+        mechanism_tables.mechanisms(data).markdown(),
+        *show("mechanisms"),
         "### Share of the drops by kind of the jump",
-        state_tables.shares_by_kind(data).markdown(),
+        mechanism_tables.shares_by_kind(data).markdown(),
         "Numbers of jumps: `jumps.csv`.",
         "## Profiles",
-        tables.profiles(data).markdown(),
+        loss_tables.profiles(data).markdown(),
         "## Accuracy and completeness",
         *_bullets(findings.quality(data)),
     ]
@@ -100,17 +109,43 @@ def _summary(data: Aggregate) -> str:
     )
 
 
-def _footnote() -> str:
-    return (
-        "W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max) and Δ~ = Δ/h_max, each realisation with its own "
-        "h_max; s.e.: standard error of the mean; 95 % interval of the mean by the BCa bootstrap "
-        f"at the expanded level ({statistics.RESAMPLES} resamples, fixed seed), for fewer than "
-        f"{statistics.FEWEST_FOR_BOOTSTRAP} realisations by Student's t; ± steps: mean "
-        "|loop integral - sum of drops|, or the difference from a campaign with other load steps "
-        "beside this one; ± grid: the difference from a campaign with another resolution or "
-        "method beside this one; audit: largest |loop integral - sum of drops| / loss; paper: "
-        f"{paper.REFERENCE}, Table 1, – where its value is not known here."
+def _footnote(data: Aggregate) -> str:
+    counts = {cell.done for cell in data.cells}
+    methods = {statistics.interval_method(n) for n in counts} - {"none"}
+    bootstrap = (
+        f"the BCa bootstrap at the expanded level ({statistics.RESAMPLES} resamples, fixed seed)"
     )
+    interval = {
+        frozenset(): "",
+        frozenset({"bootstrap"}): f"; 95 % interval of the mean by {bootstrap}",
+        frozenset({"student"}): "; 95 % interval of the mean by Student's t",
+        frozenset({"bootstrap", "student"}): f"; 95 % interval of the mean by {bootstrap}, for "
+        f"fewer than {statistics.FEWEST_FOR_BOOTSTRAP} realisations by Student's t",
+    }[frozenset(methods)]
+    kinds = {companion.kind for companion in data.companions}
+    steps = (
+        "the difference from the campaign with other load steps beside this one"
+        if "load steps" in kinds
+        else "mean |loop integral - sum of drops|"
+    )
+    parts = [
+        "W~ = ∮ σ~ dΔ~ with σ~ = 2p̄/(E* q0 h_max) and Δ~ = Δ/h_max, each realisation with its own "
+        f"h_max; s.e.: standard error of the mean{interval}",
+        "± loop: mean of the estimated numerical error of a loop",
+        f"± steps: {steps}",
+    ]
+    if "resolution" in kinds:
+        parts.append(
+            "± method: the difference from the campaign with another accuracy or method beside it"
+        )
+    parts.append("audit: largest |loop integral - sum of drops| / loss")
+    if any(np.nansum(cell.values["races"]) for cell in data.cells):
+        parts.append(
+            "races: jumps that another rule of descent would have ended elsewhere, all loops"
+        )
+    if paper.is_the_papers(data.campaign):
+        parts.append(f"paper: {paper.REFERENCE}, Table 1, – where it gives none")
+    return "; ".join(parts) + "."
 
 
 def _origin(data: Aggregate) -> str:
@@ -123,12 +158,12 @@ def _bullets(sentences: Sequence[str]) -> list[str]:
     return ["\n".join(f"- {sentence}" for sentence in sentences)] if sentences else []
 
 
-def _show(illustrations: Sequence[Illustration]) -> list[str]:
-    return [
-        f"![{item.title}]({item.name}.png)\n\n**{item.title}.** {item.caption} "
-        f"([PDF]({item.name}.pdf))"
-        for item in illustrations
-    ]
+def _shown(item: Illustration, of_paper: bool) -> str:
+    title = f"{item.title} (paper's {item.of_paper})" if of_paper and item.of_paper else item.title
+    caption = item.caption
+    if of_paper and item.name == "table1_losses":
+        caption += " Stars: the paper's values."
+    return f"![{title}]({item.name}.png)\n\n**{title}.** {caption} ([PDF]({item.name}.pdf))"
 
 
 def _list(values: Sequence[float]) -> str:

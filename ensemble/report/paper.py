@@ -1,23 +1,45 @@
-"""Numbers of the paper: Carbone, Pierro & Recchia, arXiv 1511.08891.
+"""Numbers of the paper, Carbone, Pierro & Recchia, arXiv 1511.08891, and what is set beside them.
 
-Only what is known first hand stands here. Its Table 1 has nine losses (three H, three γ); eight of
-them are not at hand and stay blank rather than guessed.
+A campaign is compared with them only where its profile, its material and its path are the paper's.
+The paper leaves two of these open (docs/theory.md, sections 2 and 3), so a campaign counts if it is
+one of the readings: the spectrum by h_rms with 100 or 200 for q_max/q_min, by C0, or by the m2 that
+the paper quotes; the turning point from 0.80 (the separations of its Fig. 3 in units of h_max) to
+0.93 (the same in µm).
 """
 
 from __future__ import annotations
 
+import math
+
+from ensemble.campaign.tables import Campaign
+
 REFERENCE = "G. Carbone, E. Pierro, G. Recchia, arXiv 1511.08891 (2015)"
 
-# (H, γ in J/m²) -> dimensionless energy loss, mean of 10 realisations, no error given.
-TABLE_1: dict[tuple[float, float], float] = {(0.8, 0.04): 19.36}
-TABLE_1_CELLS = 9
+# (H, γ in J/m²) -> dimensionless energy loss, mean of 10 realisations, no error given. The paper
+# has a dash at H = 0.7 and γ = 0.01 J/m².
+TABLE_1: dict[tuple[float, float], float] = {
+    (0.7, 0.04): 26.6,
+    (0.7, 0.07): 42.83,
+    (0.8, 0.01): 3.44,
+    (0.8, 0.04): 19.36,
+    (0.8, 0.07): 49.25,
+    (0.9, 0.01): 2.59,
+    (0.9, 0.04): 17.91,
+    (0.9, 0.07): 28.15,
+}
 
 # H -> mean square slope that the paper quotes.
 M2: dict[float, float] = {0.7: 5.1e-3, 0.8: 2.7e-3, 0.9: 1.5e-3}
 
+_PERIOD, _N0, _H_RMS, _C0 = 2e-3 * math.pi, 10, 1e-6, 1e-13
+_RATIOS = (100, 200)
+_YOUNG, _POISSON = 1e6, 0.5
+_TURNING_POINTS = (0.80, 0.93)
+_NEAR = 1e-3  # values are the paper's if they agree with its digits
+
 
 def table_1(hurst: float, work_of_adhesion: float) -> float | None:
-    """Loss of the paper's Table 1 at (H, γ in J/m²), None if it is not known."""
+    """Loss of the paper's Table 1 at (H, γ in J/m²), None where it gives none."""
     for (h, g), value in TABLE_1.items():
         if abs(h - hurst) < 1e-9 and abs(g - work_of_adhesion) < 1e-9:
             return value
@@ -27,3 +49,34 @@ def table_1(hurst: float, work_of_adhesion: float) -> float | None:
 def m2(hurst: float) -> float | None:
     """Mean square slope that the paper quotes for H, None if it gives none."""
     return next((value for h, value in M2.items() if abs(h - hurst) < 1e-9), None)
+
+
+def is_the_papers(campaign: Campaign) -> bool:
+    """Whether profile, material and path of a campaign are a reading of the paper's."""
+    profile, material, cycle = campaign.profile, campaign.material, campaign.cycle
+    low, high = _TURNING_POINTS
+    return (
+        _is(profile.period, _PERIOD)
+        and profile.n0 == _N0
+        and profile.amplitudes == "deterministic"
+        and _is_spectrum(campaign)
+        and _is(material.young, _YOUNG)
+        and _is(material.poisson, _POISSON)
+        and low - _NEAR <= cycle.max_penetration <= high + _NEAR
+    )
+
+
+def _is_spectrum(campaign: Campaign) -> bool:
+    profile = campaign.profile
+    if profile.ratio not in _RATIOS:
+        return False
+    if profile.h_rms is not None:
+        return _is(profile.h_rms, _H_RMS)
+    if profile.c0 is not None:
+        return _is(profile.c0, _C0) and profile.ratio == _RATIOS[0]
+    quoted = [m2(hurst) for hurst in campaign.sweep.hurst]
+    return profile.m2 is not None and all(q is not None and _is(profile.m2, q) for q in quoted)
+
+
+def _is(value: float, of_paper: float) -> bool:
+    return math.isclose(value, of_paper, rel_tol=_NEAR)

@@ -17,7 +17,7 @@ def write_report(
     stream: IO[str] | None = None,
     beside: Sequence[Path | str] = (),
 ) -> Aggregate:
-    """Write ``losses.csv``, ``curves.nc``, the figures and ``report.md``; print the losses.
+    """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``; print.
 
     Parameters
     ----------
@@ -59,16 +59,17 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     )
     from ensemble.report.figures.losses import of_penetration
     from ensemble.report.figures.style import save, style
+    from ensemble.report.html import html_page
     from ensemble.report.page import write_page
-    from ensemble.report.tables import losses, states
+    from ensemble.report.tables import losses, mechanisms
 
     losses.losses(data).write_csv(directory / "losses.csv")
     losses.paired(data).write_csv(directory / "growth.csv")
-    states.jumps(data).write_csv(directory / "jumps.csv")
+    mechanisms.jumps(data).write_csv(directory / "jumps.csv")
     write_curves(data, directory / "curves.nc")
     if data.companions:
         losses.companions(data).write_csv(directory / "beside.csv")
-    states.slopes(data).write_csv(directory / "slopes.csv")
+    mechanisms.slopes(data).write_csv(directory / "slopes.csv")
     with_shapes = (*SHAPES, *HEIGHTS) if data.fields.penetration.size else HEIGHTS
     sections = (
         ("loops", LOOPS),
@@ -84,15 +85,21 @@ def _write_files(data: Aggregate, directory: Path) -> None:
             save(figure, directory / item.name)
     page = write_page(data, sections)
     (directory / "report.md").write_text(page, encoding="utf-8")
+    (directory / "report.html").write_text(html_page(page, directory), encoding="utf-8")
 
 
 def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
     from ensemble.report import findings
-    from ensemble.report.tables import losses, states
+    from ensemble.report.tables import losses, mechanisms
 
     losses.losses(data).print(stream)
     print(file=stream)
-    states.mechanisms(data).print(stream)
-    for sentence in (*findings.missing(data), *findings.quality(data)):
+    mechanisms.mechanisms(data).print(stream)
+    print(file=stream)
+    for sentence in (
+        *findings.verdict(data),
+        *findings.missing(data),
+        *findings.quality(data),
+    ):
         print(sentence, file=stream)
-    print(f"report: {directory / 'report.md'}", file=stream)
+    print(f"report: {directory / 'report.md'}, {directory / 'report.html'}", file=stream)

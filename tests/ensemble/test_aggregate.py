@@ -83,8 +83,8 @@ def test_curves_are_the_means_of_the_raw_rows(file, hurst, gamma):
         area = data[f"{branch}_contact_fraction"][:][mine]
         for name, values in (
             ("mean_stress", stress),
-            ("stress", sigma),
-            ("stress_slope", sigma / np.sqrt(m2)[:, None]),
+            ("mean_stress_dimensionless", sigma),
+            ("mean_stress_over_slope", sigma / np.sqrt(m2)[:, None]),
             ("contact_fraction", area),
             ("patches", data[f"{branch}_patches"][:][mine]),
         ):

@@ -27,8 +27,8 @@ from ensemble.report.figures import fields as field_figures
 from ensemble.report.figures import loops, losses
 from ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
 from ensemble.report.figures.style import save, spread_out, style
-from ensemble.report.tables import losses as tables
-from ensemble.report.tables import states as state_tables
+from ensemble.report.tables import losses as loss_tables
+from ensemble.report.tables import mechanisms as mechanism_tables
 from ensemble.report.write import write_report
 from ensemble.task.compute import make_problem
 from tests.support.synthetic_results import campaign, rows, write
@@ -89,7 +89,7 @@ def test_only_what_is_known_of_the_paper_is_shown():
 
 def test_tables_print_as_plain_lines_without_a_terminal(data):
     stream = io.StringIO()
-    tables.losses(data).print(stream)
+    loss_tables.losses(data).print(stream)
     lines = stream.getvalue().splitlines()
     assert len(lines) == 2 + 6
     assert "\x1b" not in stream.getvalue()
@@ -98,12 +98,12 @@ def test_tables_print_as_plain_lines_without_a_terminal(data):
 
 
 def test_jumps_by_kind_add_up_to_all_drops(data):
-    table = state_tables.jumps(data)
+    table = mechanism_tables.jumps(data)
     shares = np.zeros(len(data.cells))
     for row in table.rows:
         shares[[(c.hurst, c.work_of_adhesion) for c in data.cells].index(row[:2])] += row[-1]
     np.testing.assert_allclose(shares, 1)
-    glance = state_tables.shares_by_kind(data)
+    glance = mechanism_tables.shares_by_kind(data)
     place = {(row[0], row[1], row[2]): row[-1] for row in table.rows}
     for row in glance.rows:
         assert sum(row[2:]) == pytest.approx(1)
@@ -118,8 +118,9 @@ def test_curves_open_in_xarray_with_units(report, data):
             assert array.attrs["units"], name
             assert array.attrs["long_name"], name
         assert curves["loading_mean_stress_mean"].attrs["units"] == "Pa"
-        one = curves["unloading_stress_mean"].sel(hurst=0.8, work_of_adhesion=0.07)
-        expected = data.cell(0.8, 0.07).curves["unloading_stress"].mean
+        one = curves["unloading_mean_stress_dimensionless_mean"]
+        one = one.sel(hurst=0.8, work_of_adhesion=0.07)
+        expected = data.cell(0.8, 0.07).curves["unloading_mean_stress_dimensionless"].mean
         np.testing.assert_array_equal(one, expected)
         assert curves["realisations"].values.tolist() == [[5] * 3] * 2
         quantiles = curves["loading_contact_fraction_quantiles"]
@@ -161,9 +162,9 @@ def test_loops_are_drawn_with_one_standard_deviation(data):
     cell = data.cell(0.8, 0.01)
     line = lines_of(axes)[r"$\gamma$ = 0.01 J/m², loading"]
     np.testing.assert_array_equal(line[:, 0], data.campaign.loading_penetration)
-    np.testing.assert_array_equal(line[:, 1], cell.curves["loading_stress"].mean)
+    np.testing.assert_array_equal(line[:, 1], cell.curves["loading_mean_stress_dimensionless"].mean)
     band = axes.collections[0].get_paths()[0].vertices
-    half = cell.curves["loading_stress"].std[-1]
+    half = cell.curves["loading_mean_stress_dimensionless"].std[-1]
     top = band[band[:, 0] == data.campaign.loading_penetration[-1], 1]
     assert np.ptp(top) == pytest.approx(2 * half)
     assert axes.get_xlabel().startswith("penetration")
@@ -231,7 +232,7 @@ def test_spectra_carry_both_reference_slopes(data):
         assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(slope, abs=1e-5)
     x, y = np.log(drawn["0.90"]).T
     assert (y[-1] - y[0]) / (x[-1] - x[0]) == pytest.approx(-2.8, abs=1e-3)
-    rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in state_tables.slopes(data).rows}
+    rows_of = {(r[0], r[1], r[2], round(r[3], 2)): r[5] for r in mechanism_tables.slopes(data).rows}
     assert rows_of[0.7, 0.01, "unloading", 0.9] == pytest.approx(-2.7, abs=1e-3)
 
 
@@ -415,15 +416,16 @@ def test_contact_is_compared_at_equal_load():
     stress = np.linspace(-1, 3, 41)
     fake = Fake()
     fake.curves = {
-        "loading_stress": Curve(stress),
+        "loading_mean_stress_dimensionless": Curve(stress),
         "loading_contact_fraction": Curve(0.1 * (stress + 1.5)),
-        "unloading_stress": Curve(np.concatenate([stress[::-1], [-0.5, 0.0]])),
+        "unloading_mean_stress_dimensionless": Curve(np.concatenate([stress[::-1], [-0.5, 0.0]])),
         "unloading_contact_fraction": Curve(
             np.concatenate([0.2 * (stress[::-1] + 1.5), [0.01, 0.0]])
         ),
     }
     assert findings.area_ratio(fake) == pytest.approx(2)
-    fake.curves["unloading_stress"] = Curve(fake.curves["unloading_stress"].mean - 10)
+    name = "unloading_mean_stress_dimensionless"
+    fake.curves[name] = Curve(fake.curves[name].mean - 10)
     assert findings.area_ratio(fake) is None
 
 
@@ -453,14 +455,14 @@ def test_errors_come_from_the_audit_and_from_campaigns_beside(file, data, tmp_pa
         tmp_path, "finer.h5", 1.02, a=("[output]", "[solver]\naccuracy = 1e-4\n[output]")
     )
     steps = companion(tmp_path, "steps.h5", 0.99, a=("load_steps = 20", "load_steps = 40"))
-    alone = {row[:2]: row for row in tables.losses(data).rows}
+    alone = {row[:2]: row for row in loss_tables.losses(data).rows}
     both = aggregate(file, [finer, steps])
     assert [c.kind for c in both.companions] == ["resolution", "load steps"]
     assert both.companions[1].differs == ("cycle.load_steps = 40",)
-    names = [column.name for column in tables.losses(both).columns]
+    names = [column.name for column in loss_tables.losses(both).columns]
     by_steps = names.index("loss_dimensionless_error_load_steps")
     by_grid = names.index("loss_dimensionless_error_resolution")
-    for row in tables.losses(both).rows:
+    for row in loss_tables.losses(both).rows:
         cell = data.cell(*row[:2])
         loss = cell.values["loss_dimensionless"]
         assert row[by_grid] == pytest.approx(0.02 * loss.mean())

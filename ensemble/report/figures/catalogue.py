@@ -23,37 +23,43 @@ class Illustration:
     caption : str
         What it shows, as a sentence or two.
     draw : callable
+    of_paper : str
+        The figure or table of the paper that shows the same, if there is one.
     """
 
     name: str
     title: str
     caption: str
     draw: Callable[[Aggregate], Figure]
+    of_paper: str = ""
 
 
 LOOPS = (
     Illustration(
         "fig6_contact_against_stress",
-        "Contact fraction against mean stress (paper's Fig. 6)",
+        "Contact fraction against mean stress",
         "Means over realisations, taken at equal penetration; σ~ = 2p̄/(E* q0 h_max) with each "
         "realisation's own h_max, compression positive.",
         loops.contact_against_stress,
+        "Fig. 6",
     ),
     Illustration(
         "fig7_loop_against_penetration",
-        "Mean stress and contact fraction against penetration (paper's Fig. 7)",
+        "Mean stress and contact fraction against penetration",
         "Lines: means over realisations; shading: one standard deviation of a single realisation. "
         "A realisation that has detached counts with zero.",
         loops.loop_against_penetration,
+        "Fig. 7",
     ),
 )
 LOSSES = (
     Illustration(
         "table1_losses",
-        "Loss against work of adhesion (paper's Table 1)",
-        "Means with 95 % intervals; stars: the paper's values, as far as they are known. The "
-        "curves are moved apart a little so that the intervals can be told apart.",
+        "Loss against work of adhesion",
+        "Means with 95 % intervals. The curves are moved apart a little so that the intervals can "
+        "be told apart.",
         losses.loss_against_adhesion,
+        "Table 1",
     ),
     Illustration(
         "loss_against_m2",
@@ -65,40 +71,45 @@ LOSSES = (
 SHAPES = (
     Illustration(
         "fig3_shapes",
-        "Deformed shapes (paper's Fig. 3)",
+        "Deformed shapes",
         "The first realisation that kept its fields, middle H and γ: rigid profile h - s and "
         "elastic surface v on both branches, at the same separation. In contact the two coincide. "
         "Right: one and a half of the longest waves around the highest point.",
         fields.shapes,
+        "Fig. 3",
     ),
     Illustration(
         "fig4_spectra_loading",
-        "Spectral density on loading (paper's Fig. 4)",
+        "Spectral density on loading",
         "Two-sided, mean over the realisations in contact, middle γ. Thin lines: slopes of a "
         "self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the profile's "
         "highest wave number only the edges of contact have power.",
         fields.spectra_on_loading,
+        "Fig. 4",
     ),
     Illustration(
         "fig5_spectra_unloading",
-        "Spectral density on unloading (paper's Fig. 5)",
+        "Spectral density on unloading",
         "As on loading. At the largest penetration both branches are one state.",
         fields.spectra_on_unloading,
+        "Fig. 5",
     ),
     Illustration(
         "fig8_gap_density",
-        "Probability density of the separation (paper's Fig. 8)",
+        "Probability density of the separation",
         "Gap outside contact, in units of each realisation's h_max; the integral is the fraction "
         "out of contact. Middle γ. At the largest penetration both branches are one state.",
         fields.gap_density,
+        "Fig. 8",
     ),
 )
 HEIGHTS = (
     Illustration(
         "fig9_height_density",
-        "Probability density of the heights (paper's Fig. 9)",
+        "Probability density of the heights",
         "Rigid profiles, mean over realisations, with the Gaussian of the same variance.",
         fields.height_density,
+        "Fig. 9",
     ),
 )
 MECHANISMS = (

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.cells import Cell
-from ensemble.aggregate.fields import FieldStatistics, Shape
+from ensemble.aggregate.fields import DeformedShape, FieldStatistics
 from ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     LINES,
@@ -225,7 +225,7 @@ def _reference_slopes(axes: Axes, hurst: float, rigid: np.ndarray, q: np.ndarray
 def _draw_shape(
     axes: Axes,
     fields: FieldStatistics,
-    shape: Shape,
+    shape: DeformedShape,
     k: int,
     separation: float,
     part: slice,
@@ -248,7 +248,7 @@ def _draw_shape(
     axes.set_xlim(x[0], x[-1])
 
 
-def _window(data: Aggregate, fields: FieldStatistics, shape: Shape) -> slice:
+def _window(data: Aggregate, fields: FieldStatistics, shape: DeformedShape) -> slice:
     """One and a half of the longest waves around the highest point, inside the period."""
     nodes = fields.position.size
     half = max(4, round(0.75 * nodes / data.campaign.profile.n0))

@@ -39,7 +39,7 @@ def contact_against_stress(data: Aggregate) -> Figure:
         for k, cell in _curves_of(data, hurst):
             for branch in BRANCHES:
                 axes.plot(
-                    cell.curves[f"{branch}_stress_slope"].mean,
+                    cell.curves[f"{branch}_mean_stress_over_slope"].mean,
                     cell.curves[f"{branch}_contact_fraction"].mean,
                     linestyle=LINE_OF_BRANCH[branch],
                     color=look(k).colour,
@@ -62,7 +62,7 @@ def loop_against_penetration(data: Aggregate) -> Figure:
     figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True)
     grid = panels(figure, len(hursts), 2)
     for row, hurst in zip(grid, hursts, strict=True):
-        for axes, name in zip(row, ("stress", "contact_fraction"), strict=True):
+        for axes, name in zip(row, ("mean_stress_dimensionless", "contact_fraction"), strict=True):
             for k, cell in _curves_of(data, hurst):
                 for branch in BRANCHES:
                     _with_spread(axes, data, cell, branch, name, k)

@@ -40,6 +40,7 @@ def loss_against_adhesion(data: Aggregate) -> Figure:
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
     axes = figure.axes[0]
     hursts = spread_out(data.hursts, MOST_CURVES)
+    of_paper = paper.is_the_papers(data.campaign)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
         _errorbar(
@@ -50,7 +51,7 @@ def loss_against_adhesion(data: Aggregate) -> Figure:
             f"H = {hurst:g}",
             offset=_apart(data, k, len(hursts)),
         )
-        known = [(g, paper.table_1(hurst, g)) for g in data.works_of_adhesion]
+        known = [(g, paper.table_1(hurst, g)) for g in data.works_of_adhesion if of_paper]
         quoted = [(g, value) for g, value in known if value is not None]
         if quoted:
             axes.plot(

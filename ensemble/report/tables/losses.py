@@ -11,62 +11,68 @@ from ensemble.aggregate.statistics import Estimate, interval_method
 from ensemble.report import paper
 from ensemble.report.tables.table import (
     KEY,
-    Column,
     Table,
+    TableColumn,
     Value,
     fixed,
     make_table,
     number,
     percent,
+    plain,
+    signed_percent,
 )
+from solver.profile import Array
 
 
 def losses(data: Aggregate) -> Table:
     """One row for each (H, γ), everything that ``losses.csv`` holds."""
     columns = (
         *KEY,
-        Column("n", "n"),
-        Column("failed", "failed"),
-        Column("pending", "pending"),
-        Column("loss_dimensionless_mean", "W~", number()),
-        Column("loss_dimensionless_std"),
-        Column("loss_dimensionless_sem", "s.e.", number(2)),
-        Column("loss_dimensionless_ci_low", "95 % from", number()),
-        Column("loss_dimensionless_ci_high", "to", number()),
-        Column("loss_dimensionless_error_load_steps", "± steps", number(1)),
-        Column("loss_dimensionless_error_resolution", "± grid", number(1)),
-        Column("loss_dimensionless_paper", "paper", fixed(2)),
-        Column("loss_mean [J/m^2]", "loss (J/m²)", number()),
-        Column("loss_std [J/m^2]"),
-        Column("loss_sem [J/m^2]"),
-        Column("loss_ci_low [J/m^2]"),
-        Column("loss_ci_high [J/m^2]"),
-        Column("interval"),
-        Column("loss_from_drops_mean [J/m^2]"),
-        Column("audit_residual_mean"),
-        Column("audit_residual_rms"),
-        Column("audit_residual_largest", "audit", percent),
-        Column("loss_small_scale_mean [J/m^2]"),
-        Column("loss_small_scale_sem [J/m^2]"),
-        Column("loss_large_scale_mean [J/m^2]"),
-        Column("loss_large_scale_sem [J/m^2]"),
-        Column("small_scale_share_mean"),
-        Column("small_scale_share_ci_low"),
-        Column("small_scale_share_ci_high"),
-        Column("pull_off_stress_mean [Pa]"),
-        Column("pull_off_stress_sem [Pa]"),
-        Column("pull_off_stress_ci_low [Pa]"),
-        Column("pull_off_stress_ci_high [Pa]"),
-        Column("pull_off_stress_dimensionless_mean"),
-        Column("pull_off_penetration_mean"),
-        Column("pull_off_penetration_sem"),
-        Column("h_max_mean [m]"),
-        Column("h_rms_mean [m]"),
-        Column("m0_mean [m^2]"),
-        Column("m2_mean"),
-        Column("m4_mean [1/m^2]"),
-        Column("m2_paper"),
-        Column("wall_time_mean [s]"),
+        TableColumn("n", "n"),
+        TableColumn("failed", "failed", only_if_any=True),
+        TableColumn("pending", "pending", only_if_any=True),
+        TableColumn("loss_dimensionless_mean", "W~", number()),
+        TableColumn("loss_dimensionless_std"),
+        TableColumn("loss_dimensionless_sem", "s.e.", number(2)),
+        TableColumn("loss_dimensionless_ci_low", "95 % from", number()),
+        TableColumn("loss_dimensionless_ci_high", "to", number()),
+        TableColumn("loss_dimensionless_error_numerical", "± loop", number(1), only_if_any=True),
+        TableColumn("loss_dimensionless_error_load_steps", "± steps", number(1)),
+        TableColumn("loss_dimensionless_error_resolution", "± method", number(1), only_if_any=True),
+        TableColumn("loss_dimensionless_paper", "paper", fixed(2), only_if_any=True),
+        TableColumn("loss_mean [J/m^2]", "loss (mJ/m²)", number(unit=1e-3)),
+        TableColumn("loss_std [J/m^2]"),
+        TableColumn("loss_sem [J/m^2]"),
+        TableColumn("loss_ci_low [J/m^2]"),
+        TableColumn("loss_ci_high [J/m^2]"),
+        TableColumn("interval"),
+        TableColumn("loss_from_drops_mean [J/m^2]"),
+        TableColumn("audit_residual_mean"),
+        TableColumn("audit_residual_rms"),
+        TableColumn("audit_residual_largest", "audit", percent),
+        TableColumn("races", "races", plain, only_if_any=True),
+        TableColumn("energy_at_stake_dimensionless_mean"),
+        TableColumn("loss_small_scale_mean [J/m^2]"),
+        TableColumn("loss_small_scale_sem [J/m^2]"),
+        TableColumn("loss_large_scale_mean [J/m^2]"),
+        TableColumn("loss_large_scale_sem [J/m^2]"),
+        TableColumn("small_scale_share_mean"),
+        TableColumn("small_scale_share_ci_low"),
+        TableColumn("small_scale_share_ci_high"),
+        TableColumn("pull_off_stress_mean [Pa]"),
+        TableColumn("pull_off_stress_sem [Pa]"),
+        TableColumn("pull_off_stress_ci_low [Pa]"),
+        TableColumn("pull_off_stress_ci_high [Pa]"),
+        TableColumn("pull_off_stress_dimensionless_mean"),
+        TableColumn("pull_off_penetration_mean"),
+        TableColumn("pull_off_penetration_sem"),
+        TableColumn("h_max_mean [m]"),
+        TableColumn("h_rms_mean [m]"),
+        TableColumn("m0_mean [m^2]"),
+        TableColumn("m2_mean"),
+        TableColumn("m4_mean [1/m^2]"),
+        TableColumn("m2_paper"),
+        TableColumn("wall_time_mean [s]"),
     )
     rows = [_loss_row(data, cell) for cell in data.cells]
     return make_table("Loss of one loop (Table 1)", columns, rows)
@@ -85,15 +91,18 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         cell.failed,
         cell.pending,
         *_five(found["loss_dimensionless"]),
+        found["loss_error_dimensionless"].mean,
         _error_of_load_steps(data, cell),
         _error_of_resolution(data, cell),
-        paper.table_1(cell.hurst, cell.work_of_adhesion),
+        papers_loss(data, cell),
         *_five(found["loss"]),
         interval_method(cell.done),
         found["loss_from_drops"].mean,
         found["audit_residual"].mean,
         float(np.sqrt(np.mean(audit**2))) if cell.done else None,
         float(np.max(np.abs(audit))) if cell.done else None,
+        _sum(cell.values["races"]),
+        found["energy_at_stake_dimensionless"].mean,
         found["loss_small_scale"].mean,
         found["loss_small_scale"].sem,
         found["loss_large_scale"].mean,
@@ -109,9 +118,55 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         pull_off.mean,
         pull_off.sem,
         *(found[name].mean for name in ("h_max", "h_rms", "m0", "m2", "m4")),
-        paper.m2(cell.hurst),
+        paper.m2(cell.hurst) if paper.is_the_papers(data.campaign) else None,
         found["wall_time"].mean,
     ]
+
+
+def papers_loss(data: Aggregate, cell: Cell) -> float | None:
+    """Value of the paper's Table 1, None where the campaign or the cell is not the paper's."""
+    if not paper.is_the_papers(data.campaign):
+        return None
+    return paper.table_1(cell.hurst, cell.work_of_adhesion)
+
+
+def _sum(values: Array) -> int | None:
+    return int(values.sum()) if values.size and not np.isnan(values).any() else None
+
+
+def beside_the_paper(data: Aggregate) -> Table:
+    """The paper's Table 1, cell by cell; no rows if the campaign is not the paper's."""
+    columns = (
+        *KEY,
+        TableColumn("n", "n"),
+        TableColumn("loss_dimensionless", "W~", number()),
+        TableColumn("ci_low", "95 % from", number()),
+        TableColumn("ci_high", "to", number()),
+        TableColumn("paper", "paper", fixed(2)),
+        TableColumn("deviation", "W~ off the paper by", signed_percent),
+        TableColumn("inside", "paper in the interval"),
+    )
+    rows: list[list[Value]] = []
+    for cell in data.cells:
+        value = papers_loss(data, cell)
+        if not cell.done or not paper.is_the_papers(data.campaign):
+            continue
+        loss = cell.estimates["loss_dimensionless"]
+        known = value is not None and not np.isnan(loss.low)
+        rows.append(
+            [
+                cell.hurst,
+                cell.work_of_adhesion,
+                cell.done,
+                loss.mean,
+                loss.low,
+                loss.high,
+                value,
+                loss.mean / value - 1 if value is not None else None,
+                ("yes" if loss.low <= (value or 0) <= loss.high else "no") if known else None,
+            ]
+        )
+    return make_table("Beside the paper's Table 1", columns, rows)
 
 
 def _error_of_load_steps(data: Aggregate, cell: Cell) -> float | None:
@@ -151,18 +206,18 @@ def _five(estimate: Estimate) -> list[float]:
 def paired(data: Aggregate) -> Table:
     """How the loss grows from one γ to the next on the same profiles."""
     columns = (
-        Column("hurst", "H"),
-        Column("work_of_adhesion_from [J/m^2]", "γ from"),
-        Column("work_of_adhesion_to [J/m^2]", "to (J/m²)"),
-        Column("pairs", "pairs"),
-        Column("loss_dimensionless_difference", "W~ grows by", number()),
-        Column("loss_dimensionless_difference_sem", "s.e.", number(2)),
-        Column("loss_dimensionless_difference_ci_low", "95 % from", number()),
-        Column("loss_dimensionless_difference_ci_high", "to", number()),
-        Column("loss_difference [J/m^2]", "loss by (J/m²)", number()),
-        Column("loss_difference_sem [J/m^2]"),
-        Column("loss_difference_ci_low [J/m^2]"),
-        Column("loss_difference_ci_high [J/m^2]"),
+        TableColumn("hurst", "H"),
+        TableColumn("work_of_adhesion_from [J/m^2]", "γ from"),
+        TableColumn("work_of_adhesion_to [J/m^2]", "to (J/m²)"),
+        TableColumn("pairs", "pairs"),
+        TableColumn("loss_dimensionless_difference", "W~ grows by", number()),
+        TableColumn("loss_dimensionless_difference_sem", "s.e.", number(2)),
+        TableColumn("loss_dimensionless_difference_ci_low", "95 % from", number()),
+        TableColumn("loss_dimensionless_difference_ci_high", "to", number()),
+        TableColumn("loss_difference [J/m^2]", "loss by (mJ/m²)", number(unit=1e-3)),
+        TableColumn("loss_difference_sem [J/m^2]"),
+        TableColumn("loss_difference_ci_low [J/m^2]"),
+        TableColumn("loss_difference_ci_high [J/m^2]"),
     )
     rows = [
         [
@@ -185,13 +240,13 @@ def _without_std(estimate: Estimate) -> list[float]:
 def profiles(data: Aggregate) -> Table:
     """Statistics of the profiles of each H, and the slope that the paper quotes."""
     columns = (
-        Column("hurst", "H"),
-        Column("h_rms [m]", "h_rms (m)", number()),
-        Column("h_max [m]", "mean h_max (m)", number()),
-        Column("m0 [m^2]", "m0 (m²)", number()),
-        Column("m2", "m2", number()),
-        Column("m2_paper", "m2, paper", number(2)),
-        Column("m4 [1/m^2]", "m4 (1/m²)", number()),
+        TableColumn("hurst", "H"),
+        TableColumn("h_rms [m]", "h_rms (µm)", number(unit=1e-6)),
+        TableColumn("h_max [m]", "mean h_max (µm)", number(unit=1e-6)),
+        TableColumn("m0 [m^2]", "m0 (µm²)", number(unit=1e-12)),
+        TableColumn("m2", "m2", number()),
+        TableColumn("m2_paper", "m2, paper", number(2), only_if_any=True),
+        TableColumn("m4 [1/m^2]", "m4 (1/µm²)", number(unit=1e12)),
     )
     rows: list[list[Value]] = []
     for hurst in data.hursts:
@@ -201,7 +256,7 @@ def profiles(data: Aggregate) -> Table:
             [
                 hurst,
                 *(mean[name] for name in ("h_rms", "h_max", "m0", "m2")),
-                paper.m2(hurst),
+                paper.m2(hurst) if paper.is_the_papers(data.campaign) else None,
                 mean["m4"],
             ]
         )
@@ -211,17 +266,17 @@ def profiles(data: Aggregate) -> Table:
 def companions(data: Aggregate) -> Table:
     """Losses of the campaigns beside this one, over the realisations that both have."""
     columns = (
-        Column("file", "campaign"),
-        Column("differs", "where it differs"),
+        TableColumn("file", "campaign"),
+        TableColumn("differs", "where it differs"),
         *KEY,
-        Column("pairs", "pairs"),
-        Column("loss_dimensionless_here", "W~ here", number()),
-        Column("loss_dimensionless_there", "there", number()),
-        Column("difference", "difference", number(3)),
-        Column("difference_sem", "s.e.", number(2)),
-        Column("difference_ci_low", "95 % from", number(3)),
-        Column("difference_ci_high", "to", number(3)),
-        Column("loss_dimensionless_paper", "paper", fixed(2)),
+        TableColumn("pairs", "pairs"),
+        TableColumn("loss_dimensionless_here", "W~ here", number()),
+        TableColumn("loss_dimensionless_there", "there", number()),
+        TableColumn("difference", "difference", number(3)),
+        TableColumn("difference_sem", "s.e.", number(2)),
+        TableColumn("difference_ci_low", "95 % from", number(3)),
+        TableColumn("difference_ci_high", "to", number(3)),
+        TableColumn("loss_dimensionless_paper", "paper", fixed(2), only_if_any=True),
     )
     rows: list[list[Value]] = []
     for companion in data.companions:
@@ -240,7 +295,7 @@ def companions(data: Aggregate) -> Table:
                     pair.here.mean,
                     pair.there.mean,
                     *_without_std(pair.difference),
-                    paper.table_1(cell.hurst, cell.work_of_adhesion),
+                    papers_loss(data, cell) if paper.is_the_papers(companion.campaign) else None,
                 ]
             )
     return make_table("Beside other campaigns", columns, rows)

@@ -14,9 +14,14 @@ Format = Callable[[Any], str]
 BLANK = "–"
 
 
-def number(digits: int = 4) -> Format:
-    """Show a number with so many significant digits."""
-    return lambda value: f"{value:#.{digits}g}".rstrip(".")
+def number(digits: int = 4, unit: float = 1.0) -> Format:
+    """Show a number with so many significant digits, in multiples of ``unit``: 12.30, 4e-5."""
+
+    def show(value: Any) -> str:
+        mantissa, e, exponent = f"{value / unit:#.{digits}g}".partition("e")
+        return mantissa.rstrip(".") + (f"e{int(exponent)}" if e else "")
+
+    return show
 
 
 def plain(value: Any) -> str:
@@ -29,14 +34,19 @@ def fixed(digits: int) -> Format:
     return lambda value: f"{value:.{digits}f}"
 
 
+def signed_percent(value: Any) -> str:
+    """Show a relative deviation in percent, with its sign."""
+    return f"{100 * value:+.1f} %"
+
+
 def percent(value: Any) -> str:
     """Show a fraction in percent, with two significant digits."""
     return f"{100 * value:.2g} %"
 
 
 @dataclass(frozen=True)
-class Column:
-    """One column.
+class TableColumn:
+    """One column of a table.
 
     Attributes
     ----------
@@ -46,15 +56,18 @@ class Column:
         For people; empty if the column is for the CSV file only.
     show : callable
         Turns a value into text.
+    only_if_any : bool
+        For people only if a row has a value that is not zero.
     """
 
     name: str
     heading: str = ""
     show: Format = plain
+    only_if_any: bool = False
 
 
 # What a row is about.
-KEY = (Column("hurst", "H"), Column("work_of_adhesion [J/m^2]", "γ (J/m²)"))
+KEY = (TableColumn("hurst", "H"), TableColumn("work_of_adhesion [J/m^2]", "γ (J/m²)"))
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,7 @@ class Table:
     """Rows of values; None and NaN are blank."""
 
     title: str
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     rows: tuple[tuple[Value, ...], ...]
 
     def write_csv(self, path: Path) -> None:
@@ -99,7 +112,12 @@ class Table:
             print("  ".join(cells).rstrip(), file=stream)
 
     def _shown(self) -> list[list[str]]:
-        kept = [(k, column) for k, column in enumerate(self.columns) if column.heading]
+        kept = [
+            (k, column)
+            for k, column in enumerate(self.columns)
+            if column.heading
+            and not (column.only_if_any and all(_missing(r[k]) or not r[k] for r in self.rows))
+        ]
         body = [
             [BLANK if _missing(row[k]) else column.show(row[k]) for k, column in kept]
             for row in self.rows
@@ -107,7 +125,9 @@ class Table:
         return [[column.heading for _, column in kept], *body]
 
 
-def make_table(title: str, columns: Sequence[Column], rows: Sequence[Sequence[Value]]) -> Table:
+def make_table(
+    title: str, columns: Sequence[TableColumn], rows: Sequence[Sequence[Value]]
+) -> Table:
     """Build a table; every row must have as many values as there are columns."""
     for row in rows:
         if len(row) != len(columns):

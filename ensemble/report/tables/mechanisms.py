@@ -8,8 +8,8 @@ from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.fields import fitted_slope
 from ensemble.report.tables.table import (
     KEY,
-    Column,
     Table,
+    TableColumn,
     Value,
     fixed,
     make_table,
@@ -25,11 +25,11 @@ def jumps(data: Aggregate) -> Table:
     found = data.jumps
     columns = (
         *KEY,
-        Column("kind", "kind"),
-        Column("scale", "scale"),
-        Column("jumps_per_loop", "jumps a loop", number(3)),
-        Column("energy_per_loop [J/m^2]", "drops a loop (J/m²)", number(3)),
-        Column("share_of_drops", "share", percent),
+        TableColumn("kind", "kind"),
+        TableColumn("scale", "scale"),
+        TableColumn("jumps_per_loop", "jumps a loop", number(3)),
+        TableColumn("energy_per_loop [J/m^2]", "drops a loop (mJ/m²)", number(3, unit=1e-3)),
+        TableColumn("share_of_drops", "share", percent),
     )
     rows: list[list[Value]] = []
     for k, cell in enumerate(data.cells):
@@ -55,7 +55,7 @@ def shares_by_kind(data: Aggregate) -> Table:
     """Share of each kind in the drops, one row for each (H, γ): :func:`jumps` at a glance."""
     found = data.jumps
     used = [j for j in range(len(found.kinds)) if found.number[:, j].any()]
-    columns = (*KEY, *(Column(found.kinds[j], found.kinds[j], percent) for j in used))
+    columns = (*KEY, *(TableColumn(found.kinds[j], found.kinds[j], percent) for j in used))
     rows: list[list[Value]] = []
     for k, cell in enumerate(data.cells):
         total = float(found.energy[k].sum())
@@ -68,14 +68,14 @@ def mechanisms(data: Aggregate) -> Table:
     """Loss by mechanism and pull-off, one row for each (H, γ)."""
     columns = (
         *KEY,
-        Column("small_scale_share", "small-scale share", percent),
-        Column("small_scale_share_ci_low", "95 % from", percent),
-        Column("small_scale_share_ci_high", "to", percent),
-        Column("jumps_per_loop", "jumps a loop", number(3)),
-        Column("pull_off_stress [Pa]", "pull-off (Pa)", number(3)),
-        Column("pull_off_stress_sem [Pa]", "s.e.", number(2)),
-        Column("pull_off_penetration", "at Δ/h_max", number(3)),
-        Column("wall_time [s]", "s a loop", plain),
+        TableColumn("small_scale_share", "small-scale share", percent),
+        TableColumn("small_scale_share_ci_low", "95 % from", percent),
+        TableColumn("small_scale_share_ci_high", "to", percent),
+        TableColumn("jumps_per_loop", "jumps a loop", number(3)),
+        TableColumn("pull_off_stress [Pa]", "pull-off (kPa)", number(3, unit=1e3)),
+        TableColumn("pull_off_stress_sem [Pa]", "s.e. (kPa)", number(2, unit=1e3)),
+        TableColumn("pull_off_penetration", "at Δ/h_max", number(3)),
+        TableColumn("wall_time [s]", "s a loop", plain),
     )
     rows: list[list[Value]] = []
     for cell in data.cells:
@@ -101,13 +101,13 @@ def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
     columns = (
         *KEY,
-        Column("branch", "branch"),
-        Column("penetration", "Δ/h_max", fixed(2)),
-        Column("realisations", "n"),
-        Column("slope", "slope", fixed(2)),
-        Column("slope_sem", "s.e.", number(1)),
-        Column("slope_persson", "-(2+H)", fixed(2)),
-        Column("slope_profile", "-(2H+1)", fixed(2)),
+        TableColumn("branch", "branch"),
+        TableColumn("penetration", "Δ/h_max", fixed(2)),
+        TableColumn("realisations", "n"),
+        TableColumn("slope", "slope", fixed(2)),
+        TableColumn("slope_sem", "s.e.", number(1)),
+        TableColumn("slope_persson", "-(2+H)", fixed(2)),
+        TableColumn("slope_profile", "-(2H+1)", fixed(2)),
     )
     fields = data.fields
     rows: list[list[Value]] = []
