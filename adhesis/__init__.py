@@ -5,6 +5,7 @@ notice. Lengths in m, stresses in Pa (compression positive), energies per unit d
 per nominal area in J/m². Loads no MPI and no matplotlib.
 """
 
+from adhesis._open import open
 from ensemble.trace.answer import loss_of_trace
 from ensemble.trace.prepare import prepare_trace
 from ensemble.trace.read import read_trace
@@ -34,6 +35,7 @@ __all__ = [
     "Profile",
     "loss_of_trace",
     "make_method",
+    "open",
     "prepare_trace",
     "profile_from_heights",
     "read_trace",

@@ -10,6 +10,7 @@ from ensemble.aggregate import statistics
 from ensemble.aggregate.average import Aggregate
 from ensemble.report import findings, paper
 from ensemble.report.figures.catalogue import Illustration
+from ensemble.report.figures.style import left_out
 from ensemble.report.tables import losses as loss_tables
 from ensemble.report.tables import mechanisms as mechanism_tables
 
@@ -36,6 +37,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         " ".join(findings.verdict(data)),
         *_bullets(findings.missing(data)),
         _summary(data),
+        left_out(data),
         "## Losses",
         losses.markdown(),
         _footnote(data),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import re
@@ -15,6 +16,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray
+from matplotlib.container import BarContainer, ErrorbarContainer
 from matplotlib.image import imread
 
 from ensemble.aggregate.average import aggregate
@@ -29,6 +31,7 @@ from ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS
 from ensemble.report.figures.style import save, spread_out, style
 from ensemble.report.tables import losses as loss_tables
 from ensemble.report.tables import mechanisms as mechanism_tables
+from ensemble.report.tables.table import number
 from ensemble.report.write import write_report
 from ensemble.task.compute import make_problem
 from tests.support.synthetic_results import campaign, rows, write
@@ -39,7 +42,7 @@ GAMMAS = (0.01, 0.04, 0.07)
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory) -> Path:
-    plan = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5)
+    plan = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5, ratio=100)
     return write(tmp_path_factory.mktemp("report") / "r.h5", plan, rows(plan))
 
 
@@ -77,14 +80,50 @@ def test_losses_csv_holds_the_averages_with_units(report, data):
         assert float(row["m2_mean"]) == pytest.approx(cell.values["m2"][0])
         tension = 2 * cell.values["pull_off_stress"] / (1e6 / 0.75 * 1000 * cell.values["h_max"])
         assert float(row["pull_off_stress_dimensionless_mean"]) == pytest.approx(tension.mean())
-        known = (cell.hurst, cell.work_of_adhesion) == (0.8, 0.04)
-        assert row["loss_dimensionless_paper"] == ("19.36" if known else "")
+        value = paper.table_1(cell.hurst, cell.work_of_adhesion)
+        assert row["loss_dimensionless_paper"] == ("" if value is None else str(value))
+        assert float(row["loss_dimensionless_error_numerical"]) == pytest.approx(
+            1e-4 * cell.values["loss_dimensionless"].mean()
+        )
 
 
-def test_only_what_is_known_of_the_paper_is_shown():
-    assert paper.table_1(0.8, 0.04) == 19.36
-    assert paper.table_1(0.7, 0.04) is None
+def test_the_papers_table_has_eight_numbers_and_a_dash():
+    table = [[paper.table_1(h, g) for g in GAMMAS] for h in (0.7, 0.8, 0.9)]
+    assert table == [[None, 26.6, 42.83], [3.44, 19.36, 49.25], [2.59, 17.91, 28.15]]
+    assert len(paper.TABLE_1) == 8
     assert (paper.m2(0.7), paper.m2(0.9), paper.m2(0.5)) == (5.1e-3, 1.5e-3, None)
+
+
+def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path, drawn):
+    for name in ("paper", "beside/ratio-200", "beside/equal-c0", "beside/penetration-0.93"):
+        assert paper.is_the_papers(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
+    text = (ROOT / "jobs" / "paper.toml").read_text()
+    for old, new in (
+        ("max_penetration = 0.9 ", "max_penetration = 0.6 "),
+        ("ratio = 100", "ratio = 10"),
+        ("young = 1e6", "young = 2e6"),
+        ("poisson = 0.5", "poisson = 0.3"),
+        ("n0 = 10", "n0 = 9"),
+        ("h_rms = 1e-6", "h_rms = 2e-6"),
+    ):
+        assert old in text
+        assert not paper.is_the_papers(parse_campaign(text.replace(old, new))), new
+    plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=3, ratio=20)
+    path = write(tmp_path / "r.h5", plan, rows(plan))
+    data = write_report(path, tmp_path / "out", io.StringIO())
+    page = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "19.36" not in page
+    assert "aper" not in page.replace("paper.h5", "")
+    assert "19.36" not in (tmp_path / "out" / "losses.csv").read_text()
+    with style():
+        assert "H = 0.8, paper" not in lines_of(losses.loss_against_adhesion(data).axes[0])
+
+
+def test_numbers_are_written_as_people_write_them():
+    assert [number(1)(4e-5), number(4)(12.3), number(2)(1234.0), number(3)(1e-6)] == [
+        *("4e-5", "12.30", "1.2e3", "1.00e-6"),
+    ]
+    assert number(3, unit=1e3)(8240.0) == "8.24"
 
 
 def test_tables_print_as_plain_lines_without_a_terminal(data):
@@ -95,6 +134,7 @@ def test_tables_print_as_plain_lines_without_a_terminal(data):
     assert "\x1b" not in stream.getvalue()
     assert lines[6].split()[:3] == ["0.8", "0.04", "5"]
     assert "19.36" in lines[6]
+    assert "failed" not in lines[1]  # nothing has
 
 
 def test_jumps_by_kind_add_up_to_all_drops(data):
@@ -180,18 +220,25 @@ def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
         np.testing.assert_allclose(line.get_ydata(), [e.mean for e in found])
         ends = np.array(bars.get_segments())[:, :, 1]
         np.testing.assert_allclose(ends, [[e.low, e.high] for e in found], rtol=1e-12)
-    assert lines_of(axes)["H = 0.8, paper"].tolist() == [[0.04, 19.36]]
+    stars = [[0.01, 3.44], [0.04, 19.36], [0.07, 49.25]]
+    assert lines_of(axes)["H = 0.8, paper"].tolist() == stars
+    assert len(lines_of(axes)["H = 0.7, paper"]) == 2
     assert "J/m²" in axes.get_xlabel()
 
 
 def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
     with style():
         axes = losses.loss_by_mechanism(data).axes[0]
-    large, small = axes.containers
+    large, small = (c for c in axes.containers if isinstance(c, BarContainer))
     for k, cell in enumerate(data.cells):
         top = small[k].get_y() + small[k].get_height()
-        assert top == pytest.approx(cell.values["loss_from_drops"].mean())
-        assert large[k].get_height() == pytest.approx(cell.values["loss_large_scale"].mean())
+        assert top == pytest.approx(1e3 * cell.values["loss_from_drops"].mean())
+        assert large[k].get_height() == pytest.approx(1e3 * cell.values["loss_large_scale"].mean())
+    spread = [c for c in axes.containers if isinstance(c, ErrorbarContainer)]
+    for bars, name in zip(spread, ("loss_large_scale", "loss_small_scale"), strict=True):
+        ends = np.array(bars.lines[2][0].get_segments())[:, :, 1]
+        found = [cell.estimates[name] for cell in data.cells]
+        np.testing.assert_allclose(np.ptp(ends, axis=1), [1e3 * (e.high - e.low) for e in found])
 
 
 def test_jump_densities_integrate_to_the_number_of_jumps(data):
@@ -200,7 +247,8 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data):
     cell = data.cell(0.7, 0.01)
     total = 0.0
     for axes in figure.axes[:2]:
-        patch = next(p for p in axes.patches if p.get_label() == r"$\gamma$ = 0.01 J/m²")
+        label = r"$\gamma$ = 0.01 J/m²"
+        patch = next(p for p in axes.patches if p.get_label() == label)
         values, edges, _ = patch.get_data()
         total += np.nansum(values * np.diff(np.log10(edges)))
         assert BIN_EDGES[0] <= edges[0] < edges[-1] <= BIN_EDGES[-1]
@@ -221,6 +269,37 @@ def test_shapes_show_profile_and_surface_at_the_same_separation(data):
     detail = lines_of(figure.axes[1])["rigid"]
     assert detail[:, 1].max() == drawn["rigid"][:, 1].max()
     assert len(detail) < len(drawn["rigid"]) / 3
+
+
+def test_the_detail_of_the_shapes_goes_on_across_the_end_of_the_period(data):
+    """The highest point lies at the end: what comes before and after it is shown."""
+    fields = data.fields
+    turned = []
+    for shape in fields.shapes:
+        higher = shape.height.copy()
+        higher[-1] = 2 * higher.max()  # the highest point, half a wave from a crest
+        turned.append(replace(shape, height=higher))
+    with style():
+        figure = field_figures.shapes(replace(data, fields=replace(fields, shapes=tuple(turned))))
+    x, y = lines_of(figure.axes[1])["rigid"].T
+    period = 1e3 * data.campaign.profile.period
+    assert x[0] < period < x[-1]
+    assert np.allclose(np.diff(x), x[1] - x[0])
+    assert abs(x[np.argmax(y)] - (x[0] + x[-1]) / 2) < 2 * (x[1] - x[0])
+    assert "H = 0.7, $\\gamma$ = 0.04" in figure.axes[0].get_title(loc="left")
+
+
+def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, drawn):
+    for count, said in ((5, ""), (8, "6 of 8 γ")):
+        plan = campaign(hurst=(0.7,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
+        path = write(tmp_path / f"{count}.h5", plan, rows(plan))
+        data = write_report(path, tmp_path / str(count), io.StringIO())
+        with style():
+            axes = loops.loop_against_penetration(data).axes[0]
+        assert len([k for k in lines_of(axes) if "unloading" in k]) == min(count, 6)
+        page = (tmp_path / str(count) / "report.md").read_text(encoding="utf-8")
+        assert ("Figures with a panel" in page) is bool(said)
+        assert said in page
 
 
 def test_spectra_carry_both_reference_slopes(data):
@@ -330,7 +409,8 @@ def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, monkeypatch)
     names = {path.name for path in tmp_path.iterdir()}
     assert {"losses.csv", "curves.nc", "report.md", "loss_by_mechanism.pdf"} < names
     for name in names:
-        assert (tmp_path / name).read_bytes() == (report / name).read_bytes(), name
+        if name != "report.html":  # it holds the figures, of which only some were drawn
+            assert (tmp_path / name).read_bytes() == (report / name).read_bytes(), name
 
 
 @pytest.fixture
@@ -393,10 +473,21 @@ def test_bad_input_is_refused_in_one_sentence(file, tmp_path, capsys):
 
 def test_findings_compare_with_the_paper(data):
     text = "\n".join(findings.agreement(data))
-    loss = data.cell(0.8, 0.04).estimates["loss_dimensionless"]
-    assert f"W~ = {loss.mean:.4g} against 19.36" in text
-    assert "outside the 95 % interval" in text
-    assert "only 1 is known" in text
+    table = loss_tables.beside_the_paper(data)
+    assert len(table.rows) == 6
+    off = []
+    for row in table.rows:
+        loss = data.cell(*row[:2]).estimates["loss_dimensionless"]
+        value = paper.table_1(*row[:2])
+        assert row[3:7] == (loss.mean, loss.low, loss.high, value)
+        if value is None:
+            assert row[7:] == (None, None)
+        else:
+            off.append(loss.mean / value - 1)
+            assert row[7] == off[-1]
+            assert row[8] == ("yes" if loss.low <= value <= loss.high else "no")
+    assert "Of the 8 losses of the paper's Table 1 5 have a cell here" in text
+    assert f"{100 * min(off):+.1f} % to {100 * max(off):+.1f} %" in text
     assert "0.002 against 0.0027 at H = 0.8" in text
     assert "grows with γ at every H" in text
     ratios = [ratio for cell in data.cells if (ratio := findings.area_ratio(cell)) is not None]
@@ -439,12 +530,12 @@ def test_values_are_spread_evenly():
 
 def companion(tmp_path, name: str, factor: float, **replaced: str) -> Path:
     """The campaign of ``file`` with some lines replaced, its losses multiplied by a factor."""
-    text = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5).text
+    text = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5, ratio=100).text
     for old, new in replaced.values():
         assert old in text
         text = text.replace(old, new)
     plan = parse_campaign(text)
-    values = rows(campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5))
+    values = rows(campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=5, ratio=100))
     values |= {n: values[n] * factor for n in ("loss", "loss_dimensionless")}
     short = {n for n, v in values.items() if "loading_" in n or n.startswith(("psd", "gap_d"))}
     return write(tmp_path / name, plan, {n: v for n, v in values.items() if n not in short})
@@ -492,7 +583,7 @@ def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, drawn
 
 
 def test_campaigns_with_one_gamma_in_common_are_drawn_for_each_hurst(file, tmp_path):
-    plan = campaign(hurst=(0.7, 0.8), gamma=(0.04,), realisations=3)
+    plan = campaign(hurst=(0.7, 0.8), gamma=(0.04,), realisations=3, ratio=100)
     lower = parse_campaign(plan.text.replace("max_penetration = 0.9", "max_penetration = 0.6"))
     values = {name: row for name, row in rows(plan).items() if row.ndim == 1}
     data = aggregate(file, [write(tmp_path / "lower.h5", lower, values)])
@@ -507,12 +598,95 @@ def test_campaigns_with_one_gamma_in_common_are_drawn_for_each_hurst(file, tmp_p
 
 def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
     factor = 19 / aggregate(file).cell(0.8, 0.04).estimates["loss_dimensionless"].mean
-    wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 10", "ratio = 20"))
-    data = aggregate(file, [wider])
+    wider = companion(tmp_path, "wider.h5", factor, a=("ratio = 100", "ratio = 200"))
+    other = companion(tmp_path, "other.h5", factor, a=("ratio = 100", "ratio = 30"))
+    data = aggregate(file, [wider, other])
     assert data.companions[0].kind == "spectrum"
     (sentence,) = findings.readings(data)
-    assert sentence.startswith("Nearest to the known values of the paper's Table 1: wider.h5")
-    assert "wider.h5 1.9 %" in sentence
+    names = re.findall(r"(\w+\.h5) [\d.]+ % \(5 values\)", sentence)
+    assert sorted(names) == ["r.h5", "wider.h5"]  # other.h5 is no reading of the paper's
+    found = [
+        data.companions[0].cell(h, g).estimates["loss_dimensionless"].mean / paper.table_1(h, g) - 1
+        for h, g in paper.TABLE_1
+        if h < 0.9
+    ]
+    assert f"wider.h5 {100 * np.sqrt(np.mean(np.square(found))):.1f} %" in sentence
+
+
+# ---------------------------------------------------------------------- how well it is known
+
+
+def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):
+    outcome, statistical, numerical = findings.verdict(data)
+    means = [cell.estimates["loss_dimensionless"].mean for cell in data.cells]
+    assert f"from W~ = {min(means):.3g}" in outcome
+    assert f"to W~ = {max(means):.3g}" in outcome
+    halves = [
+        (e.high - e.low) / 2 / e.mean
+        for e in (cell.estimates["loss_dimensionless"] for cell in data.cells)
+    ]
+    assert "5 realisations" in statistical
+    assert f"{100 * min(halves):.2g} to {100 * max(halves):.2g} %" in statistical
+    assert "at most 0.01 % of it" in numerical
+    audit = max(np.abs(cell.values["audit_residual"]).max() for cell in data.cells)
+    assert f"closes within {100 * audit:.2g} %" in numerical
+    raced = sum(int((cell.values["races"] > 0).sum()) for cell in data.cells)
+    assert f"in {raced} of 30 loops another rule of descent" in numerical
+    assert "at most 2 % of a loop's loss" in numerical
+    head = (report / "report.md").read_text(encoding="utf-8").split("\n\n")[1]
+    assert head == " ".join(findings.verdict(data))
+
+
+def test_doubtful_losses_and_steep_profiles_are_said(tmp_path):
+    plan = campaign(hurst=(0.7,), gamma=(0.01, 0.02), realisations=4)
+    values = rows(plan)
+    values["audit_residual"][:] = 1e-5
+    clean = aggregate(write(tmp_path / "clean.h5", plan, values))
+    assert not any("WARNING" in text for text in findings.quality(clean))
+    values["audit_residual"][2] = -0.19
+    values["loss_error"][5] = 0.03 * values["loss"][5]
+    values["m2"][4:] = 1.2**2
+    data = aggregate(write(tmp_path / "r.h5", plan, values))
+    doubtful, steep = (text for text in findings.quality(data) if "WARNING" in text)
+    assert "2 of 8 losses are doubtful" in doubtful
+    assert doubtful.index("row 2, H = 0.7, γ = 0.01 J/m² (19 %)") < doubtful.index("row 5")
+    assert "slope exceeds" in steep
+    assert "γ = 0.02" in steep
+    assert "γ = 0.01" not in steep
+
+
+def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, drawn):
+    for n, named, other in ((3, "Student's t", "bootstrap"), (5, "bootstrap", "Student")):
+        plan = campaign(hurst=(0.7,), gamma=(0.01,), realisations=n)
+        path = write(tmp_path / f"{n}.h5", plan, rows(plan))
+        write_report(path, tmp_path / str(n), io.StringIO())
+        page = (tmp_path / str(n) / "report.md").read_text(encoding="utf-8")
+        assert named in page
+        assert other not in page
+
+
+def test_a_long_list_of_cells_is_cut(tmp_path):
+    plan = campaign(gamma=tuple(0.01 * k for k in range(1, 8)), realisations=1)
+    sentences = findings.missing(aggregate(write(tmp_path / "r.h5", plan, rows(plan))))
+    assert max(text.count("γ = ") for text in sentences) == 4
+    assert "and 10 more" in sentences[-1]
+
+
+def test_the_html_page_needs_no_other_file(report):
+    page = (report / "report.html").read_text(encoding="utf-8")
+    assert not re.findall(r'(?:src|href)="(?!data:image/png|\w+\.pdf")', page)
+    images = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
+    assert {base64.b64decode(text) for text in images} == {
+        path.read_bytes() for path in report.glob("*.png")
+    }
+    assert len(images) == 12
+    markdown = (report / "report.md").read_text(encoding="utf-8")
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", page)
+    assert len(cells) == sum(
+        line.count("|") - 1
+        for table in re.findall(r"(?:^\|.*\n)+", markdown, re.MULTILINE)
+        for line in table.splitlines()[2:]
+    )
 
 
 def test_campaigns_that_come_along_are_comparable_with_the_paper_campaign():

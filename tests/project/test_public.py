@@ -33,6 +33,7 @@ PUBLIC = [
     "Profile",
     "loss_of_trace",
     "make_method",
+    "open",
     "prepare_trace",
     "profile_from_heights",
     "read_trace",

@@ -18,7 +18,7 @@ CAMPAIGN = """
 [profile]
 period = 6.283185307179586e-3
 n0 = 10
-ratio = 10
+ratio = {ratio}
 h_rms = 1e-6
 [material]
 young = 1e6
@@ -38,10 +38,15 @@ field_nodes = 256
 """
 
 
-def campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32) -> Campaign:
+def campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32, ratio=10) -> Campaign:
+    """The paper's profile, material and path if ``ratio`` is 100; else its own."""
     return parse_campaign(
         CAMPAIGN.format(
-            hurst=list(hurst), gamma=list(gamma), realisations=realisations, jumps=jumps
+            hurst=list(hurst),
+            gamma=list(gamma),
+            realisations=realisations,
+            jumps=jumps,
+            ratio=ratio,
         )
     )
 
@@ -86,8 +91,8 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "loss_large_scale": (1 - share) * drops,
         "audit_residual": audit,
         "loss_error": 1e-4 * loss,
-        "races": np.zeros(n, dtype=np.int32),
-        "energy_at_stake": np.zeros(n),
+        "races": (np.arange(n) % 7 == 3).astype(np.int32),
+        "energy_at_stake": np.where(np.arange(n) % 7 == 3, 0.02 * loss, 0.0),
         "pull_off_penetration": pull_off[:, 0],
         "pull_off_stress": -unloading.min(axis=1) * scale,
         "states": np.full(n, 90, dtype=np.int32),

@@ -39,7 +39,8 @@ LOOPS = (
         "fig6_contact_against_stress",
         "Contact fraction against mean stress",
         "Means over realisations, taken at equal penetration; σ~ = 2p̄/(E* q0 h_max) with each "
-        "realisation's own h_max, compression positive.",
+        "realisation's own h_max, compression positive. Shading: one standard deviation of A/A0 of "
+        "a single realisation.",
         loops.contact_against_stress,
         "Fig. 6",
     ),
@@ -74,7 +75,8 @@ SHAPES = (
         "Deformed shapes",
         "The first realisation that kept its fields, middle H and γ: rigid profile h - s and "
         "elastic surface v on both branches, at the same separation. In contact the two coincide. "
-        "Right: one and a half of the longest waves around the highest point.",
+        "Right: one and a half of the longest waves around the highest point, carried on across "
+        "the end of the period where it lies near one.",
         fields.shapes,
         "Fig. 3",
     ),
@@ -118,14 +120,15 @@ MECHANISMS = (
         "Loss by mechanism",
         "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
         "large scale: patches appear, merge, split, vanish or pull off. Figures above the bars: "
-        "share of the small scale.",
+        "share of the small scale. Error bars: 95 % interval of the mean of either part.",
         losses.loss_by_mechanism,
     ),
     Illustration(
         "jump_energies",
         "Distribution of the energy drops",
         "Jumps of one loop per decade of energy drop, mean over realisations. Drops more than "
-        "eight decades below the largest are not shown.",
+        "eight decades below the largest are not shown. Shading: n jumps in a bin are known to "
+        "sqrt(n).",
         losses.jump_energies,
     ),
     Illustration(

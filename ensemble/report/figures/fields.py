@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.cells import Cell
@@ -32,8 +33,7 @@ from ensemble.report.findings import typical_cell
 from ensemble.task.fields import field_plan
 from solver.method import BRANCHES
 
-# Gap/h_max below which the density is that of the interpolation beside edges alone.
-_LEAST_GAP = 1e-3
+_LEAST_DENSITY = 1e-6
 # Colour of a branch where both are drawn over the rigid profile.
 _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 
@@ -55,17 +55,18 @@ def shapes(data: Aggregate) -> Figure:
     )
     if shape is None:
         return figure
+    everywhere = np.arange(fields.position.size)
     window = _window(data, fields, shape)
     for (whole, detail), k in zip(panels(figure, len(chosen), 2), chosen, strict=True):
         separation = shape.h_max * (1 - fields.penetration[k])
-        for axes, part in ((whole, slice(None)), (detail, window)):
+        for axes, part in ((whole, everywhere), (detail, window)):
             _draw_shape(axes, fields, shape, k, separation, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
         label_panel(
             whole,
-            rf"$\Delta/h_\mathrm{{max}}$ = {fields.penetration[k]:.2f}, "
-            f"separation $s$ = {1e6 * separation:.2f} µm",
+            rf"{_cell_label(cell)}, $\Delta/h_\mathrm{{max}}$ = {fields.penetration[k]:.2f}, "
+            f"$s$ = {1e6 * separation:.2f} µm",
         )
         label_panel(detail, "detail")
         whole.set_ylabel("height (µm)")
@@ -120,7 +121,7 @@ def gap_density(data: Aggregate) -> Figure:
                     )
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_xlim(left=_LEAST_GAP)
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
         axes.set_ylabel(r"density of $t/h_\mathrm{max}$")
         label_panel(axes, _cell_label(cell))
     figure.axes[len(hursts) - 1].set_xlabel(r"gap $t/h_\mathrm{max}$")
@@ -228,9 +229,12 @@ def _draw_shape(
     shape: DeformedShape,
     k: int,
     separation: float,
-    part: slice,
+    part: NDArray[np.intp],
 ) -> None:
-    x = 1e3 * fields.position[part]
+    """Draw the nodes ``part``, counted on beyond the period where they exceed it."""
+    nodes = fields.position.size
+    x = 1e3 * part * (fields.position[1] - fields.position[0])
+    part = part % nodes
     rigid = 1e6 * (shape.height[part] - separation)
     axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
     axes.plot(x, rigid, color="0.4", linewidth=0.5, label="rigid")
@@ -248,13 +252,12 @@ def _draw_shape(
     axes.set_xlim(x[0], x[-1])
 
 
-def _window(data: Aggregate, fields: FieldStatistics, shape: DeformedShape) -> slice:
-    """One and a half of the longest waves around the highest point, inside the period."""
+def _window(data: Aggregate, fields: FieldStatistics, shape: DeformedShape) -> NDArray[np.intp]:
+    """Nodes of one and a half of the longest waves around the highest point, across the ends."""
     nodes = fields.position.size
-    half = max(4, round(0.75 * nodes / data.campaign.profile.n0))
+    half = min(max(4, round(0.75 * nodes / data.campaign.profile.n0)), nodes // 2)
     top = int(np.argmax(shape.height))
-    start = min(max(0, top - half), max(0, nodes - 2 * half))
-    return slice(start, min(nodes, start + 2 * half))
+    return np.arange(top - half, top + half, dtype=np.intp)
 
 
 def _penetration_handles(

@@ -38,9 +38,20 @@ def contact_against_stress(data: Aggregate) -> Figure:
     for axes, hurst in zip(column, hursts, strict=True):
         for k, cell in _curves_of(data, hurst):
             for branch in BRANCHES:
+                stress = cell.curves[f"{branch}_mean_stress_over_slope"].mean
+                area = cell.curves[f"{branch}_contact_fraction"]
+                if cell.done > 1:
+                    axes.fill_between(
+                        stress,
+                        np.maximum(area.mean - area.std, 0),
+                        area.mean + area.std,
+                        color=look(k).colour,
+                        alpha=0.13,
+                        linewidth=0,
+                    )
                 axes.plot(
-                    cell.curves[f"{branch}_mean_stress_over_slope"].mean,
-                    cell.curves[f"{branch}_contact_fraction"].mean,
+                    stress,
+                    area.mean,
                     linestyle=LINE_OF_BRANCH[branch],
                     color=look(k).colour,
                     marker=look(k).marker,

@@ -34,6 +34,8 @@ from ensemble.report.figures.style import (
 )
 from ensemble.report.findings import typical_cell
 
+_MOST_BARS = 9  # in one column, so that their labels do not touch
+
 
 def loss_against_adhesion(data: Aggregate) -> Figure:
     """Table 1 as a figure: W~ against γ for each H with intervals, the paper's values beside."""
@@ -67,7 +69,7 @@ def loss_against_adhesion(data: Aggregate) -> Figure:
     axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
     axes.set_ylabel(r"loss $\tilde W = \oint\tilde\sigma\,\mathrm{d}\tilde\Delta$")
     axes.set_ylim(bottom=0)
-    axes.legend(loc="upper left")
+    legend_above(figure, axes.get_legend_handles_labels()[0], 3)
     return figure
 
 
@@ -92,7 +94,7 @@ def loss_against_slope(data: Aggregate) -> Figure:
     axes.set_xlabel("mean square slope $m_2$")
     axes.set_ylabel(r"loss $\tilde W$")
     axes.set_ylim(bottom=0)
-    legend_above(figure, axes.get_legend_handles_labels()[0], MOST_CURVES)
+    legend_above(figure, axes.get_legend_handles_labels()[0], 3)
     return figure
 
 
@@ -168,32 +170,57 @@ def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, 
 
 def loss_by_mechanism(data: Aggregate) -> Figure:
     """Sum of the drops at small-scale and at large-scale jumps, for each (H, γ)."""
-    figure = new_figure(1, 1, ONE_COLUMN, 65 * MM)
-    axes = figure.axes[0]
     cells = _cells(data)
+    width = ONE_COLUMN if len(cells) <= _MOST_BARS else TWO_COLUMNS
+    figure = new_figure(1, 1, width, 68 * MM)
+    axes = figure.axes[0]
     place = np.arange(len(cells))
-    large = np.array([cell.estimates["loss_large_scale"].mean for cell in cells])
-    small = np.array([cell.estimates["loss_small_scale"].mean for cell in cells])
-    axes.bar(place, large, color="#56B4E9", edgecolor="black", linewidth=0.5, label="large scale")
-    axes.bar(
-        place,
-        small,
-        bottom=large,
-        color="#E69F00",
-        edgecolor="black",
-        linewidth=0.5,
-        hatch="////",
-        label="small scale",
-    )
-    for x, cell, top in zip(place, cells, large + small, strict=True):
+    large = [cell.estimates["loss_large_scale"] for cell in cells]
+    small = [cell.estimates["loss_small_scale"] for cell in cells]
+    bottom = np.zeros(len(cells))
+    for found, colour, hatch, label, aside in (
+        (large, "#56B4E9", "", "large scale", -0.15),
+        (small, "#E69F00", "////", "small scale", 0.15),
+    ):
+        mean = 1e3 * np.array([estimate.mean for estimate in found])
+        low = 1e3 * np.array([estimate.low for estimate in found])
+        high = 1e3 * np.array([estimate.high for estimate in found])
+        axes.bar(
+            place,
+            mean,
+            bottom=bottom,
+            color=colour,
+            edgecolor="black",
+            linewidth=0.5,
+            hatch=hatch,
+            label=label,
+        )
+        axes.errorbar(
+            place + aside,
+            bottom + mean,
+            yerr=np.nan_to_num(np.array([mean - low, high - mean])),
+            fmt="none",
+            ecolor="black",
+            elinewidth=0.8,
+            label="_",
+        )
+        bottom = bottom + mean
+    above = 1e3 * np.nan_to_num([found.high - found.mean for found in small])
+    reach = np.fmax(bottom + above, 1e3 * np.array([found.high for found in large]))
+    for x, cell, top in zip(place, cells, reach, strict=True):
         share = cell.estimates["small_scale_share"].mean
         axes.annotate(
-            f"{100 * share:.0f} %", (x, top), (0, 2), textcoords="offset points", ha="center"
+            f"{100 * share:.0f} %",
+            (x, top),
+            (0, 3),
+            textcoords="offset points",
+            ha="center",
+            fontsize=6,
         )
     axes.set_xticks(place, [f"{cell.hurst:g}\n{cell.work_of_adhesion:g}" for cell in cells])
     axes.set_xlabel(r"$H$ (upper line), $\gamma$ in J/m² (lower line)")
-    axes.set_ylabel("sum of drops (J/m²)")
-    axes.set_ylim(0, 1.12 * float((large + small).max(initial=0)) or 1)
+    axes.set_ylabel("sum of drops (mJ/m²)")
+    axes.set_ylim(0, 1.12 * float(reach.max(initial=0)) or 1)
     axes.grid(False, axis="x")
     legend_above(figure, axes.get_legend_handles_labels()[0], 2)
     return figure
@@ -232,9 +259,22 @@ def _jump_density(axes: Axes, data: Aggregate, cell: Cell, small: bool, k: int) 
     histogram = found.histogram[data.cells.index(cell)]
     density = histogram[found.small_scale == small].sum(axis=0) * BINS_PER_DECADE / cell.done
     part = _occupied(found.histogram)
+    edges = BIN_EDGES[part.start : part.stop + 1]
+    # Jumps are counted: n of them are known to sqrt(n).
+    scatter = density / np.sqrt(np.maximum(density * cell.done / BINS_PER_DECADE, 1))
+    axes.stairs(
+        (density + scatter)[part],
+        edges,
+        baseline=np.maximum(density - scatter, 0.3 * density)[part],
+        fill=True,
+        color=look(k).colour,
+        alpha=0.1,
+        linewidth=0,
+        label="_",
+    )
     axes.stairs(
         np.where(density > 0, density, np.nan)[part],
-        BIN_EDGES[part.start : part.stop + 1],
+        edges,
         baseline=None,
         color=look(k).colour,
         linestyle=LINES[k],
@@ -262,7 +302,7 @@ def pull_off(data: Aggregate) -> Figure:
     axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
     axes.set_ylabel("pull-off stress (kPa)")
     axes.set_ylim(bottom=0)
-    axes.legend(loc="best")
+    legend_above(figure, axes.get_legend_handles_labels()[0], 3)
     _second_scale(axes, data)
     return figure
 
@@ -289,7 +329,7 @@ def _apart(data: Aggregate, k: int, count: int) -> float:
 
 
 def _cells(data: Aggregate) -> list[Cell]:
-    hursts = spread_out(data.hursts, MOST_CURVES)
+    hursts = spread_out(data.hursts, MOST_PANELS)
     gammas = spread_out(data.works_of_adhesion, MOST_CURVES)
     return [c for c in data.cells if c.done and c.hurst in hursts and c.work_of_adhesion in gammas]
 

@@ -28,10 +28,17 @@ ONE_COLUMN = 85 * MM
 TWO_COLUMNS = 175 * MM
 
 # A panel with more curves than this cannot be read; panels beyond it make no page.
-MOST_CURVES = 4
+MOST_CURVES = 6
 MOST_PANELS = 4
 
-LINES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)))
+LINES: tuple[Any, ...] = (
+    "-",
+    (0, (4, 1.5)),
+    (0, (1, 1)),
+    (0, (4, 1, 1, 1)),
+    (0, (7, 1.5)),
+    (0, (4, 1, 1, 1, 1, 1)),
+)
 LINE_OF_BRANCH: dict[str, Any] = {"loading": "-", "unloading": LINES[1]}
 
 
@@ -50,6 +57,8 @@ LOOKS = (
     Look("#0072B2", "s", "////"),
     Look("#000000", "^", "...."),
     Look("#CC79A7", "D", "xxxx"),
+    Look("#009E73", "v", "\\\\\\\\"),
+    Look("#56B4E9", "P", "++++"),
 )
 
 
@@ -77,6 +86,20 @@ def shown_gammas(data: Aggregate) -> list[tuple[int, float]]:
     finished = {cell.work_of_adhesion for cell in data.cells if cell.done}
     shown = spread_out(data.works_of_adhesion, MOST_CURVES)
     return [(k, gamma) for k, gamma in enumerate(shown) if gamma in finished]
+
+
+def left_out(data: Aggregate) -> str:
+    """A sentence on the H and γ that figures leave out for the sake of the eye; empty if none."""
+    parts = [
+        f"{most} of {len(values)} {name}"
+        for name, values, most in (
+            ("H", data.hursts, MOST_PANELS),
+            ("γ", data.works_of_adhesion, MOST_CURVES),
+        )
+        if len(values) > most
+    ]
+    what = "Figures with a panel for each H and a curve for each γ show"
+    return f"{what} {' and '.join(parts)}." if parts else ""
 
 
 def new_figure(rows: int, columns: int, width: float, height: float, **options: Any) -> Figure:

@@ -1,0 +1,43 @@
+"""The door to results files; what it loads, it loads when it is called."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ensemble.report.opened import CampaignResults
+
+
+def open(
+    path: str | os.PathLike[str], *, beside: Sequence[str | os.PathLike[str]] = ()
+) -> CampaignResults:
+    """Open the results file of a campaign, finished or not.
+
+    Parameters
+    ----------
+    path : path
+        The file that ``adhesis run`` writes (HDF5).
+    beside : sequence of path
+        Results files of other campaigns, for the comparisons of the report.
+
+    Returns
+    -------
+    CampaignResults
+        Labelled arrays (``dataset``, ``curves``, ``spectra``, ``fields``), tables (``losses``,
+        ``growth``, ``mechanisms``, ``jumps``) and the figures of the report (``plot``).
+
+    Raises
+    ------
+    InputError
+        If the file is missing, foreign or damaged; one sentence.
+
+    References
+    ----------
+    docs/python.md, "Results in Python"
+    """
+    from ensemble.report.opened import CampaignResults  # xarray and pandas take half a second
+
+    return CampaignResults(pathlib.Path(path), [pathlib.Path(other) for other in beside])

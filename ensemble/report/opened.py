@@ -1,0 +1,190 @@
+"""A results file as an object of Python: labelled arrays, tables, and every figure of the report.
+
+What the report writes to disk is here in memory; the file is opened anew at each access, so that a
+run may go on writing to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from ensemble.aggregate.average import Aggregate, aggregate
+from ensemble.campaign.tables import Campaign
+from ensemble.report.curves import curves_dataset
+from ensemble.report.plots import Plots
+from ensemble.report.tables import losses, mechanisms
+from ensemble.report.tables.table import Table
+from ensemble.results.read import Results
+from ensemble.results.schema import DATASETS, DONE, scales
+from ensemble.task.dataset import KEPT, Dataset
+from solver.jumps import BRANCHES, JUMP_KINDS
+
+AXES = ("hurst", "work_of_adhesion", "realisation")
+# Dimensions of the file under the names that they have here.
+_RENAMED = {
+    "field_branch": "branch",
+    "field_penetration": "penetration",
+    "field_position": "position",
+}
+_SPECTRA = ("psd_height", "height_density", "psd_displacement", "gap_density")
+
+
+class CampaignResults:
+    """Results of a campaign, finished or not; made by :func:`adhesis.open`.
+
+    Parameters
+    ----------
+    path : path
+        The results file.
+    beside : sequence of path
+        Results files of other campaigns, for the comparisons.
+
+    Attributes
+    ----------
+    path : Path
+    campaign : Campaign
+        What was asked for: its tables are attributes (``campaign.cycle.max_penetration``).
+    plot : Plots
+        One method for each figure of the report.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, foreign or damaged.
+    """
+
+    def __init__(self, path: Path | str, beside: Sequence[Path | str] = ()) -> None:
+        self.path = Path(path)
+        self._beside = tuple(beside)
+        with Results(self.path) as results:
+            self.campaign: Campaign = results.campaign
+            self._counts = np.bincount(results.status(), minlength=3)
+        self.plot = Plots(self)
+
+    def __repr__(self) -> str:
+        pending, done, failed = self._counts[:3]
+        return f"<CampaignResults {self.path}: {done} done, {failed} failed, {pending} pending>"
+
+    @cached_property
+    def averages(self) -> Aggregate:
+        """Everything averaged over realisations, as the report has it.
+
+        Raises
+        ------
+        InputError
+            If no task is finished.
+        """
+        return aggregate(self.path, self._beside)
+
+    # ------------------------------------------------------------------ arrays
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Every number and every curve of every loop, SI units.
+
+        Dimensions hurst, work_of_adhesion, realisation, and the penetration of either branch;
+        NaN (-1 for counts) where a task is not done.
+        """
+        wanted = [
+            d
+            for d in DATASETS
+            if d.dims[0] == "task"
+            and d.name not in (*AXES, *_SPECTRA, "error")
+            and not d.name.startswith("jump_")
+        ]
+        count = next(d for d in DATASETS if d.name == "jump_count")
+        return self._arranged([*wanted, count])
+
+    @cached_property
+    def spectra(self) -> xr.Dataset:
+        """Spectral densities, and densities of heights and gaps, of every loop."""
+        return self._arranged([d for d in DATASETS if d.name in _SPECTRA])
+
+    @cached_property
+    def fields(self) -> xr.Dataset:
+        """Profile, displacement, stress and gap of the first realisations, as far as kept."""
+        return self._arranged([d for d in DATASETS if d.dims[0] == KEPT])
+
+    @cached_property
+    def curves(self) -> xr.Dataset:
+        """Both branches averaged over realisations: mean, std, quantiles (``curves.nc``)."""
+        return curves_dataset(self.averages)
+
+    # ------------------------------------------------------------------ tables
+
+    @cached_property
+    def losses(self) -> pd.DataFrame:
+        """``losses.csv``: mean losses with 95 % intervals and errors, one row for each (H, γ)."""
+        return _frame(losses.losses(self.averages), AXES[:2])
+
+    @cached_property
+    def growth(self) -> pd.DataFrame:
+        """``growth.csv``: growth of the loss from one γ to the next, on the same profiles."""
+        return _frame(losses.paired(self.averages), ())
+
+    @cached_property
+    def mechanisms(self) -> pd.DataFrame:
+        """Jumps by kind, their number and share of the drops (``jumps.csv``)."""
+        return _frame(mechanisms.jumps(self.averages), (*AXES[:2], "kind"))
+
+    @cached_property
+    def jumps(self) -> pd.DataFrame:
+        """The catalogue: one row for each jump of each finished loop, in the order of the path."""
+        columns = [d for d in DATASETS if d.name.startswith("jump_") and d.dims[1:] == ("jump",)]
+        with Results(self.path) as results:
+            rows = np.flatnonzero(results.status() == DONE)
+            used = results.column("jump_kind", rows) >= 0
+            loop, _ = np.nonzero(used)
+            out = {name: results.column(name, rows)[loop] for name in AXES}
+            for d in columns:
+                out[d.name.removeprefix("jump_")] = results.column(d.name, rows)[used]
+        out["branch"] = np.array(BRANCHES)[out["branch"]]
+        out["kind"] = np.array(JUMP_KINDS)[out["kind"]]
+        return pd.DataFrame(out)
+
+    # ------------------------------------------------------------------ inside
+
+    def _arranged(self, datasets: Iterable[Dataset]) -> xr.Dataset:
+        """Datasets with the task dimension spread over H, γ and realisation."""
+        with Results(self.path) as results:
+            axes = [results.column(name) for name in AXES]
+            rows = np.arange(len(results))
+            kept = results.column(KEPT)
+            known = {scale.name: scale for scale in scales(results.campaign)}
+            coordinates: dict[str, Any] = {}
+            variables: dict[str, Any] = {}
+            for d in datasets:
+                mine = kept if d.dims[0] == KEPT else rows
+                labels = [np.unique(axis[mine]) for axis in axes]
+                place = tuple(
+                    np.searchsorted(label, axis[mine])
+                    for label, axis in zip(labels, axes, strict=True)
+                )
+                values = results.column(d.name)
+                shape = (*(label.size for label in labels), *values.shape[1:])
+                array = np.full(shape, d.fill, values.dtype)
+                array[place] = values
+                dims = tuple(_RENAMED.get(dim, dim) for dim in d.dims[1:])
+                about = {"units": d.unit, "long_name": d.meaning, **d.attributes}
+                variables[d.name] = ((*AXES, *dims), array, about)
+                coordinates |= dict(zip(AXES, labels, strict=True))
+                for dim, name in zip(d.dims[1:], dims, strict=True):
+                    scale = known[dim]
+                    text = {"units": scale.unit, "long_name": scale.meaning}
+                    label = list(BRANCHES) if name == "branch" else scale.values
+                    coordinates[name] = (name, label, text)
+        return xr.Dataset(variables, coordinates, {"source": self.path.name})
+
+
+def _frame(table: Table, index: Sequence[str]) -> pd.DataFrame:
+    names = [column.name.partition(" [work")[0] for column in table.columns]
+    names = ["work_of_adhesion" if name == "work_of_adhesion [J/m^2]" else name for name in names]
+    frame = pd.DataFrame([list(row) for row in table.rows], columns=names)
+    return frame.set_index(list(index)) if index else frame

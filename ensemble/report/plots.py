@@ -1,0 +1,89 @@
+"""The figures of the report as methods: each draws one and returns its axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ensemble.aggregate.average import Aggregate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ensemble.report.opened import CampaignResults
+
+
+class Plots:
+    """One method for each figure of the report; docs/theory.md says what each shows.
+
+    Every method returns the figure's axes, panel by panel; ``axes[0].figure`` is the figure, with
+    ``savefig``. What is drawn are averages over the realisations that are finished.
+    """
+
+    def __init__(self, results: CampaignResults) -> None:
+        self._results = results
+
+    def _draw(self, name: str) -> list[Axes]:
+        from ensemble.report.figures import fields, loops, losses
+        from ensemble.report.figures.style import style
+
+        draw: Callable[[Aggregate], Figure] = next(
+            getattr(room, name) for room in (loops, losses, fields) if hasattr(room, name)
+        )
+        with style():
+            figure = draw(self._results.averages)
+            figure.canvas.draw()  # the layout is found with the style's own sizes
+        return list(figure.axes)
+
+    def contact_against_stress(self) -> list[Axes]:
+        """Contact fraction against mean stress, a panel for each H."""
+        return self._draw("contact_against_stress")
+
+    def loop_against_penetration(self) -> list[Axes]:
+        """Mean stress and contact fraction against penetration, a row for each H."""
+        return self._draw("loop_against_penetration")
+
+    def loss_against_adhesion(self) -> list[Axes]:
+        """Loss against work of adhesion, with intervals."""
+        return self._draw("loss_against_adhesion")
+
+    def loss_against_slope(self) -> list[Axes]:
+        """Loss against mean square slope, with intervals."""
+        return self._draw("loss_against_slope")
+
+    def loss_against_penetration(self) -> list[Axes]:
+        """Loss against the largest penetration, of this campaign and those beside it."""
+        return self._draw("loss_against_penetration")
+
+    def loss_by_mechanism(self) -> list[Axes]:
+        """Energy drops at small-scale and at large-scale jumps."""
+        return self._draw("loss_by_mechanism")
+
+    def jump_energies(self) -> list[Axes]:
+        """Jumps a loop and decade of energy drop."""
+        return self._draw("jump_energies")
+
+    def pull_off(self) -> list[Axes]:
+        """Pull-off stress against work of adhesion, with intervals."""
+        return self._draw("pull_off")
+
+    def shapes(self) -> list[Axes]:
+        """Rigid profile and deformed surface of one realisation."""
+        return self._draw("shapes")
+
+    def spectra_on_loading(self) -> list[Axes]:
+        """Spectral density of profile and deformed surface on loading."""
+        return self._draw("spectra_on_loading")
+
+    def spectra_on_unloading(self) -> list[Axes]:
+        """Spectral density of profile and deformed surface on unloading."""
+        return self._draw("spectra_on_unloading")
+
+    def gap_density(self) -> list[Axes]:
+        """Probability density of the gap."""
+        return self._draw("gap_density")
+
+    def height_density(self) -> list[Axes]:
+        """Probability density of the heights."""
+        return self._draw("height_density")

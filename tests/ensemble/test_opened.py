@@ -1,0 +1,110 @@
+"""A results file opened in Python: labelled axes, tables, figures; the report's numbers."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import adhesis
+from ensemble.errors import InputError
+from ensemble.report.figures.catalogue import (
+    HEIGHTS,
+    LOOPS,
+    LOSSES,
+    MECHANISMS,
+    PENETRATIONS,
+    SHAPES,
+)
+from ensemble.report.plots import Plots
+from ensemble.report.tables.losses import losses
+from tests.support.synthetic_results import campaign, rows, write
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> Path:
+    plan = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04, 0.07), realisations=4)
+    values = rows(plan)
+    values["status"][[2, 9]] = [0, 2]
+    for name in ("loss", "loading_mean_stress"):
+        values[name][[2, 9]] = np.nan
+    return write(tmp_path_factory.mktemp("opened") / "r.h5", plan, values)
+
+
+@pytest.fixture(scope="module")
+def results(file):
+    return adhesis.open(file)
+
+
+def test_every_loop_is_found_under_its_labels(file, results):
+    data = results.dataset
+    assert data.loss.dims == ("hurst", "work_of_adhesion", "realisation")
+    assert data.loading_mean_stress.dims[3:] == ("loading_penetration",)
+    assert data.loss.attrs["units"] == "J m-2"
+    with h5py.File(file) as raw:
+        for row in (0, 5, 17, 23):
+            label = {name: raw[name][row] for name in ("hurst", "work_of_adhesion", "realisation")}
+            assert float(data.loss.sel(label)) == raw["loss"][row]
+            np.testing.assert_array_equal(
+                data.unloading_energy.sel(label), raw["unloading_energy"][row]
+            )
+    assert int(np.isnan(data.loss).sum()) == 2
+    assert repr(results).endswith("22 done, 1 failed, 1 pending>")
+
+
+def test_tables_are_those_of_the_report(results):
+    table = losses(results.averages)
+    frame = results.losses
+    assert list(frame.index.names) == ["hurst", "work_of_adhesion"]
+    for row in table.rows:
+        assert frame.loc[row[:2], "loss_dimensionless_mean"] == row[5]
+    low, high = (frame[f"loss_dimensionless_ci_{end}"] for end in ("low", "high"))
+    assert ((low < frame.loss_dimensionless_mean) & (frame.loss_dimensionless_mean < high)).all()
+    assert len(results.growth) == 4
+    shares = results.mechanisms.groupby(["hurst", "work_of_adhesion"]).share_of_drops.sum()
+    np.testing.assert_allclose(shares, 1)
+
+
+def test_the_catalogue_has_every_jump_of_the_finished_loops(file, results):
+    jumps = results.jumps
+    with h5py.File(file) as raw:
+        done = raw["status"][:] == 1
+        drops = raw["jump_energy_drop"][:][done]
+        assert len(jumps) == raw["jump_count"][:][done].sum()
+    assert jumps.energy_drop.sum() == pytest.approx(np.nansum(drops))
+    assert set(jumps.branch) == {"loading", "unloading"}
+    assert "pull-off" in set(jumps.kind)
+    assert not (
+        (jumps.hurst == 0.7) & (jumps.realisation == 2) & (jumps.work_of_adhesion == 0.01)
+    ).any()
+
+
+def test_fields_have_branch_penetration_and_position(file, results):
+    fields = results.fields
+    assert fields.field_gap.dims[3:] == ("branch", "penetration", "position")
+    one = fields.field_displacement.sel(hurst=0.8, work_of_adhesion=0.04, realisation=0)
+    with h5py.File(file) as raw:
+        place = raw["field_task"][:].tolist().index(16)
+        np.testing.assert_array_equal(
+            one.sel(branch="unloading"), raw["field_displacement"][place, 1]
+        )
+    assert results.spectra.gap_density.dims[3:] == ("branch", "penetration", "gap_bin")
+    assert results.curves.loading_mean_stress_mean.attrs["units"] == "Pa"
+
+
+def test_every_figure_of_the_report_has_a_method_that_returns_its_axes(results):
+    figures = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
+    methods = {name for name, _ in inspect.getmembers(Plots, inspect.isfunction)}
+    assert {item.draw.__name__ for item in figures} == {m for m in methods if m[0] != "_"}
+    for name in ("loop_against_penetration", "height_density"):
+        axes = getattr(results.plot, name)()
+        assert axes[0].figure.axes == axes
+        assert axes[0].lines
+
+
+def test_bad_files_are_refused(tmp_path):
+    with pytest.raises(InputError, match="does not exist"):
+        adhesis.open(tmp_path / "none.h5")
