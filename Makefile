@@ -1,6 +1,6 @@
 # make help lists what there is. tools/setup.sh does nothing when nothing has changed.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test run test test-kills fuzz lint bench docs check-package clean lock
+.PHONY: help setup setup-test run test test-kills fuzz lint bench docs figures-of-docs check-package clean lock
 SHELL := /bin/bash
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
@@ -9,7 +9,7 @@ CAMPAIGN := jobs/example.toml
 FOR := 600
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-15s %s\n", $$1, $$2 }' Makefile
 
 setup:  ## everything that adhesis needs, into .venv (ADHESIS_APT=no: no system packages)
 	@tools/setup.sh
@@ -43,6 +43,9 @@ docs: setup  ## the documentation site in docs/_build, its examples run
 
 check-package: setup  ## wheel and source distribution, used in a bare environment
 	@tools/check_package.sh
+
+figures-of-docs: setup  ## every figure of README and docs, by its command, stamped (half an hour)
+	$(bin)/python tools/figures_of_docs.py $(ARGS)
 
 lock: setup  ## requirements.lock from the versions in .venv
 	@{ sed '/^[^#]/d' requirements.lock; \

@@ -5,6 +5,7 @@ Run it as ``.venv/bin/python docs/figures/loop.py``.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -68,4 +69,4 @@ def draw(loop: LoopResult, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    draw(compute(), Path(__file__).with_name("loop.png"))
+    draw(compute(), Path(sys.argv[1]) if sys.argv[1:] else Path(__file__).with_name("loop.png"))

@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         type=Path,
         required=True,
-        help="directory for losses.csv, curves.nc, the figures and report.md",
+        help="directory for losses.csv, curves.nc, the figures, report.md and report.html",
     )
     parser.add_argument(
         "--beside",

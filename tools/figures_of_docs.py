@@ -1,0 +1,160 @@
+"""Makes the figures of README and docs/ again, each by its command, stamped with the commit.
+
+    make figures-of-docs                         all of them (half an hour of two cores)
+    make figures-of-docs ARGS='loop paper'       some
+    make figures-of-docs ARGS=--check            says which are not of the present code
+
+A stamp is a text "Source" inside the PNG: version and commit of adhesis, and the command.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from ensemble.versions import commit, versions  # noqa: E402
+
+BESIDE = tuple(sorted((ROOT / "jobs" / "beside").glob("*.toml")))
+KEPT = (".png", ".csv", ".md")  # PDF, NetCDF and HTML are made anew by whoever wants them
+_IMAGE_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"
+_NAME = b"Source\x00"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Figures that one command makes.
+
+    Attributes
+    ----------
+    commands : tuple of str
+        Words after ``python``, run in the folder of the checkout; OUT is a folder for what they
+        make, RANKS the options of a run.
+    made : str
+        Glob of what is kept of it, below OUT.
+    folder : str
+        Where that goes, below docs/.
+    """
+
+    commands: tuple[str, ...]
+    made: str
+    folder: str
+
+
+def _paper() -> tuple[str, ...]:
+    runs = [f"-m ensemble run {path} --out OUT/{path.stem}.h5" for path in BESIDE]
+    beside = " ".join(f"OUT/{path.stem}.h5" for path in BESIDE)
+    return (
+        "-m ensemble run jobs/paper.toml --out OUT/paper.h5",
+        *runs,
+        f"-m ensemble report OUT/paper.h5 --to OUT/paper --beside {beside}",
+    )
+
+
+PARTS = {
+    "loop": Part(("docs/figures/loop.py OUT/loop.png",), "loop.png", "figures"),
+    "measured": Part(("examples/measured_profile.py --to OUT",), "measured_profile.png", "figures"),
+    "bench": Part(("-m ensemble bench --budget 240 --to OUT",), "benchmark.png", "figures"),
+    "paper": Part(_paper(), "paper/*.*", "paper"),
+}
+
+
+def stamp(path: Path, text: str) -> None:
+    """Put a text into a PNG, in place of an older one."""
+    data = path.read_bytes()
+    old = _place(data)
+    if old is not None:
+        data = data[: old[0]] + data[old[1] :]
+    body = b"tEXt" + _NAME + text.encode("latin-1", "replace")
+    chunk = (len(body) - 4).to_bytes(4, "big") + body + zlib.crc32(body).to_bytes(4, "big")
+    if not data.endswith(_IMAGE_END):
+        raise ValueError(f"{path} is no PNG")
+    path.write_bytes(data[: -len(_IMAGE_END)] + chunk + _IMAGE_END)
+
+
+def stamped(path: Path) -> str | None:
+    """Return the text that :func:`stamp` put there, None without one."""
+    data = path.read_bytes()
+    place = _place(data)
+    return (
+        None if place is None else data[place[0] + 8 + len(_NAME) : place[1] - 4].decode("latin-1")
+    )
+
+
+def _place(data: bytes) -> tuple[int, int] | None:
+    start = data.find(b"tEXt" + _NAME)
+    if start < 0:
+        return None
+    return start - 4, start + 8 + int.from_bytes(data[start - 4 : start], "big")
+
+
+def figures(part: Part) -> list[Path]:
+    """Return the figures of a part that the documentation has."""
+    pattern = part.made.rpartition("/")[2]
+    return [p for p in sorted((ROOT / "docs" / part.folder).glob(pattern)) if p.suffix == ".png"]
+
+
+def source(name: str) -> str:
+    """Return the stamp of a part's figures."""
+    told = versions()
+    return f"adhesis {told['adhesis_version']}, commit {commit()}: make figures-of-docs ARGS={name}"
+
+
+def make(name: str, ranks: int) -> None:
+    """Run the commands of a part and put what they made into docs/, stamped."""
+    part = PARTS[name]
+    with tempfile.TemporaryDirectory() as folder:
+        for command in part.commands:
+            words = command.replace("OUT", folder).split()
+            if ranks > 1 and words[:3] == ["-m", "ensemble", "run"]:
+                words += ["--ranks", str(ranks)]
+            print("python", *words, flush=True)
+            subprocess.run([sys.executable, *words], cwd=ROOT, check=True)
+        for path in sorted(Path(folder).glob(part.made)):
+            if path.suffix not in KEPT:
+                continue
+            to = ROOT / "docs" / part.folder / path.name
+            shutil.copyfile(path, to)
+            if to.suffix == ".png":
+                stamp(to, source(name))
+            print(to.relative_to(ROOT), flush=True)
+
+
+def stale() -> list[str]:
+    """Return a line for each figure that is not stamped with the present commit."""
+    out = []
+    for name, part in PARTS.items():
+        for path in figures(part):
+            text = stamped(path)
+            if text != source(name):
+                out.append(f"{path.relative_to(ROOT)}: {text or 'not stamped'}")
+    return out
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Make or check; returns 1 if a check finds stale figures."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="default: all")
+    parser.add_argument("--ranks", type=int, default=1, help="ranks of the campaigns' runs")
+    parser.add_argument("--check", action="store_true", help="only say which are stale")
+    args = parser.parse_args(words)
+    if args.check:
+        found = stale()
+        print("\n".join(found) or "every figure is of the present commit")
+        return 1 if found else 0
+    for name in args.parts or PARTS:
+        make(name, args.ranks)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
