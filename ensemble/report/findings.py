@@ -30,19 +30,19 @@ def _outcome(data: Aggregate) -> str:
     end = data.campaign.cycle.max_penetration
     top = f"A loop to Δ/h_max = {end:g} and back until detached loses"
     if len(cells) == 1:
-        return f"{top} {_loss(cells[0])} on average ({_name(cells[0])})."
+        return f"{top} on average {_loss(cells[0])}."
     low, high = cells[0], cells[-1]
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
     return (
-        f"{top}, on average over realisations, from {_loss(low)} ({_name(low)}) to {_loss(high)} "
-        f"({_name(high)}); {100 * min(share):.0f} to {100 * max(share):.0f} % of it is lost where "
-        "edges run inside patches."
+        f"{top}, on average over realisations, from {_loss(low)} to {_loss(high)}; "
+        f"{100 * min(share):.0f} to {100 * max(share):.0f} % of it is lost where edges run inside "
+        "patches."
     )
 
 
 def _loss(cell: Cell) -> str:
     dimensionless, loss = cell.estimates["loss_dimensionless"].mean, cell.estimates["loss"].mean
-    return f"W~ = {dimensionless:.3g}, {1e3 * loss:.3g} mJ/m²"
+    return f"W~ = {dimensionless:.3g} or {1e3 * loss:.3g} mJ/m² at {_name(cell)}"
 
 
 def _statistical(data: Aggregate) -> str:
@@ -216,7 +216,8 @@ def _table_1(data: Aggregate) -> list[str]:
     )
     low, high, rms = 100 * min(found), 100 * max(found), 100 * np.sqrt(np.mean(np.square(found)))
     return [
-        f"Of the {len(paper.TABLE_1)} losses of the paper's Table 1 {len(found)} have a cell here: "
+        f"Of the {len(paper.TABLE_1)} losses of the paper's Table 1, {len(found)} have a cell "
+        "here: "
         f"W~ is off by {low:+.1f} % to {high:+.1f} %, root mean square {rms:.1f} %{intervals}."
     ]
 
@@ -265,18 +266,20 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
 
 def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:
     """Whether the loss is monotone in m2; the paper's table is not."""
-    out = []
+    found: dict[str, list[str]] = {}
     for gamma in data.works_of_adhesion:
         cells = [c for c in data.cells if c.work_of_adhesion == gamma and c.done > 1]
         if len(cells) < 3:
             continue
         cells.sort(key=lambda c: c.estimates["m2"].mean)
         steps = np.diff([c.estimates["loss_dimensionless"].mean for c in cells])
-        monotone = bool(np.all(steps > 0) or np.all(steps < 0))
-        word = ("falls" if steps[0] < 0 else "grows") if monotone else "is not monotone"
-        out.append(f"{word} {'with' if monotone else 'in'} m2 at γ = {gamma:g} J/m²")
+        verb = "falls with m2" if steps[0] < 0 else "grows with m2"
+        if not (np.all(steps > 0) or np.all(steps < 0)):
+            verb = "is not monotone in m2"
+        found.setdefault(verb, []).append(f"{gamma:g}")
+    parts = [f"{verb} at γ = {_listed(gammas, ', ')} J/m²" for verb, gammas in found.items()]
     rest = "; the paper's table is not monotone" if of_paper else ""
-    return [f"The mean loss {_listed(out, ', ')}{rest}."] if out else []
+    return [f"The mean loss {', and '.join(parts)}{rest}."] if parts else []
 
 
 def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:

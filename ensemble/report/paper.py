@@ -46,6 +46,12 @@ def table_1(hurst: float, work_of_adhesion: float) -> float | None:
     return None
 
 
+def has_cell(hurst: float, work_of_adhesion: float) -> bool:
+    """Whether the paper's Table 1 has a place for (H, γ in J/m²), be it a dash."""
+    gammas = {g for _, g in TABLE_1}
+    return m2(hurst) is not None and any(abs(g - work_of_adhesion) < 1e-9 for g in gammas)
+
+
 def m2(hurst: float) -> float | None:
     """Mean square slope that the paper quotes for H, None if it gives none."""
     return next((value for h, value in M2.items() if abs(h - hurst) < 1e-9), None)

@@ -486,7 +486,7 @@ def test_findings_compare_with_the_paper(data):
             off.append(loss.mean / value - 1)
             assert row[7] == off[-1]
             assert row[8] == ("yes" if loss.low <= value <= loss.high else "no")
-    assert "Of the 8 losses of the paper's Table 1 5 have a cell here" in text
+    assert "Of the 8 losses of the paper's Table 1, 5 have a cell here" in text
     assert f"{100 * min(off):+.1f} % to {100 * max(off):+.1f} %" in text
     assert "0.002 against 0.0027 at H = 0.8" in text
     assert "grows with γ at every H" in text

@@ -149,7 +149,8 @@ def beside_the_paper(data: Aggregate) -> Table:
     rows: list[list[Value]] = []
     for cell in data.cells:
         value = papers_loss(data, cell)
-        if not cell.done or not paper.is_the_papers(data.campaign):
+        place = (cell.hurst, cell.work_of_adhesion)
+        if not (cell.done and paper.is_the_papers(data.campaign) and paper.has_cell(*place)):
             continue
         loss = cell.estimates["loss_dimensionless"]
         known = value is not None and not np.isnan(loss.low)
