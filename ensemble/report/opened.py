@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 
 from ensemble.aggregate.average import Aggregate, aggregate
 from ensemble.campaign.tables import Campaign
@@ -26,7 +27,7 @@ from ensemble.results.schema import DATASETS, DONE, scales
 from ensemble.task.dataset import KEPT, Dataset
 from solver.jumps import BRANCHES, JUMP_KINDS
 
-AXES = ("hurst", "work_of_adhesion", "realisation")
+_CELL = ("hurst", "work_of_adhesion")
 # Dimensions of the file under the names that they have here.
 _RENAMED = {
     "field_branch": "branch",
@@ -83,20 +84,26 @@ class CampaignResults:
         """
         return aggregate(self.path, self._beside)
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """What tells the loops apart: H, γ, what else is a list in the campaign, realisation."""
+        return tuple(_axes(self.campaign))
+
     # ------------------------------------------------------------------ arrays
 
     @cached_property
     def dataset(self) -> xr.Dataset:
         """Every number and every curve of every loop, SI units.
 
-        Dimensions hurst, work_of_adhesion, realisation, and the penetration of either branch;
+        Dimensions hurst, work_of_adhesion, further axes of the campaign if it has any, realisation,
+        and the penetration of either branch;
         NaN (-1 for counts) where a task is not done.
         """
         wanted = [
             d
             for d in DATASETS
             if d.dims[0] == "task"
-            and d.name not in (*AXES, *_SPECTRA, "error")
+            and d.name not in (*self.axes, *_SPECTRA, "error")
             and not d.name.startswith("jump_")
         ]
         count = next(d for d in DATASETS if d.name == "jump_count")
@@ -122,7 +129,7 @@ class CampaignResults:
     @cached_property
     def losses(self) -> pd.DataFrame:
         """``losses.csv``: mean losses with 95 % intervals and errors, one row for each (H, γ)."""
-        return _frame(losses.losses(self.averages), AXES[:2])
+        return _frame(losses.losses(self.averages), _CELL)
 
     @cached_property
     def growth(self) -> pd.DataFrame:
@@ -132,7 +139,7 @@ class CampaignResults:
     @cached_property
     def mechanisms(self) -> pd.DataFrame:
         """Jumps by kind, their number and share of the drops (``jumps.csv``)."""
-        return _frame(mechanisms.jumps(self.averages), (*AXES[:2], "kind"))
+        return _frame(mechanisms.jumps(self.averages), (*_CELL, "kind"))
 
     @cached_property
     def jumps(self) -> pd.DataFrame:
@@ -142,7 +149,7 @@ class CampaignResults:
             rows = np.flatnonzero(results.status() == DONE)
             used = results.column("jump_kind", rows) >= 0
             loop, _ = np.nonzero(used)
-            out = {name: results.column(name, rows)[loop] for name in AXES}
+            out = {name: values[rows][loop] for name, values in _axes(results.campaign).items()}
             for d in columns:
                 out[d.name.removeprefix("jump_")] = results.column(d.name, rows)[used]
         out["branch"] = np.array(BRANCHES)[out["branch"]]
@@ -152,9 +159,9 @@ class CampaignResults:
     # ------------------------------------------------------------------ inside
 
     def _arranged(self, datasets: Iterable[Dataset]) -> xr.Dataset:
-        """Datasets with the task dimension spread over H, γ and realisation."""
+        """Datasets with the task dimension spread over the axes of the campaign."""
         with Results(self.path) as results:
-            axes = [results.column(name) for name in AXES]
+            axes = list(_axes(results.campaign).values())
             rows = np.arange(len(results))
             kept = results.column(KEPT)
             known = {scale.name: scale for scale in scales(results.campaign)}
@@ -173,14 +180,26 @@ class CampaignResults:
                 array[place] = values
                 dims = tuple(_RENAMED.get(dim, dim) for dim in d.dims[1:])
                 about = {"units": d.unit, "long_name": d.meaning, **d.attributes}
-                variables[d.name] = ((*AXES, *dims), array, about)
-                coordinates |= dict(zip(AXES, labels, strict=True))
+                variables[d.name] = ((*self.axes, *dims), array, about)
+                coordinates |= dict(zip(self.axes, labels, strict=True))
                 for dim, name in zip(d.dims[1:], dims, strict=True):
                     scale = known[dim]
                     text = {"units": scale.unit, "long_name": scale.meaning}
                     label = list(BRANCHES) if name == "branch" else scale.values
                     coordinates[name] = (name, label, text)
         return xr.Dataset(variables, coordinates, {"source": self.path.name})
+
+
+def _axes(campaign: Campaign) -> dict[str, NDArray[Any]]:
+    """Values of every task on each axis, in the order of the rows."""
+    tasks = campaign.tasks()
+    out = {
+        "hurst": np.array([task.hurst for task in tasks]),
+        "work_of_adhesion": np.array([task.work_of_adhesion for task in tasks]),
+    }
+    for place, axis in enumerate(campaign.axes[2:]):
+        out[axis.name] = np.array([task.others[place][1] for task in tasks])
+    return out | {"realisation": np.array([task.realisation for task in tasks])}
 
 
 def _frame(table: Table, index: Sequence[str]) -> pd.DataFrame:

@@ -65,6 +65,8 @@ def is_the_papers(campaign: Campaign) -> bool:
         _is(profile.period, _PERIOD)
         and profile.n0 == _N0
         and profile.amplitudes == "deterministic"
+        and profile.rolloff == 1
+        and not campaign.lists
         and _is_spectrum(campaign)
         and _is(material.young, _YOUNG)
         and _is(material.poisson, _POISSON)
