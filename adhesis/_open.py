@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def open(
-    path: str | os.PathLike[str], *, beside: Sequence[str | os.PathLike[str]] = ()
+    path: str | os.PathLike[str], *, beside: Iterable[str | os.PathLike[str]] = ()
 ) -> CampaignResults:
     """Open the results file of a campaign, finished or not.
 
@@ -20,7 +20,7 @@ def open(
     ----------
     path : path
         The file that ``adhesis run`` writes (HDF5).
-    beside : sequence of path
+    beside : paths
         Results files of other campaigns, for the comparisons of the report.
 
     Returns

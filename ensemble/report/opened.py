@@ -67,7 +67,7 @@ class CampaignResults:
         with Results(self.path) as results:
             self.campaign: Campaign = results.campaign
             self._counts = np.bincount(results.status(), minlength=3)
-        self.plot = Plots(self)
+        self.plot = Plots(lambda: self.averages)
 
     def __repr__(self) -> str:
         pending, done, failed = self._counts[:3]

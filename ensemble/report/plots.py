@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ensemble.report.opened import CampaignResults
-
 
 class Plots:
     """One method for each figure of the report; docs/theory.md says what each shows.
@@ -21,8 +19,8 @@ class Plots:
     ``savefig``. What is drawn are averages over the realisations that are finished.
     """
 
-    def __init__(self, results: CampaignResults) -> None:
-        self._results = results
+    def __init__(self, averages: Callable[[], Aggregate]) -> None:
+        self._averages = averages
 
     def _draw(self, name: str) -> list[Axes]:
         from ensemble.report.figures import fields, loops, losses
@@ -32,7 +30,7 @@ class Plots:
             getattr(room, name) for room in (loops, losses, fields) if hasattr(room, name)
         )
         with style():
-            figure = draw(self._results.averages)
+            figure = draw(self._averages())
             figure.canvas.draw()  # the layout is found with the style's own sizes
         return list(figure.axes)
 
