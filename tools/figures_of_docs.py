@@ -43,11 +43,14 @@ class Part:
         Glob of what is kept of it, below OUT.
     folder : str
         Where that goes, below docs/.
+    name : str
+        Under which name, if it has another one there.
     """
 
     commands: tuple[str, ...]
     made: str
     folder: str
+    name: str = ""
 
 
 def _paper() -> tuple[str, ...]:
@@ -62,7 +65,10 @@ def _paper() -> tuple[str, ...]:
 
 PARTS = {
     "loop": Part(("docs/figures/loop.py OUT/loop.png",), "loop.png", "figures"),
-    "measured": Part(("examples/measured_profile.py --to OUT",), "measured_profile.png", "figures"),
+    "rooms": Part(("docs/figures/rooms.py OUT/rooms.png",), "rooms.png", "figures"),
+    "measured": Part(
+        ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
+    ),
     "bench": Part(("-m ensemble bench --budget 240 --to OUT",), "benchmark.png", "figures"),
     "paper": Part(_paper(), "paper/*.*", "paper"),
 }
@@ -99,7 +105,7 @@ def _place(data: bytes) -> tuple[int, int] | None:
 
 def figures(part: Part) -> list[Path]:
     """Return the figures of a part that the documentation has."""
-    pattern = part.made.rpartition("/")[2]
+    pattern = part.name or part.made.rpartition("/")[2]
     return [p for p in sorted((ROOT / "docs" / part.folder).glob(pattern)) if p.suffix == ".png"]
 
 
@@ -122,7 +128,7 @@ def make(name: str, ranks: int) -> None:
         for path in sorted(Path(folder).glob(part.made)):
             if path.suffix not in KEPT:
                 continue
-            to = ROOT / "docs" / part.folder / path.name
+            to = ROOT / "docs" / part.folder / (part.name or path.name)
             shutil.copyfile(path, to)
             if to.suffix == ".png":
                 stamp(to, source(name))

@@ -5,6 +5,7 @@ Run it as ``.venv/bin/python docs/figures/rooms.py``.
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -108,4 +109,4 @@ def draw(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    draw(Path(__file__).with_name("rooms.png"))
+    draw(Path(sys.argv[1]) if sys.argv[1:] else Path(__file__).with_name("rooms.png"))

@@ -41,6 +41,7 @@ FIGURES = {
     "ensemble.report.figures.loops",
     "ensemble.report.figures.losses",
     "ensemble.report.figures.style",
+    "ensemble.report.plots",
     "ensemble.trace.figures",
 }
 DOORS = {"mpi4py": MPI, "h5py": HDF5, "numba": COMPILED, "matplotlib": FIGURES}
