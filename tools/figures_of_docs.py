@@ -2,7 +2,7 @@
 
     make figures-of-docs                         all of them (half an hour of two cores)
     make figures-of-docs ARGS='loop paper'       some
-    make figures-of-docs ARGS=--check            says which are not of the present code
+    make figures-of-docs ARGS=--check            says of which commit each is
 
 A stamp is a text "Source" inside the PNG: version and commit of adhesis, and the command.
 """
@@ -135,28 +135,27 @@ def make(name: str, ranks: int) -> None:
             print(to.relative_to(ROOT), flush=True)
 
 
-def stale() -> list[str]:
-    """Return a line for each figure that is not stamped with the present commit."""
-    out = []
-    for name, part in PARTS.items():
-        for path in figures(part):
-            text = stamped(path)
-            if text != source(name):
-                out.append(f"{path.relative_to(ROOT)}: {text or 'not stamped'}")
-    return out
+def stamps() -> dict[str, str | None]:
+    """Return the stamp of each figure, by its place."""
+    return {
+        str(path.relative_to(ROOT)): stamped(path)
+        for part in PARTS.values()
+        for path in figures(part)
+    }
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Make or check; returns 1 if a check finds stale figures."""
+    """Make or check; returns 1 if a check finds one without a stamp."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="default: all")
     parser.add_argument("--ranks", type=int, default=1, help="ranks of the campaigns' runs")
-    parser.add_argument("--check", action="store_true", help="only say which are stale")
+    parser.add_argument("--check", action="store_true", help="only say of which commit each is")
     args = parser.parse_args(words)
     if args.check:
-        found = stale()
-        print("\n".join(found) or "every figure is of the present commit")
-        return 1 if found else 0
+        found = stamps()
+        for path, text in found.items():
+            print(f"{path}: {text or 'not stamped'}")
+        return 0 if all(found.values()) else 1
     for name in args.parts or PARTS:
         make(name, args.ranks)
     return 0
