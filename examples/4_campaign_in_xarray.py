@@ -39,7 +39,7 @@ folder = Path(tempfile.mkdtemp())
 (folder / "small.toml").write_text(campaign)
 adhesis = [sys.executable, "-m", "ensemble"]
 done = subprocess.run([*adhesis, "run", "small.toml"], cwd=folder, capture_output=True, check=True)
-print(done.stderr.decode().splitlines()[-1])
+print(*(line for line in done.stderr.decode().splitlines() if "computed in" in line))
 
 # %%
 # One row a task. Selections are xarray's.

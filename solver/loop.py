@@ -164,7 +164,8 @@ class LoopResult:
                 f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
                 f"Δ/h_max up to {self.max_penetration:.4g} in {self.load_steps} load steps, "
                 f"method {self.method.name}",
-                f"loss       {self.loss:.5g} J/m² (W~ = {self.loss_dimensionless:.5g}); "
+                f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
+                f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²",
                 f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
                 f"pull-off   {self.pull_off_stress:.4g} Pa, "

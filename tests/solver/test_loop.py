@@ -259,6 +259,6 @@ def test_a_loop_prints_itself_in_a_few_lines():
     lines = str(result).splitlines()
     words = [line.split()[0] for line in lines]
     assert words == ["profile", "loop", "loss", "jumps", "pull-off", "states"]
-    assert f"{result.loss:.5g} J/m²" in lines[2]
+    assert f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²" in lines[2]
     assert lines[3].endswith("2 (1 snap-in, 1 pull-off)")
     assert str(len(result.separation)) in lines[5]
