@@ -12,7 +12,7 @@ from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.campaign.tables import Campaign
 from ensemble.errors import InputError
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED
+from ensemble.results.schema import DONE, FAILED, PENDING
 from solver import problem
 from solver.material import HalfSpace
 from solver.profile import Array
@@ -111,7 +111,7 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
                 work_of_adhesion=g,
                 done=rows.size,
                 failed=failed,
-                pending=mine.size - rows.size - failed,
+                pending=int(np.sum(status[mine] == PENDING)),
                 rows=rows,
                 realisation=realisation[rows].astype(np.int64),
                 seed=seed[rows],

@@ -54,8 +54,10 @@ def _is_free(key: str) -> bool:
 
 
 def _extends(key: str, was: Any, now: Any) -> bool:
-    if key == "sweep.realisations":
+    if key in ("sweep.realisations", "stop.most"):
         return bool(now > was)
+    if key == "stop.relative_error":
+        return was is not None and now is not None and bool(now < was)
     table, name = key.split(".")
     entry = next(f for f in fields(TABLES[table]) if f.name == name)  # type: ignore[index]
     if key not in ("sweep.hurst", "sweep.work_of_adhesion") and entry.metadata["axis"] is None:
@@ -72,4 +74,4 @@ def _values(value: Any) -> set[Any]:
 
 def _firsts(campaign: Campaign) -> list[Task]:
     """One task of every cell."""
-    return campaign.tasks()[:: campaign.sweep.realisations]
+    return campaign.tasks()[:: campaign.realisations]

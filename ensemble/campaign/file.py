@@ -64,6 +64,10 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     lists: list[tuple[Table, str, tuple[float, ...]]] = []
     tables = {name: _read_table(source, name, document.get(name, {}), lists) for name in TABLES}
     _check_zip(source, tables["sweep"], lists)
+    if "stop" in document and tables["stop"].relative_error is None:
+        raise InputError(
+            f"{source}: [stop] relative_error is missing: it must be a number between 0 and 1"
+        )
     campaign = Campaign(text=text, lists=tuple(lists), **tables)
     _check_together(source, campaign)
     return campaign
@@ -145,6 +149,14 @@ def _check_together(source: str, campaign: Campaign) -> None:
         raise InputError(
             f"{source}: [profile] n0 · ratio is {n0 * ratio:g}: "
             f"it must be at most {MOST_WAVES} harmonics"
+        )
+    if (
+        campaign.stop.relative_error is not None
+        and campaign.stop.most < campaign.sweep.realisations
+    ):
+        raise InputError(
+            f"{source}: [stop] most is {campaign.stop.most}: it must be at least realisations, the "
+            f"number that every cell gets ({campaign.sweep.realisations})"
         )
     if campaign.task_count > _MOST_TASKS:
         raise InputError(

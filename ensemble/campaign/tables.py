@@ -95,7 +95,9 @@ class SweepTable:
     work_of_adhesion: tuple[float, ...] = _key(
         list_of(not_negative_number("J/m²")), "works of adhesion γ in J/m²"
     )
-    realisations: int = _key(whole_number(1, 2**31 - 1), "profiles for every H and γ")
+    realisations: int = _key(
+        whole_number(1, 2**31 - 1), "profiles for every cell; with [stop] the first of them"
+    )
     seed: int = _key(whole_number(0), "seed of all profiles", 0)
     zip: tuple[tuple[str, ...], ...] = _key(
         list_of_names(),
@@ -156,7 +158,20 @@ class OutputTable:
     )
 
 
-Table = Literal["profile", "material", "sweep", "cycle", "solver", "output"]
+@dataclass(frozen=True)
+class StopTable:
+    """``[stop]``: realisations in batches until the mean loss of a cell is known well enough."""
+
+    relative_error: float | None = _key(
+        number_between(0, 1),
+        "wanted half-width of the 95 % interval of the loss, over the loss",
+        None,
+    )
+    batch: int = _key(whole_number(1), "realisations that a cell gets at a time", 8)
+    most: int = _key(whole_number(1, 2**31 - 1), "most realisations of a cell", 1000)
+
+
+Table = Literal["profile", "material", "sweep", "cycle", "solver", "output", "stop"]
 _SWEEP_UNITS = {"hurst": "1", "work_of_adhesion": "J m-2"}
 TABLES: dict[Table, type] = {
     "profile": ProfileTable,
@@ -165,6 +180,7 @@ TABLES: dict[Table, type] = {
     "cycle": CycleTable,
     "solver": SolverTable,
     "output": OutputTable,
+    "stop": StopTable,
 }
 
 
@@ -188,6 +204,7 @@ class Campaign:
     cycle: CycleTable
     solver: SolverTable
     output: OutputTable
+    stop: StopTable = StopTable()
     lists: tuple[tuple[Table, str, tuple[Value, ...]], ...] = ()
     text: str = field(default="", compare=False, repr=False)
     _at: dict[tuple[tuple[str, Value], ...], Campaign] = field(
@@ -236,7 +253,12 @@ class Campaign:
     @property
     def task_count(self) -> int:
         """Number of tasks."""
-        return len(self.cells) * self.sweep.realisations
+        return len(self.cells) * self.realisations
+
+    @property
+    def realisations(self) -> int:
+        """Realisations of a cell; with ``[stop]``, the most that it may get."""
+        return self.sweep.realisations if self.stop.relative_error is None else self.stop.most
 
     def at(self, task: Task) -> Campaign:
         """Return the campaign with the values of a task in its tables, and without other axes."""
@@ -268,7 +290,7 @@ class Campaign:
         The order does not depend on that of the file, so that a grown campaign has the rows of one
         that was this large from the start.
         """
-        seeds = [task_seed(self.sweep.seed, r) for r in range(self.sweep.realisations)]
+        seeds = [task_seed(self.sweep.seed, r) for r in range(self.realisations)]
         names = [axis.name for axis in self.axes[2:]]
         tasks = [
             Task(hurst, gamma, realisation, seed, tuple(zip(names, others, strict=True)))

@@ -123,7 +123,8 @@ def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
-    plist.set_fill_value(np.array(column.fill, dtype))
+    if dtype.kind != "S":  # texts are filled with zeros; h5py hands a text over as garbage
+        plist.set_fill_value(np.array(column.fill, dtype))
     space = h5py.h5s.create_simple(shape)
     kind = h5py.h5t.py_create(dtype)
     return h5py.Dataset(h5py.h5d.create(file.id, column.name.encode(), kind, space, plist))

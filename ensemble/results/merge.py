@@ -25,6 +25,7 @@ from ensemble.results.schema import (
     DATASETS,
     DONE,
     FAILED,
+    NOT_NEEDED,
     PENDING,
     TASK_DATASETS,
     kept_rows,
@@ -141,7 +142,7 @@ def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
             f"{part.path} holds another campaign than {of}: {'; '.join(difference.other)} "
             f"(here: {of}, there: {part.path})"
         )
-    if part.tasks() != part.campaign.tasks(part.part) or part.status().max(initial=0) > FAILED:
+    if part.tasks() != part.campaign.tasks(part.part) or part.status().max(initial=0) > NOT_NEEDED:
         raise InputError(f"{part.path} is damaged: its tasks are not those of its campaign")
 
 

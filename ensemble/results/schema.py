@@ -21,7 +21,8 @@ from ensemble.task.row import RESULT_DATASETS, row_scales
 FILE_TYPE = "adhesis-results"
 FILE_VERSION = (1, 0)
 
-PENDING, DONE, FAILED = 0, 1, 2
+PENDING, DONE, FAILED, NOT_NEEDED = 0, 1, 2, 3
+_STATES = ("pending", "done", "failed", "not needed")
 ERROR_LENGTH = 512
 
 
@@ -38,7 +39,7 @@ TASK_DATASETS: tuple[Dataset, ...] = (
 )
 # How it went; the status is written last.
 RUN_DATASETS: tuple[Dataset, ...] = (
-    _task("status", "u1", "1", "state of the task", **flags(("pending", "done", "failed"), "u1")),
+    _task("status", "u1", "1", "state of the task", **flags(_STATES, "u1")),
     _task("error", f"S{ERROR_LENGTH}", "1", "why the task failed (UTF-8)"),
     _task("rank", COUNT, "1", "rank that computed the task"),
 )
@@ -70,7 +71,7 @@ def datasets(campaign: Campaign) -> tuple[Dataset, ...]:
 
 def kept_rows(campaign: Campaign, part: Part = WHOLE) -> NDArray[np.intp]:
     """Return the rows of the tasks that keep their fields, in the file of a part."""
-    realisation = part.rows(campaign.task_count) % campaign.sweep.realisations
+    realisation = part.rows(campaign.task_count) % campaign.realisations
     return np.flatnonzero(realisation < campaign.output.field_realisations)
 
 

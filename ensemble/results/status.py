@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
+from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
+_CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
 _READ = ("wall_time", "loss", "loss_dimensionless", "audit_residual", "loss_error")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
@@ -45,6 +46,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     """
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy
+        wanted = results.campaign.stop.relative_error
         axes = ["hurst", "work_of_adhesion"]
         axes += [dataset.name for dataset in axis_datasets(results.campaign)]
         state = results.status()
@@ -75,11 +77,12 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "pending": int(np.sum(state == PENDING)),
         "done": int(np.sum(state == DONE)),
         "failed": len(failed),
+        "not_needed": int(np.sum(state == NOT_NEEDED)),
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
-        "groups": _groups(state, column, axes),
+        "groups": _groups(state, column, axes, wanted),
         "failures": failures,
     }
 
@@ -112,7 +115,10 @@ def _times(times: NDArray[np.float64]) -> dict[str, float]:
 
 
 def _groups(
-    state: NDArray[np.uint8], column: dict[str, NDArray[Any]], axes: Sequence[str]
+    state: NDArray[np.uint8],
+    column: dict[str, NDArray[Any]],
+    axes: Sequence[str],
+    wanted: float | None,
 ) -> list[dict[str, Any]]:
     points, group_of = np.unique(
         np.stack([column[name] for name in axes]), axis=1, return_inverse=True
@@ -121,8 +127,7 @@ def _groups(
     size = points.shape[1]
     done = state == DONE
     count = {
-        name: np.bincount(group_of[state == code], minlength=size)
-        for name, code in (("done", DONE), ("pending", PENDING), ("failed", FAILED))
+        name: np.bincount(group_of[state == code], minlength=size) for name, code in _CODES.items()
     }
 
     def mean_and_error(name: str) -> list[tuple[float | None, float | None]]:
@@ -136,6 +141,14 @@ def _groups(
             for i in range(size)
         ]
 
+    def precision(i: int) -> dict[str, Any]:
+        """How well the loss of a cell is known, and how well it is to be."""
+        from ensemble.campaign.precision import half_width
+
+        width = half_width(column["loss"][done & (group_of == i)])
+        known = width if np.isfinite(width) else None
+        return {"relative_error": known, "wanted_relative_error": wanted}
+
     seconds = mean_and_error("wall_time")
     loss, scaled = mean_and_error("loss"), mean_and_error("loss_dimensionless")
     return [
@@ -147,6 +160,7 @@ def _groups(
             "loss_standard_error": loss[i][1],
             "loss_dimensionless": scaled[i][0],
             "loss_dimensionless_standard_error": scaled[i][1],
+            **({} if wanted is None else precision(i)),
         }
         for i in range(size)
     ]
@@ -156,7 +170,9 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     """Return a status as lines for people; ``pace`` is added to the first."""
     lines = [
         f"{status['file']}: {status['tasks']} tasks, {status['done']} done, "
-        f"{status['pending']} pending, {status['failed']} failed{pace}"
+        f"{status['pending']} pending, {status['failed']} failed"
+        + (f", {status['not_needed']} not needed" if status["not_needed"] else "")
+        + pace
     ]
     if seconds := status["seconds"]:
         lines.append(
@@ -187,7 +203,18 @@ def _group_line(group: dict[str, Any], further: Sequence[str]) -> str:
         + (f"{mean:9.3g}" if mean is not None else " " * 9)
         + (f"  {loss:.4g}" if loss is not None else "")
         + (f" ± {error:.2g}" if error is not None else "")
+        + _precision(group)
     ).rstrip()
+
+
+def _precision(group: dict[str, Any]) -> str:
+    """How far a cell is on its way to the wanted interval."""
+    if "wanted_relative_error" not in group:
+        return ""
+    wanted, known = group["wanted_relative_error"], group["relative_error"]
+    now = "unknown" if known is None else f"{100 * known:.2g} %"
+    enough = ", enough" if not group["pending"] else ""
+    return f"  interval ± {now} of ± {100 * wanted:g} %{enough}"
 
 
 def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:

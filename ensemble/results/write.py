@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -18,6 +18,7 @@ from ensemble.results.schema import (
     DATASETS,
     DONE,
     FAILED,
+    NOT_NEEDED,
     PENDING,
     TASK_DATASETS,
     encode_error,
@@ -100,6 +101,13 @@ class Writer:
                     if place is not None:
                         self._datasets[dataset.name].clear(place, dataset.fill)
                 self._flush()
+
+    def mark(self, rows: Iterable[int], *, needed: bool) -> None:
+        """Say of rows without a result that they are to be computed, or that they need not be."""
+        for row in rows:
+            with self._telling(row):
+                self._datasets["status"].write(row, PENDING if needed else NOT_NEEDED)
+        self._flush()
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
         with self._telling(row):

@@ -211,6 +211,7 @@ class Master:
             self._schedule.measured(self._group_of[outcome.task], outcome.seconds)
         self._hand_out()
         self._collect(outcome)
+        self._hand_out()  # what was collected may have brought further tasks
 
     def _answered(self, rank: int, task: int) -> None:
         del self._sent[rank][task]

@@ -17,8 +17,9 @@ from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
 from ensemble.results.layout import create
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, PENDING, same_rows
+from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, same_rows
 from ensemble.results.write import Writer
+from ensemble.run.batches import Batches
 from ensemble.run.lock import RunLock
 from ensemble.task.compute import check_task
 from ensemble.versions import versions
@@ -89,6 +90,8 @@ class Plan:
         Rows that are.
     times : dict
         Of each group of tasks that take about the same time: seconds measured, and tasks.
+    batches : Batches, optional
+        Where the campaign has ``[stop]``: what comes after ``rows``.
     """
 
     tasks: list[Task]
@@ -96,6 +99,7 @@ class Plan:
     done: int
     failed: int
     times: dict[Group, tuple[float, int]] = field(default_factory=dict)
+    batches: Batches | None = None
 
 
 def prepare(
@@ -137,6 +141,10 @@ def prepare(
     InputError
     """
     tasks = campaign.tasks(part)
+    if part != WHOLE and campaign.stop.relative_error is not None:
+        raise InputError(
+            f"part is {part}, but the campaign has [stop]: its batches are decided on whole cells"
+        )
     if not tasks:
         raise InputError(
             f"part is {part}: the campaign has {campaign.task_count} tasks and so at most as many "
@@ -150,8 +158,10 @@ def prepare(
     lock.acquire(size, patience)
     if not path.exists():
         create(path, campaign, part=part, versions=versions())
-        say(f"{path}: {len(tasks)} tasks to do")
-        return Plan(tasks, list(range(len(tasks))), 0, 0)
+        batches = Batches(campaign, tasks, {}) if campaign.stop.relative_error else None
+        rows = batches.to_do if batches else list(range(len(tasks)))
+        say(f"{path}: {len(rows)} tasks to do{' at first' if batches else ''}")
+        return Plan(tasks, rows, 0, 0, batches=batches)
     with Results(path) as old:
         difference = compare(old.campaign, campaign)
         if difference.other:
@@ -188,12 +198,24 @@ def prepare(
         say(f"{path}: {len(again)} tasks will be computed again")
     with Results(path) as results:
         plan = _plan(results)
+        status = results.status()
+    if plan.batches is not None:
+        with Writer(path) as writer:
+            spare = plan.batches.not_needed
+            writer.mark([row for row in spare if status[row] == PENDING], needed=False)
+            wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
+            writer.mark(sorted(wanted), needed=True)
     grown = f", {len(tasks) - before} of them new" if difference.grown else ""
     say(
-        f"{path}: {plan.done} of {len(tasks)} tasks done, {len(plan.rows)} to do{grown}"
+        f"{path}: {plan.done} of {_planned(plan)} tasks done, {len(plan.rows)} to do{grown}"
         + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
     )
     return plan
+
+
+def _planned(plan: Plan) -> int:
+    """Tasks that are computed or to be so; with ``[stop]`` more may follow."""
+    return plan.done + plan.failed + len(plan.rows)
 
 
 def _check_path(path: Path) -> None:
@@ -217,9 +239,18 @@ def _plan(results: Results) -> Plan:
         group = tasks[row].cell
         sum_before, count = times.get(group, (0.0, 0))
         times[group] = (sum_before + seconds[row], count + 1)
+    rows, batches = np.flatnonzero(status == PENDING).tolist(), None
+    if results.campaign.stop.relative_error is not None:
+        losses = np.where(status == FAILED, np.nan, results.column("loss"))
+        known = np.flatnonzero((status == DONE) | (status == FAILED))
+        batches = Batches(
+            results.campaign, tasks, {row: float(losses[row]) for row in known.tolist()}
+        )
+        rows = batches.to_do
     return Plan(
         tasks=tasks,
-        rows=np.flatnonzero(status == PENDING).tolist(),
+        rows=rows,
+        batches=batches,
         done=int(np.sum(status == DONE)),
         failed=int(np.sum(status == FAILED)),
         times=times,

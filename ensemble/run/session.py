@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from contextlib import AbstractContextManager, ExitStack, nullcontext
@@ -55,6 +56,9 @@ class RowWriter(Protocol):
 
     def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> None:
         """Write the row of a task that failed."""
+
+    def mark(self, rows: Iterable[int], *, needed: bool) -> None:
+        """Say of rows without a result whether they are to be computed."""
 
     def __enter__(self) -> Self: ...
 
@@ -246,8 +250,9 @@ class _Session:
         self._signals = signals
         self._engine = engine
         self._started = time.monotonic()
-        self._counts = Counts(total=len(plan.tasks), done_before=plan.done)
-        self._groups: Mapping[int, Group] = {row: plan.tasks[row].cell for row in plan.rows}
+        total = plan.done + plan.failed + len(plan.rows)
+        self._counts = Counts(total=total, done_before=plan.done)
+        self._groups: Mapping[int, Group] = {row: t.cell for row, t in enumerate(plan.tasks)}
         self._limits = Limits(
             stop=self._stop,
             time_left=self._time_left,
@@ -263,7 +268,7 @@ class _Session:
                 self._groups,
                 self._computing(progress.tick),
                 self._write,
-                lambda outcome: self._count(outcome, progress),
+                lambda outcome: self._count(outcome, progress, schedule),
                 self._limits,
             )
         finally:
@@ -274,7 +279,7 @@ class _Session:
         workers = channel.size - 1
 
         def collect(outcome: Outcome) -> None:
-            self._count(outcome if own_rows else self._write(outcome), progress)
+            self._count(outcome if own_rows else self._write(outcome), progress, schedule)
 
         progress = ProgressLine(
             self._counts, lambda: self._estimate(schedule, master.in_flight, workers)
@@ -293,14 +298,14 @@ class _Session:
         done = self._plan.done + self._counts.done
         failed = self._plan.failed + self._counts.failed
         return Summary(
-            total=len(self._plan.tasks),
+            total=self._counts.total,
             done=done,
             failed=failed,
             computed=self._counts.done,
             failed_now=self._counts.failed,
             seconds=time.monotonic() - self._started,
             doubtful=self._counts.doubtful,
-            stopped=stopped if done + failed < len(self._plan.tasks) else None,
+            stopped=stopped if done + failed < self._counts.total else None,
         )
 
     def _computing(self, tick: Callable[[], None]) -> Compute:
@@ -329,7 +334,7 @@ class _Session:
         wrong = doubtful(self._campaign.solver.accuracy, loss, residual, error)
         return Told(loss, residual, error, bool(wrong))
 
-    def _count(self, outcome: Outcome, progress: ProgressLine) -> None:
+    def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         if outcome.error is None:
             self._counts.done += 1
             told: Told = outcome.result
@@ -344,11 +349,18 @@ class _Session:
         else:
             self._counts.failed += 1
             progress.failure(str(self._plan.tasks[outcome.task]), outcome.error)
+        if self._plan.batches is not None:
+            loss = math.nan if outcome.error is not None else outcome.result.loss
+            further, spare = self._plan.batches.finished(outcome.task, loss)
+            assert self._writer is not None
+            self._writer.mark(spare, needed=False)
+            self._counts.total += len(further)
+            schedule.add(further)
         progress.tick()
 
     def _schedule(self) -> Schedule:
         priors: dict[Hashable, float] = {task.cell: prior(task) for task in self._plan.tasks}
-        rounds = {row: self._plan.tasks[row].realisation for row in self._plan.rows}
+        rounds = {row: task.realisation for row, task in enumerate(self._plan.tasks)}
         schedule = Schedule(self._plan.rows, self._groups, priors, rounds)
         for group, (seconds, count) in self._plan.times.items():
             schedule.measured(group, seconds, count)

@@ -213,7 +213,7 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
         load_steps=cycle.load_steps,
         wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,
         most_nodes=output.field_nodes,
-        realisations=min(output.field_realisations, campaign.sweep.realisations),
+        realisations=min(output.field_realisations, campaign.realisations),
     )
 
 

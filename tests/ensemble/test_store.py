@@ -64,6 +64,7 @@ def test_a_new_file_is_whole_and_pending(path, campaign):
             values = results.column(column.name)
             empty = np.isnan(values) if values.dtype.kind == "f" else values == -1
             assert empty.all(), column.name
+        assert not results.column("error").view(np.uint8).any()
     assert not list(path.parent.glob("*.part"))
 
 
