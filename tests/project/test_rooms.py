@@ -234,7 +234,9 @@ def test_status_loads_no_mpi_and_no_figures(results: Path) -> None:
 
 
 def test_report_loads_no_mpi(results: Path, tmp_path: Path) -> None:
-    packages = loaded(COMMAND, "report", str(results), "--to", str(tmp_path / "r"))
+    # Every figure is drawn; putting it on disk takes seconds and loads nothing of ours.
+    quick = "import ensemble.report.figures.style as s; s.save = lambda *_, **__: None\n"
+    packages = loaded(quick + COMMAND, "report", str(results), "--to", str(tmp_path / "r"))
     assert "matplotlib" in packages
     assert "mpi4py" not in packages
 
