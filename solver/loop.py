@@ -28,8 +28,14 @@ T = TypeVar("T")
 Progress = Callable[[Branch, float, ContactState], None]
 """Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
 
-# Unloading has always detached long before this many times the loading stroke; more is a bug.
-_MAX_UNLOADING_STROKES = 1000
+# After so many times the loading stroke, unloading skips load steps that are shorter than a share
+# of h_max or of the way since first touch; loops of ordinary depth have detached long before.
+_STROKES_AT_STEP = 20
+_LONG_STEP = 0.02
+# Unloading has always detached long before this many times h_max (under a load, this many times the
+# loading stroke); more is a bug.
+_FARTHEST = 1000
+_FARTHEST_HEIGHTS = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +179,28 @@ class LoopResult:
                 f"states     {len(self.separation)}, {self.seconds:.2g} s of CPU time",
             )
         )
+
+    def on_axis(self, branch: Branch, values: Array) -> Array:
+        """Values of one branch at every load step, interpolated where unloading skips some.
+
+        Parameters
+        ----------
+        branch : {"loading", "unloading"}
+        values : array, shape (states,)
+
+        Returns
+        -------
+        array, shape (load steps from the branch's first state on the axis to its last,)
+        """
+        chosen = self.states(branch, load_steps_only=True)
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        drive = -control.prescribed(self.separation[chosen], self.mean_stress[chosen])
+        unit = self.turning_point / self.load_steps * (1.0 if control.is_load else h_max)
+        place = np.abs(np.rint((drive - drive[0]) / unit)) if len(chosen) else np.empty(0)
+        if branch == "loading" or len(chosen) < 2 or place[-1] == len(chosen) - 1:
+            return values[chosen]
+        # under a load the last state lies where contact was lost, off the axis
+        return np.interp(np.arange(place[-1] + 1), place, values[chosen])
 
     def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
         """Indices of the states of one branch, optionally only those on the load-step axis."""
@@ -354,14 +382,36 @@ def _unload(
     # The turning point belongs to both branches: it starts the unloading curve.
     record.visit("unloading", True, state)
     i = index
+    stride = 1
     while state.patches:
-        i -= 1
+        i -= stride
         drive = axis(i)
-        if index - i > _MAX_UNLOADING_STROKES * axis.load_steps:
+        if _too_far(method.problem, drive, (index - i) / axis.load_steps):
             raise PathError(f"still in contact at {drive:g}")
+        if index - i >= _STROKES_AT_STEP * axis.load_steps:
+            stride = _stride(method.problem, axis, i, stride)
         state = record.extend("unloading", method.follow(state, method.problem.prescribed(drive)))
         if progress is not None:
             progress("unloading", drive, state)
+
+
+def _too_far(problem: Problem, drive: float, strokes: float) -> bool:
+    """Whether a loop that is still in contact at ``drive`` is a bug."""
+    if problem.control.is_load:
+        return strokes > _FARTHEST
+    return drive < -_FARTHEST_HEIGHTS
+
+
+def _stride(problem: Problem, axis: Axis, index: int, last: int) -> int:
+    """Load steps to the next state, far below the turning point: at most twice as many as last.
+
+    Under a load there is no height that steps could be measured by.
+    """
+    if problem.control.is_load:
+        return 1
+    step = axis(index + 1) - axis(index)
+    wanted = _LONG_STEP * max(1.0, -axis(index)) / step
+    return max(1, min(2 * last, int(wanted)))
 
 
 def _result(

@@ -228,13 +228,12 @@ def row_of(loop: LoopResult, sizes: Mapping[str, int]) -> Row:
     """
     row: Row = {d.name: d.value(loop) for d in (*NUMBERS, JUMP_COUNT) if d.value is not None}
     for branch, curves in CURVES.items():
-        chosen = loop.states(branch, load_steps_only=True)
         for dataset in curves:
             (length,) = row_shape(dataset, sizes)
             assert dataset.value is not None
             curve = np.zeros(length, dataset.dtype)
-            on_axis = chosen[:length]
-            curve[: len(on_axis)] = dataset.value(loop)[on_axis]
+            on_axis = loop.on_axis(branch, dataset.value(loop))[:length]
+            curve[: len(on_axis)] = on_axis
             row[dataset.name] = curve
     drops = np.array([j.energy_drop for j in loop.jumps])
     largest = np.sort(np.argsort(-drops, kind="stable")[: sizes["jump"]])

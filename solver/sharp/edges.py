@@ -188,12 +188,13 @@ class EdgeMechanics:
         """
         # Without adhesion the minimum is unique, and the energy's slope vanishes there twice.
         equal_speeds = equal_speeds or self.critical == 0
+        law = self.law
         left = _DESCENT_LIMIT
         kinds = _ANY
         rests = 0
         while left > 0:
             gaps, ended, fields, tangents, kinds = descend(
-                gaps, prescribed, left, kinds, equal_speeds, self.law, RULES, self.source.panels
+                gaps, prescribed, left, kinds, equal_speeds, law, RULES, self.source.panels
             )
             self.count.fields += fields
             self.count.descent_steps += fields
@@ -205,10 +206,12 @@ class EdgeMechanics:
                 rest = self.without_small(gaps)
                 if rest is not None:
                     return rest
-                if self.law.hold.give > 0 and len(gaps) == 1:
+                if len(gaps) == 1:
                     length, _ = self.widths(gaps)
-                    if length[0] < self.smallest:
+                    if length[0] < self.smallest and law.hold.give > 0:
                         raise FullContact
+                    # at fixed separation the last gap never closes, however narrow it gets
+                    law = law._replace(smallest=min(law.smallest, 0.05 * float(length[0])))
             if ended == RESTING:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
@@ -223,7 +226,9 @@ class EdgeMechanics:
         """Gaps without closed gaps or vanished patches, or None if there are none."""
         length, patch = self.widths(gaps)
         if length.min() < self.smallest and len(gaps) > 1:
-            return without_gaps(gaps, length >= self.smallest)
+            keep = length >= self.smallest
+            keep[int(np.argmax(length))] = True  # the last gap never closes
+            return without_gaps(gaps, keep)
         if patch.min() < self.smallest:
             return without_patches(gaps, patch >= self.smallest)
         return None

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.jumps import Branch
+from solver.method import ContactState
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.jump import Jumps
 from solver.sharp.states import States, Trace
-from solver.sharp.touch import Nucleation, Touch
+from solver.sharp.touch import Located, Nucleation
 
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
 _FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
@@ -29,11 +30,20 @@ class Resolution:
         Largest relative error of the trapezoidal rule over one step.
     scale : float
         q0 h_max.
+    finest : float
+        No jump is located more finely than this.
+    late : float
+        Work that a jump may add to the loss by being found late, in units of its drop.
+    least_drop : float
+        Drop in J/m² below which jumps need not be located more finely.
     """
 
     jump: float
     bend: float
     scale: float
+    finest: float
+    late: float
+    least_drop: float
 
 
 @dataclass(frozen=True)
@@ -43,6 +53,40 @@ class Target:
     at: float
     prescribed: float
     branch: Branch
+
+
+@dataclass
+class _Walk:
+    """The way since the last look for touches.
+
+    Attributes
+    ----------
+    trail : list of Point
+        From the point of the last look, known to be clear.
+    clearance : float
+        Least clearance there.
+    closed : float
+        Bound on how far a gap may have closed since.
+    pending : list of ContactState
+        States that wait for the next look: they may lie beyond a touch.
+    """
+
+    trail: list[Point]
+    clearance: float
+    closed: float
+    pending: list[ContactState]
+
+    def __init__(self, point: Point) -> None:
+        self.trail, self.clearance, self.closed, self.pending = [point], 0.0, 0.0, []
+
+    def add(self, point: Point, closed: float) -> None:
+        """Go on to a point; a gap has closed by ``closed`` at most."""
+        self.trail.append(point)
+        self.closed += closed
+
+    def restart(self, clearance: float) -> None:
+        """Begin anew after a look."""
+        self.trail, self.clearance, self.closed = [self.trail[-1]], clearance, 0.0
 
 
 class Follower:
@@ -78,51 +122,75 @@ class Follower:
         Returns
         -------
         at, point
-            q0 s reached and the stable state there, None if no contact is left.
+            d reached and the stable state there, None if no contact is left.
         """
         wanted = np.inf
+        finest = self.resolution.jump
+        walk = _Walk(point)
         shown = point
-        # where to look for touches next; the way since the last look
-        look, trail = point.at, [point]
         while point.at != target.at:
-            step = self._next_step(point, target.at, wanted)
+            step = self._next_step(point, target.at, wanted, finest)
             reached = self._advance(point, step, target.at)
             if reached is None:
-                if abs(step) > self.resolution.jump:
-                    wanted = max(0.25 * abs(step), 0.999 * self.resolution.jump)
+                if abs(step) > finest:
+                    wanted = max(0.25 * abs(step), 0.999 * finest)
                     continue
-                touched = None
-                if len(trail) > 1:
-                    touched, _ = self.nucleation.located(trail, self.resolution.jump)
+                touched = self._look(trace, walk, target.branch)
                 if touched is not None:
-                    return self._touch(trace, *touched, target.branch)
+                    return self._touch(trace, touched, target.branch)
                 at = target.at if step == target.at - point.at else point.at + step
-                return at, self._fold(trace, point, at, target.branch)
+                after, better = self._fold(trace, point, at, target.branch, finest)
+                if better < finest:
+                    wanted = finest = better
+                    continue
+                return at, after
             error = self._trapezoid_error(shown, reached)
-            if error > 4 and abs(step) > self.resolution.jump:
+            if error > 4 and abs(step) > finest:
                 wanted = 0.5 * abs(step)
                 continue
-            if target.branch == "loading":
-                trail.append(reached)
-                if reached.at <= look or reached.at == target.at:
-                    touched, clearance = self.nucleation.located(trail, self.resolution.jump)
-                    if touched is not None:
-                        return self._touch(trace, *touched, target.branch)
-                    look, trail = reached.at - clearance / self._closing(reached), [reached]
+            walk.add(reached, self._closed(point, reached, target.branch))
             small = self.edges.without_small(reached.field.gaps)
+            there = reached.at == target.at
+            if error > 1 or there:
+                exact = None
+                if there and self.states.problem.control.is_fixed:
+                    exact = target.prescribed
+                walk.pending.append(self.states.of_point(reached, exact))
+                shown = reached
+            if walk.closed >= walk.clearance or small is not None:
+                touched = self._look(trace, walk, target.branch)
+                if touched is not None:
+                    return self._touch(trace, touched, target.branch)
             if small is not None:
-                last = self.states.of_point(reached)
-                trace.states.append(last)
+                if shown is not reached:
+                    trace.states.append(self.states.of_point(reached))
+                last = trace.states[-1]
                 after = self.jumps.run(trace, last, small, reached.at, target.branch)
                 return reached.at, after
             point, wanted = reached, 2 * abs(step)
-            if point.at == target.at:
-                exact = target.prescribed if self.states.problem.control.is_fixed else None
-                trace.states.append(self.states.of_point(point, exact))
-            elif error > 1:
-                trace.states.append(self.states.of_point(point))
-                shown = point
+        trace.states += walk.pending
         return target.at, point
+
+    def _look(self, trace: Trace, walk: _Walk, branch: Branch) -> Located | None:
+        """Whether surfaces have touched since the last look; hands out the states before that."""
+        touched = None
+        if len(walk.trail) > 1:
+            touched, clearance = self.nucleation.located(walk.trail, self.resolution.jump)
+            walk.restart(clearance)
+        way = -1.0 if branch == "loading" else 1.0
+        for state in walk.pending:
+            if touched is None or way * (self.states.place(state) - touched.point.at) < 0:
+                trace.states.append(state)
+        walk.pending.clear()
+        return touched
+
+    def _closed(self, point: Point, reached: Point, branch: Branch) -> float:
+        """Bound on how far a gap has closed locally over a step."""
+        if branch == "loading":
+            return abs(reached.at - point.at) * self._closing(reached)
+        # While the mean gap widens only edges that run can close a gap elsewhere.
+        moved = float(np.abs(point.rate * (reached.at - point.at)).sum())
+        return float(self.edges.critical / np.sqrt(self.edges.wave) * moved)
 
     def _closing(self, point: Point) -> float:
         """How fast a gap may close locally, in units of d."""
@@ -133,27 +201,48 @@ class Follower:
         mean = 1 + give * point.slope if share else point.slope
         return _FASTEST_CLOSING * max(1.0, abs(mean))
 
-    def _touch(
-        self, trace: Trace, point: Point, touches: list[Touch], branch: Branch
-    ) -> tuple[float, Point | None]:
+    def _touch(self, trace: Trace, touched: Located, branch: Branch) -> tuple[float, Point | None]:
         """Jump from the point of a branch at which surfaces touch inside a gap."""
+        point = touched.point
         before = self.states.of_point(point)
         trace.states.append(before)
         gaps = point.field.gaps
-        return point.at, self.jumps.run(trace, before, gaps, point.at, branch, touches)
+        after = self.jumps.run(trace, before, gaps, point.at, branch, touched.touches)
+        trace.late += self._late(before, trace.states[-1], touched.late)
+        return point.at, after
 
-    def _fold(self, trace: Trace, point: Point, at: float, branch: Branch) -> Point | None:
-        """Jump at q0 s = ``at``, a step beyond the last point of a branch."""
+    def _fold(
+        self, trace: Trace, point: Point, at: float, branch: Branch, finest: float
+    ) -> tuple[Point | None, float]:
+        """Jump at d = ``at``, a step beyond the last point of a branch.
+
+        Returns the point after the jump, and the separation to which the jump is to be located:
+        below ``finest`` the jump was found too late for its drop, and was not recorded.
+        """
         last = self.states.of_point(point)
         before = self.states.shifted(last, point.field, at)
+        states, jumps = len(trace.states), len(trace.jumps)
         trace.states += [last, before]
-        return self.jumps.run(trace, before, point.field.gaps, at, branch)
+        after = self.jumps.run(trace, before, point.field.gaps, at, branch)
+        late = self._late(before, trace.states[-1], abs(at - point.at))
+        drop = trace.jumps[-1].energy_drop
+        allowed = self.resolution.late * max(drop, self.resolution.least_drop)
+        if late > allowed and abs(at - point.at) > self.resolution.finest:
+            del trace.states[states:], trace.jumps[jumps:]
+            share = max(0.5 * allowed / late, 1e-3)
+            return None, max(share * abs(at - point.at), self.resolution.finest)
+        trace.late += late
+        return after, finest
 
-    def _next_step(self, point: Point, target: float, wanted: float) -> float:
+    def _late(self, before: ContactState, after: ContactState, late: float) -> float:
+        """Work in J/m² that a jump found ``late`` (in d) adds to the loss, at most."""
+        return self.states.work(before, after, late)
+
+    def _next_step(self, point: Point, target: float, wanted: float, finest: float) -> float:
         """Next step in q0 s: no edge moves too far by prediction, the target is not passed."""
         fastest = float(np.abs(point.rate).max())
         size = min(wanted, _PREDICTED * self.edges.wave / max(fastest, 1e-300))
-        size = max(size, 0.999 * self.resolution.jump)
+        size = max(size, 0.999 * finest)
         left = target - point.at
         return left if size >= abs(left) else float(np.copysign(size, left))
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from solver.jumps import Branch
-from solver.method import ContactState
+from solver.method import ContactState, PathError
 from solver.profile import Array
 from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point, outward
 from solver.sharp.states import States, Trace
 from solver.sharp.touch import Nucleation, Touch
 
+_MOST_TOUCHES = 10_000  # nucleations in one jump; more is a bug
 _RAN = 0.05  # an edge that went further than this, in λ_min, ran
 _HELD_BACK = 0.03  # runners that take less than this share of C_c² from each other do not race
 _ELSEWHERE = 0.01  # edges this far apart, in λ_min, are those of different minima
@@ -50,17 +52,14 @@ class Jumps:
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals)
-        while branch == "loading" and point is not None:
-            ready = self.nucleation.ready(self.nucleation.minima(point.field))
-            grown = self._descend(point.field.gaps, at, ready, rivals) if ready else None
-            if grown is None or self._same(grown.field.gaps, point.field.gaps):
-                break
-            point = grown
+        point = self._settle(
+            point, at, lambda gaps, touching: self._descend(gaps, at, touching, rivals)
+        )
         after = self._after(before, point, at)
         other = after
         if rivals:
             try:
-                rival = self._settle(rivals[0], at, branch)
+                rival = self._settle_rival(rivals[0], at)
             except FullContact:  # elsewhere, but with no energy that could be compared
                 other = replace(after)
             else:
@@ -74,20 +73,45 @@ class Jumps:
         """State that a descent led to."""
         return self.states.after_loss(before, at) if point is None else self.states.of_point(point)
 
-    def _settle(self, point: Rival, at: float, branch: Branch) -> Point | None:
+    def _settle_rival(self, point: Rival, at: float) -> Point | None:
         """Go on with equal speeds, from a minimum that they reached, until nothing touches."""
         if isinstance(point, FullContact):
             raise point
-        while branch == "loading" and point is not None:
-            ready = self.nucleation.ready(self.nucleation.minima(point.field))
-            if not ready:
-                break
-            seeded = self.nucleation.seeded(point.field.gaps, ready)
-            grown = self._relax(seeded, at, equal_speeds=True)
-            if grown is None or self._same(grown.field.gaps, point.field.gaps):
-                break
+        return self._settle(
+            point,
+            at,
+            lambda gaps, touching: self._relax(
+                self.nucleation.seeded(gaps, touching), at, equal_speeds=True
+            ),
+        )
+
+    def _settle(
+        self, point: Point | None, at: float, descend: Callable[[Array, list[Touch]], Point | None]
+    ) -> Point | None:
+        """Let contact nucleate wherever surfaces overlap in a minimum, the deepest place first.
+
+        Raises
+        ------
+        PathError
+            If an overlap stays.
+        """
+        for _ in range(_MOST_TOUCHES):
+            if point is None:
+                if not self.states.overlaps_when_detached(at):
+                    return None
+                _, touches = self.nucleation.first_touch()
+                point = descend(np.empty((0, 2)), touches)
+                continue
+            least, minima = self.nucleation.least(point.field)
+            if least > 0:
+                return point
+            grown = descend(point.field.gaps, self.nucleation.ready(minima))
+            if grown is not None and self._same(grown.field.gaps, point.field.gaps):
+                if least < -self.nucleation.overlap:
+                    break
+                return point
             point = grown
-        return point
+        raise PathError(f"surfaces overlap at q0 s = {at:.9g}, and no patch comes to rest there")
 
     def _alike(self, one: Point | None, other: Point | None) -> bool:
         """Whether two descents led to one minimum."""

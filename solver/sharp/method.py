@@ -25,6 +25,7 @@ from solver.method import (
 )
 from solver.one_thread import on_one_thread
 from solver.problem import Problem
+from solver.profile import Profile
 from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point
 from solver.sharp.follow import Follower, Resolution, Target
 from solver.sharp.jump import Jumps
@@ -35,7 +36,16 @@ from solver.sharp.touch import Nucleation
 
 _RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
 _NOISE = 1e-13  # of h_max: no jump is located more finely
+# Error of the loss that the field's makes, in units of the accuracy, with room to spare.
+_FIELD_SHARE = 0.02
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
+# A jump may be late by a work of this share of its drop (in units of the accuracy), a jump whose
+# drop is negligible beside the work of adhesion by that share of the latter.
+_LATE = 0.5
+_LEAST_DROP = 2e-3
+# Nearer to a fold than this (in units of the field's accuracy, times h_max) the field's error hides
+# whether there is a minimum.
+_FINEST = 0.5
 _BEND = 1.5e-4  # largest relative error of the trapezoidal rule over one step
 
 
@@ -65,6 +75,17 @@ class SharpReport(MethodReport):
     descent_steps: int
 
 
+def _weakness(profile: Profile, critical: float) -> float:
+    """How weak adhesion is: critical opening over what roughness makes, at most 1.
+
+    The critical opening is then a small difference of the openings that roughness makes, of the
+    size h' sqrt(λ_min), and the loss, of the order of its square, a small difference of two works:
+    the field, and the integral along a branch (of fourth order), have to be as much finer.
+    """
+    rough = np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic)
+    return float(min(1.0, critical / rough)) if critical > 0 else 1.0
+
+
 class SharpMethod(Method):
     """Real-valued edges; see the module's text.
 
@@ -88,17 +109,21 @@ class SharpMethod(Method):
         self.accuracy = accuracy
         self.q0 = profile.q0
         h_max = profile.h_max * self.q0
-        tolerance = float(np.clip(_FIELD_ACCURACY * accuracy, 1e-14, 1e-5))
+        critical = float(4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus)))
+        weak = _weakness(profile, critical)
+        tolerance = float(np.clip(_FIELD_ACCURACY * accuracy * weak**2, 1e-14, 1e-5))
         source = StressSource(profile, tolerance)
-        critical = 4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus))
         self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
         self.states = States(problem, source, self.edges.count)
         # Under a load s goes like a square root before a fold, and where contact is lost it counts.
         late = accuracy if problem.control.is_load else 1.0
         self.resolution = Resolution(
             jump=max(_RESOLUTION * accuracy * late, _NOISE) * h_max,
-            bend=float(_BEND * np.sqrt(min(1.0, accuracy / 1e-3))),
+            bend=float(_BEND * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**1.25),
             scale=h_max,
+            finest=max(_FINEST * tolerance, _NOISE) * h_max,
+            late=_LATE * accuracy,
+            least_drop=_LEAST_DROP * problem.work_of_adhesion,
         )
         self.nucleation = Nucleation(problem, self.edges)
         self.jumps = Jumps(self.edges, self.nucleation, self.states)
@@ -145,7 +170,12 @@ class SharpMethod(Method):
             trace = self._trace(state, target)
         except FullContact:
             raise PathError(self.problem.full_contact(prescribed)) from None
-        return Path(tuple(trace.states), tuple(trace.jumps))
+        return Path(tuple(trace.states), tuple(trace.jumps), self._error(trace))
+
+    def _error(self, trace: Trace) -> float:
+        """Estimated error of the loss in J/m²: jumps found late, and the error of the field."""
+        drops = sum(abs(jump.energy_drop) for jump in trace.jumps)
+        return trace.late + _FIELD_SHARE * self.accuracy * drops
 
     def _trace(self, state: ContactState, target: Target) -> Trace:
         """States and jumps from ``state`` to the target."""

@@ -19,7 +19,7 @@ from scipy.fft import dst, next_fast_len
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp.coordinate import theta_at
+from solver.sharp.coordinate import one_minus_plus, theta_at
 from solver.sharp.field import RULES, GapField
 from solver.sharp.source import interpolate
 
@@ -108,3 +108,22 @@ def finer_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]:
     more = np.zeros(count)
     more[: len(modes)] = modes
     return _fine_nodes(gap, count)[0], dst(more, type=1)[::-1] / 2
+
+
+@compiled
+def sum_modes(gap: Array, theta: Array, modes: Array) -> Array:
+    """Σ_n b_n sin((n+1)t), cos t = η(θ), by Clenshaw's recurrence."""
+    out = np.empty(theta.shape[0])
+    left, right = gap[0], gap[1]
+    for i in range(theta.shape[0]):
+        if theta[i] - left < right - theta[i]:
+            minus, plus = one_minus_plus(gap, theta[i] - left, 0)
+        else:
+            minus, plus = one_minus_plus(gap, right - theta[i], 1)
+        twice = 2 * (plus - 1 if plus < minus else 1 - minus)
+        b1 = 0.0
+        b2 = 0.0
+        for n in range(modes.shape[0] - 1, -1, -1):
+            b1, b2 = twice * b1 - b2 + modes[n], b1
+        out[i] = b1 * np.sqrt(minus * plus)
+    return out

@@ -13,9 +13,8 @@ from solver.compiled import compiled
 from solver.method import Fields, Opening
 from solver.problem import Problem
 from solver.profile import Array
-from solver.sharp.coordinate import one_minus_plus
 from solver.sharp.field import GapField
-from solver.sharp.opening import fine_opening, finer_opening
+from solver.sharp.opening import fine_opening, finer_opening, sum_modes
 
 _FIELD_NODES = 6.0  # sine nodes per shortest wave
 _FINER = 8  # points of an opening, between which it is taken as linear, for each of these nodes
@@ -45,7 +44,7 @@ def fields_of(problem: Problem, field: GapField | None, separation: float, n: in
     for k, (left, right) in enumerate(field.gaps):
         inside = (place > left) & (place < right)
         fine = fine_opening(field, k, _FIELD_NODES)
-        gap[inside] = _sum_modes(field.solution.table[k], place[inside], fine.modes)
+        gap[inside] = sum_modes(field.solution.table[k], place[inside], fine.modes)
         pull[contact] += _pull(theta[contact], fine.theta, fine.opening * fine.weight)
     stress = np.zeros(n)
     full = field.source.sample(theta[contact])[:, 0]
@@ -68,25 +67,6 @@ def openings_of(field: GapField, q0: float) -> list[Opening]:
         theta, sine_sum = finer_opening(field.solution.table[k], modes, _FINER)
         theta = np.concatenate([[left], theta, [right]])
         out.append(Opening(theta / q0, np.concatenate([[0.0], sine_sum, [0.0]]) / q0))
-    return out
-
-
-@compiled
-def _sum_modes(gap: Array, theta: Array, modes: Array) -> Array:
-    """Σ_n b_n sin((n+1)t), cos t = η(θ), by Clenshaw's recurrence."""
-    out = np.empty(theta.shape[0])
-    left, right = gap[0], gap[1]
-    for i in range(theta.shape[0]):
-        if theta[i] - left < right - theta[i]:
-            minus, plus = one_minus_plus(gap, theta[i] - left, 0)
-        else:
-            minus, plus = one_minus_plus(gap, right - theta[i], 1)
-        twice = 2 * (plus - 1 if plus < minus else 1 - minus)
-        b1 = 0.0
-        b2 = 0.0
-        for n in range(modes.shape[0] - 1, -1, -1):
-            b1, b2 = twice * b1 - b2 + modes[n], b1
-        out[i] = b1 * np.sqrt(minus * plus)
     return out
 
 

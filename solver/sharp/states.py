@@ -17,10 +17,14 @@ from solver.sharp.source import StressSource
 
 @dataclass
 class Trace:
-    """States and jumps of a path, in order, as they are found."""
+    """States and jumps of a path, in order, as they are found.
+
+    ``late`` is the work, in J/m² of nominal area, that jumps found late may have added to the loss.
+    """
 
     states: list[ContactState] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
+    late: float = 0.0
 
 
 def hold_of(problem: Problem) -> Hold:
@@ -64,6 +68,11 @@ class States:
     def detached(self, separation: float) -> ContactState:
         """State without contact at q0 s = ``separation``."""
         return ContactState(separation / self.q0, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+
+    def overlaps_when_detached(self, at: float) -> bool:
+        """Whether no state without contact exists at d = ``at``: it would lie below s = h_max."""
+        profile, control = self.problem.profile, self.problem.control
+        return not control.is_load and at < profile.h_max * self.q0 * (1 - 1e-12)
 
     @property
     def _per_prescribed(self) -> float:
@@ -139,6 +148,13 @@ class States:
             stiffness=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
         )
+
+    def work(self, before: ContactState, after: ContactState, way: float) -> float:
+        """|Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        conjugate = [control.conjugate(s.separation, s.mean_stress, h_max) for s in (before, after)]
+        unit = self._half if control.is_load else 1 / self.q0
+        return abs(conjugate[0] - conjugate[1]) * way * unit
 
     def jump(
         self, before: ContactState, after: ContactState, branch: Branch, other: ContactState

@@ -15,10 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.problem import Problem
-from solver.profile import Array
+from solver.profile import EQUAL_CRESTS, Array
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
 from solver.sharp.field import GapField
-from solver.sharp.opening import fine_opening
+from solver.sharp.opening import fine_opening, sum_modes
+
+_OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
+# A minimum below this (of what its curvature makes over a node's distance) is found from the whole
+# series, by parabolas that get narrower so many times.
+_CLOSE = 0.1
+_NARROWER = 3
+_MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
 
 
 @dataclass(frozen=True)
@@ -30,11 +37,42 @@ class Touch:
     curvature: float
 
 
+@dataclass(frozen=True, eq=False)
+class Located:
+    """The point of a branch at which surfaces touch, where, and how late (in d) at most."""
+
+    point: Point
+    touches: list[Touch]
+    late: float
+
+
+def _bottom(
+    field: GapField, k: int, modes: Array, at: float, width: float
+) -> tuple[float, float, float]:
+    """Place, opening and half the curvature of a minimum, by parabolas that get narrower."""
+    half = 0.0
+    table = field.solution.table[k]
+    low = np.inf
+    for _ in range(_NARROWER):
+        width /= 8
+        x = np.array([at - width, at, at + width])
+        y = sum_modes(table, x, modes)
+        half = (y[2] - 2 * y[1] + y[0]) / (2 * width**2)
+        slope = (y[2] - y[0]) / (2 * width)
+        if not half > 0:
+            return at, float(y[1]), max(half, 1e-300)
+        step = float(np.clip(-slope / (2 * half), -4 * width, 4 * width))
+        at, low = at + step, float(y[1] + slope * step + half * step**2)
+    return at, low, half
+
+
 class Nucleation:
     """Finds touching points and puts seeds there."""
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
+        self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
+        self.overlap = _OVERLAP * problem.profile.h_max * problem.profile.q0
 
     def first_touch(self) -> tuple[float, list[Touch]]:
         """Separation q0 s at which the first patches are put, and where.
@@ -63,6 +101,9 @@ class Nucleation:
             half = (second - first) / (x[i + 1] - x[i - 1])
             slope = first + half * (x[i] - x[i - 1])
             at, low = x[i] - slope / (2 * half), y[i] - slope**2 / (4 * half)
+            width = x[i + 1] - x[i - 1]
+            for j in np.flatnonzero(low < _CLOSE * half * width**2):
+                at[j], low[j], half[j] = _bottom(field, k, shape.modes, at[j], 0.5 * width[j])
             found += map(Touch, at.tolist(), low.tolist(), (2 * half).tolist())
         return found
 
@@ -75,17 +116,21 @@ class Nucleation:
         return touch.opening + (4 * touch.curvature * width**2 if width <= narrowest else 0.0)
 
     def ready(self, minima: list[Touch]) -> list[Touch]:
-        """Those of the minima at which it is time to put a patch."""
-        return [t for t in minima if self.clearance(t) <= 0]
+        """Where to put patches: the place of largest overlap, and those that equal it."""
+        over = [(self.clearance(t), t) for t in minima]
+        least = min((value for value, _ in over), default=np.inf)
+        if least > 0:
+            return []
+        # without adhesion patches come and go smoothly, in any order
+        equal = self.equal if self.edges.critical > 0 else np.inf
+        return [t for value, t in over if value <= min(least + equal, 0.0)]
 
     def least(self, field: GapField) -> tuple[float, list[Touch]]:
         """Least clearance of a field, and all its minima."""
         minima = self.minima(field)
         return min((self.clearance(t) for t in minima), default=np.inf), minima
 
-    def located(
-        self, trail: list[Point], resolution: float
-    ) -> tuple[tuple[Point, list[Touch]] | None, float]:
+    def located(self, trail: list[Point], resolution: float) -> tuple[Located | None, float]:
         """First point of a trail at which surfaces touch inside a gap, with the touches.
 
         Else None and the least clearance at the end of the trail. The trail starts at a point known
@@ -105,22 +150,35 @@ class Nucleation:
                 low, clear_value = middle, value
             else:
                 high, hit, hit_minima, hit_value = middle, trail[middle], minima, value
-        clear = trail[low].at
-        while clear - hit.at > resolution and hit_value < 0:
+        last = trail[low]
+        clear = last.at
+        for _ in range(_MOST_AIMS):
+            near = abs(clear - hit.at) <= resolution
+            if hit_value == 0 or (near and hit_value > -0.5 * self.overlap):
+                break
             share = 0.5
             if np.isfinite(clear_value):
-                # secant, kept off the ends
-                share = min(max(clear_value / (clear_value - hit_value), 0.02), 0.98)
+                # secant to half of the overlap that is allowed, kept off the ends
+                aimed = clear_value + 0.2 * self.overlap
+                share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
             aim = clear + (hit.at - clear) * share
-            point = self.edges.equilibrium(hit.predicted(aim), aim, CORRECTED * self.edges.wave)
+            point = None
+            for start in (last, hit) if share < 0.5 else (hit, last):
+                if point is None:
+                    reach = CORRECTED * self.edges.wave
+                    point = self.edges.equilibrium(start.predicted(aim), aim, reach)
             if point is None:
                 break
             value, minima = self.least(point.field)
             if value > 0:
-                clear, clear_value = aim, value
+                last, clear, clear_value = point, aim, value
             else:
                 hit, hit_minima, hit_value = point, minima, value
-        return (hit, self.ready(hit_minima)), 0.0
+        # the surfaces touched so much earlier as the overlap says
+        late = abs(clear - hit.at)
+        if clear_value > hit_value:
+            late *= -hit_value / (clear_value - hit_value)
+        return Located(hit, self.ready(hit_minima), late), 0.0
 
     def seeded(self, gaps: Array, touches: list[Touch]) -> Array:
         """Edges with a seed at each touch."""

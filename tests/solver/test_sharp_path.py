@@ -1,0 +1,138 @@
+"""Method sharp on scenes that mislead a path: overlaps, late touches, weak and steep ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import HalfSpace, LoopResult, Problem, run_loop, self_affine_profile, single_wave
+from solver.method import PathError
+from solver.references.single_wave import SingleWave
+from solver.sharp.method import SharpMethod
+
+SOLID = HalfSpace(young=1e6, poisson=0.5)
+PERIOD = 2e-3
+
+
+def profile_of(hurst, n0, ratio, seed, amplitudes="deterministic", h_rms=1e-6):
+    return self_affine_profile(
+        hurst, period=PERIOD, n0=n0, ratio=ratio, seed=seed, amplitudes=amplitudes, h_rms=h_rms
+    )
+
+
+def loop(profile, gamma, *, max_penetration, load_steps, accuracy=1e-3, on_state=None):
+    method = SharpMethod(Problem(profile, SOLID, gamma), accuracy=accuracy)
+    return run_loop(
+        method, max_penetration=max_penetration, load_steps=load_steps, on_state=on_state
+    )
+
+
+def steps_back(result: LoopResult) -> float:
+    """Longest way in Δ/h_max that the record goes against its branch."""
+    back = 0.0
+    for branch, way in (("loading", 1), ("unloading", -1)):
+        steps = way * np.diff(result.penetration[result.branch == branch])
+        back = max(back, float(-steps.min(initial=0.0)))
+    return back
+
+
+def test_surfaces_that_touch_on_unloading_nucleate():
+    """A jump on unloading brings a free crest into the solid; it pulls off at -0.22, as on grids.
+
+    Without contact there from then on, it would come off at Δ/h_max = +0.13 with a clean audit.
+    """
+    profile = profile_of(0.35, 3, 2, 7496, "rayleigh")
+    states = []
+    gamma = 0.0827 * SOLID.modulus * 1e-12 * 2 * np.pi / PERIOD * 3
+    method = SharpMethod(Problem(profile, SOLID, gamma))
+    result = run_loop(
+        method,
+        max_penetration=0.844,
+        load_steps=15,
+        on_state=lambda branch, state: states.append(state),
+    )
+    assert -0.3 < result.pull_off_penetration < -0.2
+    assert "snap-in" in {j.kind for j in result.jumps if j.branch == "unloading"}
+    for state in states[::4]:
+        assert method.fields(state, 512).gap.min() > -1e-6 * profile.h_max
+
+
+def test_states_come_in_the_order_of_the_path_at_any_accuracy():
+    """A touch is located before states beyond it are recorded; the audit falls with accuracy."""
+    profile = profile_of(0.209, 5, 13, 675982, "rayleigh")
+    gamma = 4.71 * SOLID.modulus * 1e-12 * 2 * np.pi / PERIOD * 5
+    audits = []
+    for accuracy in (1e-3, 1e-5, 1e-6):
+        result = loop(profile, gamma, max_penetration=0.9918, load_steps=20, accuracy=accuracy)
+        assert steps_back(result) < 1e-12
+        audits.append(abs(result.audit_residual))
+    assert audits[0] < 3e-5
+    assert audits[1] < audits[0] / 5
+    assert audits[2] < audits[1] / 3
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.03, 0.05, 0.1, 0.3, 0.6])
+def test_the_loss_is_as_accurate_as_asked_for_and_its_error_is_told(alpha):
+    """Single wave, weak adhesion included: within the accuracy, and within the error told."""
+    amplitude, period = 1e-8, 1e-3
+    wave = SingleWave.with_alpha(alpha, amplitude, period, SOLID.modulus)
+    result = loop(
+        single_wave(amplitude, period), wave.work_of_adhesion, max_penetration=0.5, load_steps=10
+    )
+    error = abs(result.loss - wave.loop.loss)
+    assert error < 5e-4 * wave.loop.loss
+    assert error < result.loss_error < 1e-3 * wave.loop.loss
+
+
+@pytest.mark.parametrize("gamma", [1e-4, 1e-6])
+def test_weak_adhesion_of_a_rough_profile_closes_its_audit(gamma):
+    result = loop(profile_of(0.8, 2, 12, 3), gamma, max_penetration=0.5, load_steps=10)
+    assert abs(result.audit_residual) < 1e-3
+    assert result.loss > 0
+    assert min(j.energy_drop for j in result.jumps) > 0
+
+
+@pytest.mark.parametrize(
+    ("max_penetration", "gamma", "load_steps"),
+    [(1e-3, 0.04, 20), (1e-4, 0.005, 20), (0.0097, 0.1, 40), (0.999999, 0.04, 20)],
+)
+def test_small_and_extreme_turning_points(max_penetration, gamma, load_steps):
+    """They detach, in a number of states that follows from what happens and not from the step."""
+    profile = profile_of(0.8, 2, 12, 3)
+    result = loop(profile, gamma, max_penetration=max_penetration, load_steps=load_steps)
+    assert result.patches[-1] == 0
+    assert abs(result.audit_residual) < 1e-4
+    assert len(result.penetration) < 1500
+
+
+def test_skipped_load_steps_are_interpolated_on_the_axis():
+    profile = profile_of(0.8, 2, 12, 3)
+    result = loop(profile, 0.04, max_penetration=1e-3, load_steps=20)
+    axis = result.on_axis("unloading", result.penetration)
+    assert np.allclose(np.diff(axis), -1e-3 / 20, rtol=1e-6)
+    assert axis[-1] == pytest.approx(result.penetration[-1])
+
+
+def test_a_steep_profile_is_measured_exactly():
+    """Rms slope 0.96: edges once ran to and fro for ever between two panels of sqrt(1 + h'²)."""
+    profile = profile_of(0.227, 6, 5, 684946, "rayleigh", h_rms=2e-5)
+    gamma = 1.15 * SOLID.modulus * 4e-10 * 2 * np.pi / PERIOD * 6
+    result = loop(profile, gamma, max_penetration=0.9774, load_steps=20, accuracy=1e-2)
+    assert abs(result.audit_residual) < 1e-4
+    method = SharpMethod(Problem(profile, SOLID, gamma), accuracy=1e-2)
+    left, right = np.array([0.3, 2.0]), np.array([1.1, 5.9])
+    x = np.linspace(left, right, 20_001, axis=1) / profile.q0
+    measure = np.sqrt(1 + profile.at(x, 1) ** 2)
+    exact = np.trapezoid(measure, x * profile.q0, axis=1).sum()
+    assert method.states.source.measure_between(left, right) == pytest.approx(exact, rel=1e-8)
+
+
+def test_edges_that_are_no_numbers_have_no_field():
+    """Slope 37 once ended in a crash of the process; edges without a field end the path."""
+    method = SharpMethod(Problem(profile_of(0.8, 2, 12, 3), SOLID, 0.01))
+    gaps = np.array([[1.0, 2.0], [np.nan, 5.0]])
+    with pytest.raises(FloatingPointError):
+        method.edges.field(gaps, 1e-3)
+    assert method.edges.equilibrium(gaps, 1e-3, 0.1) is None
+    with pytest.raises(PathError, match="no field"):
+        method.edges.relax(gaps, 1e-3, 0.1)
