@@ -28,6 +28,11 @@ T = TypeVar("T")
 Progress = Callable[[Branch, float, ContactState], None]
 """Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
 
+STEEP = 0.3
+"""Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
+
+# An audit residual or an error of the loss beyond this share of the loss is said.
+_LARGE = 0.02
 # After so many times the loading stroke, unloading skips load steps that are shorter than a share
 # of h_max or of the way since first touch; loops of ordinary depth have detached long before.
 _STROKES_AT_STEP = 20
@@ -122,6 +127,27 @@ class LoopResult:
     def audit_residual(self) -> float:
         """(loop integral - sum of drops) / loop integral; 0 for a loop without loss."""
         return (self.loss - self.loss_from_drops) / self.loss if self.loss else 0.0
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what makes the loss doubtful; none for most loops."""
+        found = []
+        slope = float(np.sqrt(self.problem.profile.m2))
+        if slope > STEEP:
+            found.append(
+                f"the rms slope is {slope:.3g}: above {STEEP:g} linear elasticity itself is "
+                "doubtful, and with it the loss"
+            )
+        if self.problem.work_of_adhesion == 0:
+            return tuple(found)  # there is no loss to doubt
+        if abs(self.audit_residual) > _LARGE:
+            found.append(f"the audit residual is large: {self.audit_residual:.2g}")
+        if self.loss_error > _LARGE * abs(self.loss):
+            found.append(
+                f"the numerical error of the loss is large: {self.loss_error:.2g} J/m² of "
+                f"{self.loss:.3g} J/m²"
+            )
+        return tuple(found)
 
     @property
     def races(self) -> int:

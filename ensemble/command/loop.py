@@ -102,6 +102,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="Δ/h_max of the fields on both branches (default: quarters of --max-penetration)",
     )
     output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
+    output.add_argument(
+        "--strict", action="store_true", help="exit code 1 where something makes the loss doubtful"
+    )
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
 
@@ -150,7 +153,11 @@ def execute(args: argparse.Namespace) -> int:
     print(summary)
     for path in files:
         print(f"wrote       {path}")
-    return 0
+    loops = [] if isinstance(results, PathResult) else results
+    doubts = list(dict.fromkeys(text for result in loops for text in result.warnings))
+    for text in doubts:
+        print(f"adhesis loop: {text}", file=sys.stderr)
+    return 1 if doubts and args.strict else 0
 
 
 def _run(

@@ -49,6 +49,7 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
         "audit_residual": result.audit_residual,
         "loss_error": result.loss_error,
         "races": result.races,
+        "warnings": list(result.warnings),
         "energy_at_stake": result.energy_at_stake,
         "work_gained": result.work_gained,
         "work_spent": result.work_spent,
@@ -197,6 +198,8 @@ def loop_summary(result: LoopResult) -> str:
             f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
             f"audit       {result.loss_from_drops:.6g} J/m² in {len(result.jumps)} jumps, "
             f"residual {result.audit_residual:.2e}",
+            f"error       {result.loss_error:.2g} J/m² (numerical); {result.races} jumps raced, "
+            f"{result.energy_at_stake:.3g} J/m² at stake",
             f"jumps       {kinds}",
             f"pull-off    mean tension {result.pull_off_stress:.6g} Pa",
             f"method      {result.method.name}, {result.seconds:.1f} s",
