@@ -95,9 +95,11 @@ class Jumps:
         PathError
             If an overlap stays.
         """
+        # without adhesion patches narrower than the least are left out, and overlap so much
+        adhesive = self.edges.critical > 0
         for _ in range(_MOST_TOUCHES):
             if point is None:
-                if not self.states.overlaps_when_detached(at):
+                if not (adhesive and self.states.overlaps_when_detached(at)):
                     return None
                 _, touches = self.nucleation.first_touch()
                 point = descend(np.empty((0, 2)), touches)
@@ -107,7 +109,7 @@ class Jumps:
                 return point
             grown = descend(point.field.gaps, self.nucleation.ready(minima))
             if grown is not None and self._same(grown.field.gaps, point.field.gaps):
-                if least < -self.nucleation.overlap:
+                if adhesive and least < -self.nucleation.overlap:
                     break
                 return point
             point = grown
