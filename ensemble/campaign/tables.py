@@ -116,6 +116,13 @@ class CycleTable:
         axis="1",
     )
     load_steps: int = _key(whole_number(1, 100_000), "equal steps of the loading branch")
+    stiffness: float | None = _key(
+        positive_number("Pa/m"),
+        "stiffness k of what holds the half-space, in Pa/m of nominal area; by default the "
+        "separation is fixed. With it, penetrations of the path and of curves are u_tot/h_max",
+        None,
+        axis="Pa m-1",
+    )
     unloading_until: float = _key(
         negative_number(-1000),
         "end of the stored unloading curve, in units of h_max (the loop itself ends at detachment)",

@@ -66,6 +66,7 @@ def is_the_papers(campaign: Campaign) -> bool:
         and profile.n0 == _N0
         and profile.amplitudes == "deterministic"
         and profile.rolloff == 1
+        and cycle.stiffness is None
         and not campaign.lists
         and _is_spectrum(campaign)
         and _is(material.young, _YOUNG)

@@ -11,6 +11,7 @@ from ensemble.errors import InputError
 from ensemble.task.dataset import sizes_of
 from ensemble.task.fields import FieldRecorder, field_plan
 from ensemble.task.row import Row, row_of, row_scales
+from solver.control import Control
 from solver.loop import Progress, run_loop
 from solver.material import HalfSpace
 from solver.method import Method
@@ -40,7 +41,9 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
         **table.normalisation,
     )
     half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
-    return Problem(profile, half_space, task.work_of_adhesion)
+    stiffness = campaign.cycle.stiffness
+    control = Control() if stiffness is None else Control(stiffness)
+    return Problem(profile, half_space, task.work_of_adhesion, control)
 
 
 def check_task(campaign: Campaign, task: Task) -> None:

@@ -250,7 +250,9 @@ class FieldRecorder:
         """Keep the state if its penetration is one of the chosen ones and it has contact."""
         if not state.patches or not self._plan.penetration.size:
             return
-        penetration = self._method.problem.penetration(state.separation)
+        problem = self._method.problem
+        # of the path: of the far side, where a stiffness holds the half-space
+        penetration = problem.penetration(problem.prescribed_in(state))
         distance = np.abs(self._plan.penetration - penetration)
         nearest = int(np.argmin(distance))
         # States between load steps lie beside the axis by far more than rounding.

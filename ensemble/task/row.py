@@ -126,6 +126,22 @@ NUMBERS = (
         lambda loop: loop.energy_at_stake,
     ),
     _task(
+        *("work_gained", FLOAT, "J m-2", "work gained on loading per nominal area"),
+        lambda loop: loop.work_gained,
+    ),
+    _task(
+        *("work_spent", FLOAT, "J m-2", "work spent on unloading per nominal area"),
+        lambda loop: loop.work_spent,
+    ),
+    _task(
+        *("largest_contact_fraction", FLOAT, "1", "largest contact fraction A/A0 of the loop"),
+        lambda loop: loop.largest_contact_fraction,
+    ),
+    _task(
+        *("full_contact_energy", FLOAT, "J m-2", "elastic energy of full contact"),
+        lambda loop: loop.problem.full_contact_energy,
+    ),
+    _task(
         *("pull_off_penetration", FLOAT, "1", "penetration/h_max where the last contact is lost"),
         lambda loop: loop.pull_off_penetration,
     ),
