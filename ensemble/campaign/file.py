@@ -147,7 +147,7 @@ def _check_together(source: str, campaign: Campaign) -> None:
     n0, ratio = (_largest(campaign, name, getattr(profile, name)) for name in ("n0", "ratio"))
     if n0 * ratio > MOST_WAVES:
         raise InputError(
-            f"{source}: [profile] n0 · ratio is {n0 * ratio:g}: "
+            f"{source}: [profile] n0 · ratio is {round(n0 * ratio)}: "
             f"it must be at most {MOST_WAVES} harmonics"
         )
     if (
