@@ -22,7 +22,8 @@ from ensemble.aggregate.fields import FieldStatistics, aggregate_fields
 from ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
 from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.campaign.tables import Campaign
-from ensemble.results.read import Results
+from ensemble.errors import InputError
+from ensemble.results.read import Results, Slice
 from ensemble.results.schema import FAILED
 from solver.method import BRANCHES
 from solver.profile import Array
@@ -111,15 +112,27 @@ class Aggregate:
         return None
 
 
-def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
+def aggregate(
+    path: Path | str,
+    beside: Sequence[Path | str] = (),
+    others: tuple[tuple[str, float], ...] = (),
+) -> Aggregate:
     """Average a results file over realisations; ``beside`` are files to set beside it.
+
+    A campaign on further axes than H and γ is averaged point by point of these: ``others`` is one
+    of :func:`ensemble.results.read.slices`.
 
     Raises
     ------
     InputError
         If a file cannot be read, is no results file, or holds no finished task.
     """
-    with Results(path) as results:
+    with Slice(path, others) if others else Results(path) as results:
+        if results.campaign.axes[2:]:
+            names = ", ".join(axis.name for axis in results.campaign.axes[2:])
+            raise InputError(
+                f"{path} has further axes ({names}): its averages are taken at one point of them"
+            )
         status = results.status()
         cells = read_cells(results, status)
         rows = [cell.rows for cell in cells]

@@ -213,6 +213,7 @@ class Campaign:
     output: OutputTable
     stop: StopTable = StopTable()
     lists: tuple[tuple[Table, str, tuple[Value, ...]], ...] = ()
+    finest: int = field(default=0, compare=False, repr=False)
     text: str = field(default="", compare=False, repr=False)
     _at: dict[tuple[tuple[str, Value], ...], Campaign] = field(
         default_factory=dict, init=False, compare=False, repr=False
@@ -247,7 +248,9 @@ class Campaign:
 
     @property
     def finest_harmonic(self) -> int:
-        """Highest harmonic of all profiles."""
+        """Highest harmonic of all profiles, also of those of the campaign that :meth:`at` cut."""
+        if self.finest:
+            return self.finest
         names = [axis.name for axis in self.axes]
         here = {"n0": self.profile.n0, "ratio": self.profile.ratio}
         waves = [here | dict(zip(names, cell, strict=True)) for cell in self.cells]
@@ -277,7 +280,13 @@ class Campaign:
                 table = tables.get(axis.table, getattr(self, axis.table))
                 tables[axis.table] = replace(table, **{name: value})
             sweep = replace(self.sweep, zip=())
-            self._at[task.others] = replace(self, sweep=sweep, lists=(), **tables)
+            if self.has_axis("max_penetration"):  # the stored curves have one number of steps
+                cycle: CycleTable = tables["cycle"]
+                last = self.cycle.load_steps + 1 - self.unloading_penetration.size
+                until = cycle.max_penetration * last / cycle.load_steps
+                tables["cycle"] = replace(cycle, unloading_until=until)
+            finest = self.finest_harmonic
+            self._at[task.others] = replace(self, sweep=sweep, lists=(), finest=finest, **tables)
         return self._at[task.others]
 
     def identity(self, task: Task) -> tuple[Any, ...]:

@@ -16,6 +16,7 @@ def write_report(
     directory: Path | str,
     stream: IO[str] | None = None,
     beside: Sequence[Path | str] = (),
+    others: tuple[tuple[str, float], ...] = (),
 ) -> Aggregate:
     """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``; print.
 
@@ -29,13 +30,15 @@ def write_report(
         Where the tables go; standard output by default.
     beside : sequence of path
         Results files of other campaigns to compare with.
+    others : tuple, optional
+        The point of a campaign on further axes to report on (:func:`ensemble.results.read.slices`).
 
     Raises
     ------
     InputError
         If there is nothing to report, or the directory cannot be written.
     """
-    data = aggregate(path, beside)
+    data = aggregate(path, beside, others)
     directory = Path(directory)
     try:
         directory.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 # A loss that is off by more than this, or by ten times the accuracy that was asked for, is said.
-LARGE = 0.01
+LARGE = 0.02
 
 
 def bound(accuracy: float) -> float:
