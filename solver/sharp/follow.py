@@ -227,10 +227,10 @@ class Follower:
         late = self._late(before, trace.states[-1], abs(at - point.at))
         drop = trace.jumps[-1].energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
-        if late > allowed and abs(at - point.at) > self.resolution.finest:
+        if late > allowed and finest > self.resolution.finest:
             del trace.states[states:], trace.jumps[jumps:]
             share = max(0.5 * allowed / late, 1e-3)
-            return None, max(share * abs(at - point.at), self.resolution.finest)
+            return None, max(share * min(abs(at - point.at), finest), self.resolution.finest)
         trace.late += late
         return after, finest
 

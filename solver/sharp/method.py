@@ -208,6 +208,8 @@ class SharpMethod(Method):
         while point is not None and at != target.at:
             at, point = self.follower.run(trace, point, target)
         if point is None and at != target.at and not control.is_load:
+            if self.edges.critical > 0 and self.states.overlaps_when_detached(min(at, target.at)):
+                raise PathError(f"contact is lost at q0 s = {at:.9g}, where surfaces overlap")
             trace.states.append(self.detached(target.prescribed))
         return trace
 
