@@ -15,6 +15,7 @@ import numpy as np
 
 from ensemble.aggregate.cells import Cell, read_cells
 from ensemble.aggregate.statistics import Estimate, estimates
+from ensemble.campaign.compare import differing
 from ensemble.campaign.rules import shown
 from ensemble.campaign.tables import Campaign
 from ensemble.results.read import Results
@@ -22,7 +23,7 @@ from ensemble.results.read import Results
 Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
 
 # What is computed, and what is kept of it, do not change a loop.
-_IGNORED = ("sweep.", "output.", "solver.time_limit")
+_IGNORED = ("sweep.", "stop.", "output.", "solver.time_limit")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +87,7 @@ def read_companion(path: Path | str, campaign: Campaign) -> Companion:
 
 def differing_keys(here: Campaign, there: Campaign) -> list[str]:
     """Keys ("cycle.load_steps") in which the loops of two campaigns differ."""
-    one, two = here.values(), there.values()
-    return [key for key in one if one[key] != two[key] and not key.startswith(_IGNORED)]
+    return [key for key in differing(here, there) if not key.startswith(_IGNORED)]
 
 
 def kind_of(keys: Sequence[str]) -> Kind:

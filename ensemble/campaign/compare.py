@@ -15,7 +15,7 @@ from ensemble.campaign.tasks import Task
 
 
 @dataclass(frozen=True)
-class Difference:
+class Changes:
     """How a campaign differs from the one of a results file.
 
     Attributes
@@ -30,22 +30,28 @@ class Difference:
     other: tuple[str, ...]
 
 
-def compare(old: Campaign, new: Campaign) -> Difference:
+def differing(one: Campaign, two: Campaign) -> list[str]:
+    """Return the keys ("cycle.load_steps") whose values two campaigns do not share."""
+    mine, other = one.values(), two.values()
+    return [key for key in mine if mine[key] != other[key]]
+
+
+def compare(old: Campaign, new: Campaign) -> Changes:
     """Say how ``new`` differs from ``old``; keys that cannot change a result are left out."""
     before, after = old.values(), new.values()
     grown, other = [], []
     missing = {old.identity(t)[:2] + old.identity(t)[4:] for t in _firsts(old)} - {
         new.identity(t)[:2] + new.identity(t)[4:] for t in _firsts(new)
     }
-    for key, was in before.items():
-        value = after[key]
-        if value == was or _is_free(key):
+    for key in differing(old, new):
+        was, value = before[key], after[key]
+        if _is_free(key):
             continue
         if _extends(key, was, value) and not missing:
             grown.append(key)
         else:
             other.append(f"{key} is {shown(value)} here and {shown(was)} there")
-    return Difference(tuple(grown), tuple(other))
+    return Changes(tuple(grown), tuple(other))
 
 
 def _is_free(key: str) -> bool:
