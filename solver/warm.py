@@ -23,6 +23,7 @@ from solver.method import Branch, ContactState
 from solver.problem import Problem
 from solver.profile import self_affine_profile
 from solver.registry import make_method
+from solver.sharp.method import SharpMethod
 
 COMPILED_METHODS = ("sharp", "grid")
 
@@ -127,5 +128,8 @@ def _small_loops(method: str) -> None:
             states.append(state)
 
         run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
+        if isinstance(chosen, SharpMethod) and work_of_adhesion > 0:
+            chosen.edges.many = 3  # few enough for this loop: the ways of many gaps
+            run_loop(chosen, max_penetration=0.8, load_steps=2)
         nodes = chosen.nodes or 256
         chosen.fields(max(states, key=lambda state: state.patches), nodes)

@@ -32,7 +32,7 @@ RESTING, NARROW, UNFINISHED, LOST = 0, 1, 2, 3
 
 
 @compiled
-def _limits(table: Array, longest: float) -> Array:
+def limits(table: Array, longest: float) -> Array:
     """Longest step of each edge: ``longest``, or a quarter of the gap or patch it may close."""
     limit = np.empty(2 * table.shape[0])
     for k in range(table.shape[0]):
@@ -113,7 +113,7 @@ def descend(
         force = fresh
         longest = share * law.longest
         alone = 2 * longest if held and runners == 1 else longest
-        limit = _limits(table, alone)
+        limit = limits(table, alone)
         if held:
             reuses += 1
         else:

@@ -17,11 +17,16 @@ from numpy.typing import NDArray
 from solver.method import PathError
 from solver.profile import Array
 from solver.sharp.balance import Law
+from solver.sharp.coordinate import map_gaps
 from solver.sharp.descent import LOST, NARROW, RESTING, descend
 from solver.sharp.equilibrium import equilibrium
-from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution
+from solver.sharp.far import solve_many_plain
+from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution, choose_kinds
+from solver.sharp.many import equilibrium_many
 from solver.sharp.source import StressSource
+from solver.sharp.window import descend_many
 
+MANY = 48  # from so many gaps on, windows and the tree of gaps replace dense matrices
 CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min
 _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
 _DESCENT_LIMIT = 100_000
@@ -66,10 +71,25 @@ class Point:
     rate: Array
     slope: float
 
+    @property
+    def gaps(self) -> Array:
+        """Gap ends, shape (L, 2)."""
+        return self.field.gaps
+
+    @property
+    def pressure(self) -> float:
+        """2p̄/E*."""
+        return self.field.pressure
+
+    @property
+    def separation(self) -> float:
+        """Separation q0 s."""
+        return self.field.separation
+
     def predicted(self, at: float) -> Array:
         """Gaps at d = ``at``, along the tangent."""
-        motion = outward(self.field.gaps) * self.rate * (at - self.at)
-        return self.field.gaps + motion.reshape(-1, 2)
+        motion = outward(self.gaps) * self.rate * (at - self.at)
+        return self.gaps + motion.reshape(-1, 2)
 
 
 class EdgeMechanics:
@@ -84,6 +104,11 @@ class EdgeMechanics:
         Relative accuracy of the field.
     hold : Hold
         What is prescribed.
+
+    Attributes
+    ----------
+    many : int
+        From so many gaps on they are solved on a tree and moved in windows.
     """
 
     def __init__(
@@ -117,12 +142,22 @@ class EdgeMechanics:
             faint=max(_FAINT * tolerance, 1e-12) * float(critical) ** 2,
             origin=source.highest,
         )
+        self.many = MANY
         self.count = Counters()
 
     def field(self, gaps: Array, prescribed: float) -> GapField:
         """Solve the field of these gaps."""
         self.count.fields += 1
-        return GapField(self.source, gaps, prescribed, self.tolerance, self.law.hold)
+        solution = None
+        if len(gaps) >= self.many:
+            kinds = choose_kinds(map_gaps(gaps), self.law.digits, RULES.counts)
+            solution = Solution(
+                *solve_many_plain(
+                    gaps, prescribed, self.law.hold, kinds, self.law.digits, 2, RULES,
+                    self.source.panels,
+                )
+            )  # fmt: skip
+        return GapField(self.source, gaps, prescribed, self.tolerance, self.law.hold, solution)
 
     def widths(self, gaps: Array) -> tuple[Array, Array]:
         """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
@@ -150,7 +185,8 @@ class EdgeMechanics:
         if not (length.min() > 0 and patch.min() > 0):
             return None
         try:
-            found, at, solution, rate, slope, steps = equilibrium(
+            newton = equilibrium if len(gaps) < self.many else equilibrium_many
+            found, at, solution, rate, slope, steps = newton(
                 gaps, prescribed, max(reach, self.settled), kinds, patient, self.law, RULES,
                 self.source.panels,
             )  # fmt: skip
@@ -193,7 +229,8 @@ class EdgeMechanics:
         kinds = _ANY
         rests = 0
         while left > 0:
-            gaps, ended, fields, tangents, kinds = descend(
+            lower = descend if len(gaps) < self.many else descend_many
+            gaps, ended, fields, tangents, kinds = lower(
                 gaps, prescribed, left, kinds, equal_speeds, law, RULES, self.source.panels
             )
             self.count.fields += fields

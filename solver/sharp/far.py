@@ -13,7 +13,17 @@ import numpy as np
 from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp.coordinate import map_gaps
-from solver.sharp.field import Hold, Kinds, Rules, Solution, edge_openings, one_gap
+from solver.sharp.field import (
+    Hold,
+    Kinds,
+    PlainSolution,
+    Rules,
+    Solution,
+    edge_openings,
+    in_order,
+    one_gap,
+    plain,
+)
 from solver.sharp.linear import factor_rows, solve_factored
 from solver.sharp.source import Panels
 from solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
@@ -147,6 +157,9 @@ def solve_many(
     offset = np.zeros(count + 1, dtype=np.int64)
     for k in range(count):
         offset[k + 1] = offset[k] + rules.counts[kinds[k]]
+    sound = in_order(table)
+    if not sound:  # any edges with a field: what comes of them is marked as none
+        table = map_gaps(np.arange(2.0 * count).reshape(count, 2) * (np.pi / count))
     theta, weight, slope, blocks, rhs, beyond = gap_blocks(
         table, kinds, offset, fields, rules, panels
     )
@@ -166,7 +179,7 @@ def solve_many(
     separation = prescribed
     if hold.give != 0:
         separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
-    if not definite:
+    if not (sound and definite):
         pressure = np.nan
     f = np.empty(theta.shape[0])
     for i in range(theta.shape[0]):
@@ -180,7 +193,8 @@ def solve_many(
     empty = np.empty((0, 0))
     solution = Solution(
         table, kinds, offset, theta, weight, slope, empty, empty, rhs, solved, beyond,
-        hold.share, unit_mean, resistance, separation, pressure, f, opening,
+        hold.share, unit_mean, resistance, separation, pressure, f, opening, empty, np.empty(0),
+        0.0,
     )  # fmt: skip
     return solution, of_gaps
 
@@ -198,3 +212,18 @@ def spread(
     charges = collect(of.tree, of.response, alone * w + charge)
     potential = distribute(of.tree, of.response, charges, np.zeros((0, load.shape[1])))
     return alone - by_gaps(kinds, offset, rules, of.inverse, potential * w)
+
+
+@compiled
+def solve_many_plain(
+    gaps: Array,
+    prescribed: float,
+    hold: Hold,
+    kinds: Kinds,
+    digits: float,
+    fields: int,
+    rules: Rules,
+    panels: Panels,
+) -> PlainSolution:
+    """As :func:`solve_many`, for calls from Python."""
+    return plain(solve_many(gaps, prescribed, hold, kinds, digits, fields, rules, panels)[0])

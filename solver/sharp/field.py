@@ -50,7 +50,8 @@ from solver.sharp.coordinate import (
     map_gaps,
     theta_at,
 )
-from solver.sharp.linear import cholesky, solve_factored
+from solver.sharp.linear import cholesky, factor_rows, solve_column, solve_factored
+from solver.sharp.outside import Outside, add_outside, moving_load, reach
 from solver.sharp.source import Panels, StressSource, gap_moments
 
 Kinds = NDArray[np.int64]
@@ -160,6 +161,10 @@ class Solution(NamedTuple):
         The openings over sqrt(1-η²).
     opening : array, shape (2L,)
         C at each gap end.
+    felt_load, felt_area, felt_shift : array, array, float
+        Of the derivatives, what comes from outside a window (:mod:`solver.sharp.outside`): loads,
+        shape (N, 2L), and areas, shape (2L,), of the singular openings, both empty without an
+        outside, and the mean opening when all edges move together.
     """
 
     table: Array
@@ -180,11 +185,14 @@ class Solution(NamedTuple):
     pressure: float
     f: Array
     opening: Array
+    felt_load: Array
+    felt_area: Array
+    felt_shift: float
 
 
 PlainSolution = tuple[
     Array, Kinds, Kinds, Array, Array, Array, Array, Array, Array, Array, Array, float, float,
-    float, float, float, Array, Array,
+    float, float, float, Array, Array, Array, Array, float,
 ]  # fmt: skip
 """The fields of :class:`Solution` in order."""
 
@@ -281,7 +289,7 @@ def choose_kinds(table: Array, digits: float, counts: Kinds) -> Kinds:
 
 
 @compiled
-def _in_order(table: Array) -> bool:
+def in_order(table: Array) -> bool:
     """Whether every gap and patch has a length; not so where an edge is no number."""
     for k in range(table.shape[0]):
         # not written as <= : a length that is no number is a failure, too
@@ -307,20 +315,34 @@ def solve(
     is NaN if the matrix is not positive definite to rounding, or edges are no numbers or cross.
     """
     table = map_gaps(gaps)
+    windowed = panels.outside.theta.shape[0] > 0
     offset = np.zeros(table.shape[0] + 1, dtype=np.int64)
-    if not _in_order(table):
+    if not in_order(table):
         nothing, none = np.empty(0), np.empty((0, 0))
         return Solution(
             table, kinds, offset, nothing, nothing, np.empty((table.shape[0], 2)), none, none, none,
             none, np.empty((0, 0, 0)), hold.share, np.nan, np.nan, np.nan, np.nan, nothing,
-            np.full(2 * table.shape[0], np.nan),
+            np.full(2 * table.shape[0], np.nan), none, nothing, np.nan,
         )  # fmt: skip
     for k in range(table.shape[0]):
         offset[k + 1] = offset[k] + rules.counts[kinds[k]]
+    if windowed:
+        offset[-1] = offset[-2]  # the last gap is the outside
     theta, weight, slope, matrix, rhs, beyond = _assemble(
         table, kinds, offset, fields, rules, panels
     )
-    factor, definite = cholesky(matrix)
+    rows, slopes = reach(theta, weight, panels.outside)
+    drawn = rows
+    if windowed:
+        drawn = add_outside(rows, panels.outside, matrix, rhs)
+    felt_load = np.empty((0, 0))
+    felt_area = np.empty(0)
+    felt_shift = 0.0
+    if windowed:  # where edges follow outside, the matrix need not be positive definite
+        factor = matrix.copy()
+        definite = factor_rows(factor, 0.0)
+    else:
+        factor, definite = cholesky(matrix)
     solved = rhs.copy()
     opening = np.full(2 * table.shape[0], np.nan)
     pressure = np.nan
@@ -333,8 +355,11 @@ def solve(
         load_mean = 0.0
         unit_mean = 0.0
         for i in range(theta.shape[0]):
-            load_mean += weight[i] * solved[i, 0]
-            unit_mean += weight[i] * solved[i, 1]
+            load_mean += rhs[i, 1] * solved[i, 0]
+            unit_mean += rhs[i, 1] * solved[i, 1]
+        if windowed:
+            load_mean -= panels.outside.mean[0]
+            unit_mean += panels.outside.mean[1]
         resistance = hold.share * unit_mean + 2 * np.pi * hold.give
         pressure = -(2 * np.pi * prescribed + hold.share * load_mean) / resistance
         separation = prescribed
@@ -348,10 +373,52 @@ def solve(
         for k in range(table.shape[0]):
             for side in range(2):
                 opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
+        if windowed:
+            opening[-2:] = panels.outside.opening
+            if fields > 1:
+                load, felt_shift = moving_load(rows, slopes, drawn, panels.outside, f, pressure)
+                solve_column(factor, load)
+                for i in range(theta.shape[0]):
+                    solved[i, 2] += load[i]
+                felt_load, felt_area = _felt(
+                    table, slope, kinds, offset, rules, rows, drawn, panels.outside
+                )
     return Solution(
         table, kinds, offset, theta, weight, slope, matrix, factor, rhs, solved, beyond,
-        hold.share, unit_mean, resistance, separation, pressure, f, opening,
+        hold.share, unit_mean, resistance, separation, pressure, f, opening, felt_load, felt_area,
+        felt_shift,
     )  # fmt: skip
+
+
+@compiled
+def _felt(
+    table: Array,
+    slope: Array,
+    kinds: Kinds,
+    offset: Kinds,
+    rules: Rules,
+    rows: Array,
+    drawn: Array,
+    outside: Outside,
+) -> tuple[Array, Array]:
+    """What the outside adds to loads and areas of the singular openings of a window."""
+    load = np.zeros((rows.shape[0], 2 * table.shape[0]))
+    area = np.zeros(2 * table.shape[0])
+    for k in range(table.shape[0] - 1):
+        point = np.pi / (rules.counts[kinds[k]] + 1)
+        edge_rows, _ = reach(table[k, LEFT : LEFT + 2], point / slope[k], outside)
+        for side in range(2):
+            e = 2 * k + side
+            for a in range(rows.shape[1]):
+                area[e] += edge_rows[side, a] * outside.charge[a, 1]
+                for i in range(rows.shape[0]):
+                    load[i, e] += drawn[i, a] * edge_rows[side, a]
+            for j in range(offset[k], offset[k + 1]):
+                x = rules.eta[rules.start[kinds[k]] + j - offset[k]]
+                density = 1 / (1 + x) if side == 0 else 1 / (1 - x)
+                for a in range(rows.shape[1]):
+                    area[e] += density * rows[j, a] * outside.charge[a, 1]
+    return load, area
 
 
 @compiled
@@ -364,7 +431,7 @@ def plain(of: Solution) -> PlainSolution:
     return (
         of.table, of.kinds, of.offset, of.theta, of.weight, of.slope, of.matrix, of.factor, of.rhs,
         of.solved, of.beyond, of.share, of.unit_mean, of.resistance, of.separation, of.pressure,
-        of.f, of.opening,
+        of.f, of.opening, of.felt_load, of.felt_area, of.felt_shift,
     )  # fmt: skip
 
 
@@ -390,11 +457,15 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
     """
     edges = 2 * of.slope.shape[0]
     load, area = _singular_loads(of, rules)
+    windowed = of.felt_area.shape[0] > 0
+    if windowed:
+        load += of.felt_load
+        area += of.felt_area
     solve_factored(of.factor, load)
     p = area
     for i in range(load.shape[0]):
         for e in range(edges):
-            p[e] += of.weight[i] * load[i, e]
+            p[e] += of.rhs[i, 1] * load[i, e]
     if of.share == 0:
         p /= 2 * np.pi  # of the separation; the pressure stays
     else:
@@ -406,7 +477,8 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
     # Translation: all edges together against the profile.
     drift = 0.0
     for i in range(load.shape[0]):
-        drift -= of.weight[i] * of.solved[i, 2]
+        drift -= of.rhs[i, 1] * of.solved[i, 2]
+    drift += of.felt_shift
     drift = of.share * drift / of.resistance
     moving = np.empty((load.shape[0], 1))
     for i in range(load.shape[0]):
@@ -427,6 +499,16 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
                 total += by_edge[e, other]
         slope = of.slope[e // 2, e % 2]
         by_edge[e, e] = moved[e, 0] - np.sqrt(2 * slope) * of.beyond[e // 2, e % 2, 1] - total
+    if windowed:
+        # the ends of the outside stay
+        typical = 0.0
+        for e in range(edges - 2):
+            typical = max(typical, abs(by_edge[e, e]))
+        by_edge[edges - 2 :] = 0.0
+        by_edge[:, edges - 2 :] = 0.0
+        by_edge[edges - 2, edges - 2] = typical
+        by_edge[edges - 1, edges - 1] = -typical
+        p[edges - 2 :] = 0.0
     return by_edge, p
 
 
@@ -470,6 +552,10 @@ def _assemble(
     beyond = np.empty((gaps, 2, fields))
     matrix = np.empty((n, n))
     for k in range(gaps):
+        if offset[k] == offset[k + 1]:  # the outside of a window
+            slope[k] = 1.0
+            beyond[k] = 0.0
+            continue
         own = slice(offset[k], offset[k + 1])
         one_gap(
             table[k], kinds[k], rules, panels, theta[own], weight[own], slope[k], rhs[own],
@@ -605,6 +691,10 @@ def _singular_loads(of: Solution, rules: Rules) -> tuple[Array, Array]:
     sine = np.sin(0.5 * theta)
     cosine = np.cos(0.5 * theta)
     for k in range(gaps):
+        if offset[k] == offset[k + 1]:
+            load[:, 2 * k : 2 * k + 2] = 0.0
+            area[2 * k : 2 * k + 2] = 0.0
+            continue
         m = counts[kinds[k]]
         base = offset[k]
         point = np.pi / (m + 1)

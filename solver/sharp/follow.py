@@ -10,6 +10,7 @@ from solver.jumps import Branch
 from solver.method import ContactState
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.jump import Jumps
+from solver.sharp.local import advance
 from solver.sharp.states import States, Trace
 from solver.sharp.touch import Located, Nucleation
 
@@ -149,7 +150,7 @@ class Follower:
                 wanted = 0.5 * abs(step)
                 continue
             walk.add(reached, self._closed(point, reached, target.branch))
-            small = self.edges.without_small(reached.field.gaps)
+            small = self.edges.without_small(reached.gaps)
             there = reached.at == target.at
             if error > 1 or there:
                 exact = None
@@ -250,13 +251,14 @@ class Follower:
         """Predict and correct; None if no stable equilibrium is within reach."""
         if np.abs(point.rate * step).max() > 2 * _PREDICTED * self.edges.wave:
             return None
-        return self.equilibrium(point, target if step == target - point.at else point.at + step)
+        at = target if step == target - point.at else point.at + step
+        return advance(self.edges, point, at, sure=abs(step) <= self.resolution.jump)
 
     def _trapezoid_error(self, shown: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last state shown, in units of what is allowed."""
         span = abs(point.at - shown.at)
         # p = q0 h_max is σ~ = 1
         load = self.states.problem.control.is_load
-        conjugate = point.field.separation - self.resolution.scale if load else point.field.pressure
+        conjugate = point.separation - self.resolution.scale if load else point.pressure
         scale = max(abs(conjugate), _QUIET * self.resolution.scale)
         return float(span * abs(point.slope - shown.slope) / 12 / (self.resolution.bend * scale))

@@ -33,6 +33,7 @@ from solver.sharp.coordinate import (
     one_minus_plus,
     theta_at,
 )
+from solver.sharp.outside import NOTHING, Outside
 
 # Nodes p of a panel, by the tolerance they serve. The finest panel is at most half a shortest wave
 # long: interpolation there leaves (π/2)^p/(p! 2^(p-1)) of the shortest wave's amplitude. A panel as
@@ -71,6 +72,8 @@ class Panels(NamedTuple):
         Row of ``weights`` at which each level starts.
     end_x, end_w : array
         Gauss-Legendre rule on (0, 1) of an end piece (at most one shortest wave, in sqrt scale).
+    outside : Outside
+        The gaps outside the window whose gaps are solved; nothing if all are solved.
     """
 
     width: float
@@ -84,6 +87,16 @@ class Panels(NamedTuple):
     level_start: NDArray[np.int64]
     end_x: Array
     end_w: Array
+    outside: Outside
+
+
+@compiled
+def with_outside(of: Panels, outside: Outside) -> Panels:
+    """The same source for a window of gaps."""
+    return Panels(
+        of.width, of.finest, of.x, of.w, of.stress, of.slope, of.tilt, of.weights,
+        of.level_start, of.end_x, of.end_w, outside,
+    )  # fmt: skip
 
 
 class StressSource:
@@ -158,6 +171,7 @@ class StressSource:
             level_start=np.cumsum([0, *sizes[:-1]]),
             end_x=(t + 1) / 2,
             end_w=end / 2,
+            outside=NOTHING,
         )
 
     def sample(self, theta: Array) -> Array:

@@ -203,11 +203,19 @@ def newton_many(
     q0 s), and whether the edges are stable.
     """
     parts = yielding_gaps(of, gaps, residual, drift, rules)
+    return newton_step(of, gaps, parts, hold)
+
+
+@compiled
+def newton_step(
+    of: Solution, gaps: Gaps, parts: Yielding, hold: Hold
+) -> tuple[Array, Array, float, bool]:
+    """As :func:`newton_many`, from the gaps' parts."""
     response = respond(gaps.tree, parts.own, parts.negative)
     charge = collect(gaps.tree, response, parts.alone)
     potential = distribute(gaps.tree, response, charge, np.zeros((0, 2)))
     count = of.slope.shape[0]
-    motion = parts.motion
+    motion = parts.motion.copy()
     mean = np.zeros(2)  # of the opening, times 2π
     for k in range(count):
         for i in range(of.offset[k], of.offset[k + 1]):

@@ -5,12 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis import self_affine_profile
+from adhesis import HalfSpace, Problem, self_affine_profile
+from solver.loop import run_loop
+from solver.sharp.balance import imbalance, symmetric, tangent_of
 from solver.sharp.coordinate import map_gaps
+from solver.sharp.edges import EdgeMechanics
 from solver.sharp.far import solve_many
-from solver.sharp.field import FIXED, RULES, Solution, choose_kinds, solve_plain
+from solver.sharp.field import FIXED, RULES, Solution, choose_kinds, derivatives, solve_plain
+from solver.sharp.linear import is_definite
+from solver.sharp.method import SharpMethod
+from solver.sharp.outside import Outside
 from solver.sharp.source import StressSource
 from solver.sharp.tree import plant
+from solver.sharp.window import surroundings
+from solver.sharp.yielding import newton_many
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +76,118 @@ def test_work_grows_as_the_number_of_gaps():
     # once the tree is deep its upper levels, with their few more charges, hold few runs
     assert share[1][0] < 1.1 * share[0][0]
     assert share[1][1] < 1.25 * share[0][1]
+
+
+def mechanics(profile, toughness, tolerance=1e-6):
+    """Edges of a critical opening in units of that of a crack one shortest wave long."""
+    source = StressSource(profile, tolerance)
+    scale = np.sqrt(source.m2 * 2 * np.pi / source.top)
+    return EdgeMechanics(source, toughness * scale, tolerance)
+
+
+def opened(gaps, edges, separation):
+    """Solution with S and S' by the dense solver, imbalance, drift and tangent."""
+    kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
+    panels = edges.source.panels
+    of = Solution(*solve_plain(gaps, separation, FIXED, kinds, 2, RULES, panels))
+    residual, drift = imbalance(of, edges.law, panels)
+    return of, kinds, residual, drift, tangent_of(of, drift, RULES)[0]
+
+
+def test_newton_step_and_stability_equal_the_dense_ones(profile):
+    """Steps of all edges to 1e-3, and the same verdict, on stable and unstable states."""
+    edges = mechanics(profile, 1.0)
+    separation = 3 * profile.h_max * profile.q0
+    verdicts = set()
+    for seed in range(12):
+        gaps = random_gaps(6, 0.1 + 0.06 * seed, 0.1, seed)
+        of, kinds, residual, drift, tangent = opened(gaps, edges, separation)
+        assert of.opening.min() > 0
+        step = np.linalg.solve(tangent, -residual)
+        stable = is_definite(symmetric(of, tangent, edges.law.overlapping)[1])
+        tree, parts = solve_many(
+            gaps, separation, FIXED, kinds, edges.law.digits, 2, RULES, edges.source.panels
+        )
+        found, _, _, verdict = newton_many(tree, parts, residual, drift, FIXED, RULES)
+        assert np.abs(found - step).max() < 1e-3 * np.abs(step).max()
+        assert verdict == stable
+        verdicts.add(stable)
+    assert False in verdicts
+
+
+@pytest.fixture(scope="module")
+def loaded(profile):
+    """Many patches in equilibrium, under weak adhesion: method and state."""
+    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 1e-3), accuracy=1e-4)
+    state = method.detached(profile.h_max)
+    for depth in (0.0, 0.3, 0.5):
+        state = method.follow(state, profile.h_max * (1 - depth)).states[-1]
+    return method, state
+
+
+@pytest.mark.parametrize("follow", [False, True])
+def test_a_window_feels_all_other_gaps(loaded, follow):
+    """Openings and derivatives in a window are those of all gaps.
+
+    With edges that follow outside, its tangent is the Schur complement of all edges'.
+    """
+    method, state = loaded
+    edges, separation = method.edges, state.separation * method.q0
+    gaps = state.internal.copy()
+    count = len(gaps)
+    assert count >= 7
+    kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
+    first = count - 2
+    inside = (first + np.arange(4)) % count  # across the end of the period
+    panels = edges.source.panels
+    window, *outside = surroundings(
+        gaps, separation, kinds, first, 4, np.inf if follow else 0.0, edges.law, RULES, panels
+    )
+    tree, parts = solve_many(gaps, separation, FIXED, kinds, edges.law.digits, 2, RULES, panels)
+    found, _, _, stable = newton_many(
+        tree, parts, *imbalance(tree, edges.law, panels), FIXED, RULES
+    )
+    assert stable
+    assert np.abs(found).max() < 1e-3 * edges.wave  # it is an equilibrium for the tree, too
+    panels = panels._replace(outside=Outside(*outside))
+    if not follow:
+        # exact for whatever the window's edges do
+        motion = 0.02 * edges.wave * np.random.default_rng(0).standard_normal((4, 2))
+        window[:-1] += motion
+        gaps[inside] += motion
+    of, _, _, _, tangent = opened(gaps, edges, separation)
+    local = Solution(
+        *solve_plain(window, separation, FIXED, np.append(kinds[inside], 0), 2, RULES, panels)
+    )
+    own = (2 * inside[:, None] + [0, 1]).ravel()
+    scale = np.abs(of.opening).max()
+    assert np.abs(local.opening[:-2] - of.opening[own]).max() < 1e-5 * scale
+    assert local.pressure == pytest.approx(of.pressure, rel=1e-4)
+    if follow:
+        residual, drift = imbalance(local, edges.law, panels)
+        assert not residual[-2:].any()  # the ends of the outside stay
+        found = tangent_of(local, drift, RULES)[0][:-2, :-2]
+        rest = np.setdiff1d(np.arange(2 * count), own)
+        others = np.linalg.solve(tangent[np.ix_(rest, rest)], tangent[np.ix_(rest, own)])
+        exact = tangent[np.ix_(own, own)] - tangent[np.ix_(own, rest)] @ others
+    else:
+        found = derivatives(local, RULES)[0][:-2, :-2]
+        exact = derivatives(of, RULES)[0][np.ix_(own, own)]
+    assert np.abs(found - exact).max() < 1e-5 * np.abs(exact).max()
+
+
+def test_a_loop_in_windows_is_the_loop():
+    """Tree and windows from six gaps on: losses, jumps and audit as with dense matrices."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=25, h_rms=1e-6, seed=1)
+    problem = Problem(profile, HalfSpace(1e6, 0.5), 0.01)
+    loops = []
+    for many in (1000, 6):
+        method = SharpMethod(problem)
+        method.edges.many = many
+        loops.append(run_loop(method, max_penetration=0.6, load_steps=20))
+    dense, windows = loops
+    assert dense.patches.max() >= 12
+    assert len(windows.jumps) == len(dense.jumps)
+    assert windows.loss == pytest.approx(dense.loss, rel=2e-4)
+    assert windows.loss_from_drops == pytest.approx(dense.loss_from_drops, rel=2e-4)
+    assert abs(windows.audit_residual) < 1e-4

@@ -1,0 +1,62 @@
+"""Equilibrium of many gaps by Newton's iteration on the tree of gaps, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.compiled import compiled
+from solver.profile import Array
+from solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
+from solver.sharp.coordinate import map_gaps
+from solver.sharp.far import solve_many
+from solver.sharp.field import Kinds, PlainSolution, Rules, choose_kinds, plain
+from solver.sharp.source import Panels
+from solver.sharp.yielding import newton_many
+
+_NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+
+
+@compiled
+def equilibrium_many(
+    gaps: Array,
+    prescribed: float,
+    reach: float,
+    least: Kinds,
+    patient: bool,
+    law: Law,
+    rules: Rules,
+    panels: Panels,
+) -> tuple[bool, Array, PlainSolution, Array, float, int]:
+    """As :func:`solver.sharp.equilibrium.equilibrium`, in work that grows as the number of gaps."""
+    at = gaps
+    kinds = at_least(choose_kinds(map_gaps(gaps), law.digits, rules.counts), least)
+    travelled = np.zeros(gaps.size)
+    last = np.inf
+    found = False
+    steps = 0
+    while True:
+        steps += 1
+        of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
+        residual, drift = imbalance(of, law, panels)
+        step, rate, slope, stable = newton_many(of, parts, residual, drift, law.hold, rules)
+        size = np.abs(step).max()
+        if not np.isfinite(of.pressure):
+            break
+        stalled = size <= law.coarse and size > 0.3 * last
+        if size <= law.settled or stalled:
+            found = stable or not patient
+            break
+        if not patient and size <= law.near:
+            found = True
+            break
+        travelled += step
+        # not written as > : a size that is no number is a failure, too
+        within = size <= reach and size <= 2 * last and np.abs(travelled).max() <= reach
+        if not within or steps == _NEWTON_LIMIT:
+            break
+        last = size
+        moved = moved_gaps(at, step)
+        if not narrowest(moved) > 0:
+            break
+        at = moved
+    return found, at, plain(of), rate, slope, steps
