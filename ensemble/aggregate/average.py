@@ -1,15 +1,17 @@
 """Averages over realisations, from a results file alone.
 
-A cell is one (H, γ) of the sweep. Scalars of all tasks fit in memory; curves do not, so they pass
-through a bounded block of columns at a time. Only rows whose status is "done" are read: the status
-byte is written last, so a file that a run is still writing gives a consistent answer.
+A cell is one point on the axes of the campaign: an (H, γ), and a value of what else is a list.
+Scalars of all tasks fit in memory; curves do not, so they pass through a bounded block of columns
+at a time. Only rows whose status is "done" are read: the status byte is written last, so a file
+that a run is still writing gives a consistent answer.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +23,9 @@ from ensemble.aggregate.curves import average_curves
 from ensemble.aggregate.fields import FieldStatistics, aggregate_fields
 from ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
 from ensemble.aggregate.statistics import Estimate, estimates
+from ensemble.campaign.axes import Axis
 from ensemble.campaign.tables import Campaign
-from ensemble.errors import InputError
-from ensemble.results.read import Results, Slice
+from ensemble.results.read import Results
 from ensemble.results.schema import FAILED
 from solver.method import BRANCHES
 from solver.profile import Array
@@ -33,13 +35,14 @@ _MOST_FAILURES = 20
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Loss at ``upper`` minus loss at ``lower`` γ (J/m²), on the same profiles.
+    """Loss at ``upper`` minus loss at ``lower`` γ (J/m²), on the same profiles, else alike.
 
     The profiles are the same across γ, so the difference of each realisation is known much better
     than the difference of the two means.
     """
 
     hurst: float
+    others: tuple[tuple[str, float], ...]
     lower: float
     upper: float
     loss: Estimate
@@ -57,7 +60,7 @@ class Aggregate:
     attributes : dict
         Root attributes of the file.
     cells : tuple of Cell
-        By H, then γ, ascending.
+        By H, then γ, then further axes, ascending.
     paired : tuple of PairedDifference
     jumps : JumpStatistics
         In the order of the cells.
@@ -104,39 +107,58 @@ class Aggregate:
         """γ in J/m², ascending."""
         return tuple(sorted({cell.work_of_adhesion for cell in self.cells}))
 
+    @property
+    def further(self) -> tuple[Axis, ...]:
+        """The axes of the campaign beside H and γ."""
+        return self.campaign.axes[2:]
+
+    @cached_property
+    def shown(self) -> Aggregate:
+        """One cell for each (H, γ), all at the same place on the further axes: the last finished.
+
+        The last is where all of them are largest, as far as they are combined.
+        """
+        if not self.further:
+            return self
+        stacks: dict[tuple[float, float], list[int]] = {}
+        for k, cell in enumerate(self.cells):
+            stacks.setdefault((cell.hurst, cell.work_of_adhesion), []).append(k)
+        layers = list(zip(*stacks.values(), strict=False))
+        layer = next(m for m in reversed(layers) if any(self.cells[k].done for k in m))
+        return self._part(list(layer))
+
+    def _part(self, places: list[int]) -> Aggregate:
+        cells = tuple(self.cells[k] for k in places)
+        keys = {(cell.hurst, cell.others) for cell in cells}
+        return replace(
+            self,
+            cells=cells,
+            paired=tuple(pair for pair in self.paired if (pair.hurst, pair.others) in keys),
+            jumps=self.jumps.part(places),
+            fields=self.fields.part(places),
+        )
+
     def cell(self, hurst: float, work_of_adhesion: float) -> Cell | None:
-        """Return the cell of (H, γ), None if the campaign lacks it."""
+        """Return the first cell of (H, γ), None if the campaign lacks it; see :attr:`shown`."""
         for cell in self.cells:
             if (cell.hurst, cell.work_of_adhesion) == (hurst, work_of_adhesion):
                 return cell
         return None
 
 
-def aggregate(
-    path: Path | str,
-    beside: Sequence[Path | str] = (),
-    others: tuple[tuple[str, float], ...] = (),
-) -> Aggregate:
+def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
     """Average a results file over realisations; ``beside`` are files to set beside it.
-
-    A campaign on further axes than H and γ is averaged point by point of these: ``others`` is one
-    of :func:`ensemble.results.read.slices`.
 
     Raises
     ------
     InputError
         If a file cannot be read, is no results file, or holds no finished task.
     """
-    with Slice(path, others) if others else Results(path) as results:
-        if results.campaign.axes[2:]:
-            names = ", ".join(axis.name for axis in results.campaign.axes[2:])
-            raise InputError(
-                f"{path} has further axes ({names}): its averages are taken at one point of them"
-            )
+    with Results(path) as results:
         status = results.status()
         cells = read_cells(results, status)
         rows = [cell.rows for cell in cells]
-        for name, scales in _curve_scales(results.campaign, cells).items():
+        for name, scales in _curve_scales(cells).items():
             for branch in BRANCHES:
                 for curve, averages in average_curves(results, branch, name, rows, scales).items():
                     for cell, average in zip(cells, averages, strict=True):
@@ -155,10 +177,10 @@ def aggregate(
         )
 
 
-def _curve_scales(campaign: Campaign, cells: Sequence[Cell]) -> dict[str, dict[str, list[Array]]]:
+def _curve_scales(cells: Sequence[Cell]) -> dict[str, dict[str, list[Array]]]:
     """Datasets to average, and what to make of each: curve -> factor per row, cell by cell."""
     ones = [np.ones(cell.done) for cell in cells]
-    stress = [1 / stress_scale(campaign, cell.values["h_max"]) for cell in cells]
+    stress = [1 / stress_scale(cell.campaign, cell.values["h_max"]) for cell in cells]
     slope = [s / np.sqrt(cell.values["m2"]) for s, cell in zip(stress, cells, strict=True)]
     return {
         "mean_stress": {
@@ -173,9 +195,10 @@ def _curve_scales(campaign: Campaign, cells: Sequence[Cell]) -> dict[str, dict[s
 
 
 def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:
-    for lower, upper in pairwise(cells):
-        if lower.hurst != upper.hurst:
-            continue
+    rows: dict[tuple[Any, ...], list[Cell]] = {}
+    for cell in cells:
+        rows.setdefault((cell.hurst, cell.others), []).append(cell)
+    for lower, upper in chain.from_iterable(map(pairwise, rows.values())):
         _, low, high = np.intersect1d(
             lower.realisation, upper.realisation, assume_unique=True, return_indices=True
         )
@@ -190,5 +213,10 @@ def _paired(cells: Sequence[Cell]) -> Iterator[PairedDifference]:
             )
         )
         yield PairedDifference(
-            lower.hurst, lower.work_of_adhesion, upper.work_of_adhesion, loss, dimensionless
+            lower.hurst,
+            lower.others,
+            lower.work_of_adhesion,
+            upper.work_of_adhesion,
+            loss,
+            dimensionless,
         )

@@ -1,4 +1,4 @@
-"""Cells of a sweep, one (H, γ) each: the numbers of their finished tasks, and the means."""
+"""Cells of a campaign, one point on its axes each: numbers of their finished tasks, and means."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from ensemble.aggregate.curves import Curve
 from ensemble.aggregate.statistics import Estimate, estimates
 from ensemble.campaign.tables import Campaign
+from ensemble.campaign.tasks import Task
 from ensemble.errors import InputError
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, PENDING
+from ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
+from ensemble.task.fields import FieldPlan, field_plan
 from solver import problem
 from solver.material import HalfSpace
 from solver.profile import Array
@@ -39,12 +41,20 @@ _WITH_INTERVAL = (
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """All tasks of one (H, γ).
+    """All tasks of one (H, γ) and one value on every further axis of the campaign.
 
     Attributes
     ----------
     hurst, work_of_adhesion : float
         H; γ in J/m².
+    others : tuple of (str, number)
+        Names of the further axes, and the values there.
+    campaign : Campaign
+        With the values of the cell in its tables.
+    penetration : dict of array
+        Δ/h_max of the curves of each branch.
+    plan : FieldPlan
+        Of the states that have fields: their Δ/h_max, wave numbers, positions.
     done, failed, pending : int
         Tasks.
     rows : int array, shape (done,)
@@ -64,6 +74,10 @@ class Cell:
 
     hurst: float
     work_of_adhesion: float
+    others: tuple[tuple[str, float], ...]
+    campaign: Campaign
+    penetration: dict[str, Array]
+    plan: FieldPlan
     done: int
     failed: int
     pending: int
@@ -76,7 +90,7 @@ class Cell:
 
 
 def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
-    """Read every cell, by H, then γ, ascending; without curves.
+    """Read every cell, by H, then γ, then further axes, ascending; without curves.
 
     Raises
     ------
@@ -88,12 +102,18 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
             f"{results.path} holds no finished task yet ({np.sum(status == FAILED)} failed, of "
             f"{status.size}): there is nothing to report"
         )
+    campaign = results.campaign
     hurst, gamma = results.column("hurst"), results.column("work_of_adhesion")
     realisation, seed = results.column("realisation"), results.column("seed")
     columns = {name: results.column(name) for name in _PER_TASK}
     cells = []
-    for h, g in sorted(set(zip(hurst.tolist(), gamma.tolist(), strict=True))):
-        mine = np.flatnonzero((hurst == h) & (gamma == g))
+    names = [axis.name for axis in campaign.axes[2:]]
+    axes = [hurst, gamma, *(results.column(d.name) for d in axis_datasets(campaign))]
+    for h, g, *others in sorted(set(zip(*(axis.tolist() for axis in axes), strict=True))):
+        at = zip(axes, (h, g, *others), strict=True)
+        mine = np.flatnonzero(np.all([axis == value for axis, value in at], axis=0))
+        task = Task(h, g, 0, 0, tuple(zip(names, others, strict=True)))
+        here, unit = campaign.at(task), campaign.penetration_unit(task)
         rows = mine[status[mine] == DONE]
         rows = rows[np.argsort(realisation[rows], kind="stable")]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
@@ -101,7 +121,7 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         values["small_scale_share"] = np.divide(
             values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
         )
-        scale = stress_scale(results.campaign, values["h_max"]) * values["h_max"]
+        scale = stress_scale(here, values["h_max"]) * values["h_max"]
         for name in ("loss_error", "energy_at_stake"):
             values[f"{name}_dimensionless"] = values[name] / scale
         failed = int(np.sum(status[mine] == FAILED))
@@ -109,6 +129,13 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
             Cell(
                 hurst=h,
                 work_of_adhesion=g,
+                others=task.others,
+                campaign=here,
+                penetration={
+                    "loading": campaign.loading_penetration * unit,
+                    "unloading": campaign.unloading_penetration * unit,
+                },
+                plan=field_plan(campaign, task),
                 done=rows.size,
                 failed=failed,
                 pending=int(np.sum(status[mine] == PENDING)),

@@ -15,6 +15,7 @@ import numpy as np
 
 from ensemble.aggregate.cells import Cell, read_cells
 from ensemble.aggregate.statistics import Estimate, estimates
+from ensemble.campaign.axes import Axis
 from ensemble.campaign.compare import differing
 from ensemble.campaign.rules import shown
 from ensemble.campaign.tables import Campaign
@@ -40,6 +41,8 @@ class Companion:
     kind : str
         What the difference is about: "resolution" (the solver), "load steps", "penetration" (the
         largest one, load steps may go with it), "spectrum" (the profile), "other".
+    further : tuple of Axis
+        Axes beside H and γ of the campaign that this one is set beside.
     """
 
     path: Path
@@ -47,12 +50,21 @@ class Companion:
     cells: tuple[Cell, ...]
     differs: tuple[str, ...]
     kind: Kind
+    further: tuple[Axis, ...] = ()
 
-    def cell(self, hurst: float, work_of_adhesion: float) -> Cell | None:
-        """Return the cell of (H, γ), None if this campaign lacks it."""
-        for cell in self.cells:
-            if (cell.hurst, cell.work_of_adhesion) == (hurst, work_of_adhesion):
-                return cell
+    def like(self, cell: Cell) -> Cell | None:
+        """Return the cell of the same H, γ and place on the further axes of either campaign.
+
+        None if this campaign lacks it.
+        """
+        keys = {(a.table, a.name) for a in (*self.campaign.axes[2:], *self.further)}
+        for other in self.cells:
+            if (other.hurst, other.work_of_adhesion) == (cell.hurst, cell.work_of_adhesion) and all(
+                getattr(getattr(other.campaign, table), name)
+                == getattr(getattr(cell.campaign, table), name)
+                for table, name in keys
+            ):
+                return other
         return None
 
 
@@ -82,6 +94,7 @@ def read_companion(path: Path | str, campaign: Campaign) -> Companion:
         cells=tuple(cells),
         differs=tuple(f"{key} = {shown(values[key])}" for key in keys),
         kind=kind_of(keys),
+        further=campaign.axes[2:],
     )
 
 

@@ -7,16 +7,15 @@ its own number of realisations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.tables import Campaign
 from ensemble.results.blocks import row_blocks
 from ensemble.results.read import Results
 from ensemble.task.dataset import KEPT
-from ensemble.task.fields import field_plan
+from ensemble.task.fields import FieldPlan
 from solver.profile import Array
 
 
@@ -49,11 +48,10 @@ class FieldStatistics:
     Attributes
     ----------
     penetration : array, shape (penetrations,)
-        Δ/h_max.
-    position : array, shape (nodes,)
-        Of the shapes, in m.
-    wave_number, gap_bin, height_bin : array
-        Middles of the bins: rad/m, gap/h_max, height/h_rms.
+        Δ/h_max of the states, or Δ over the largest one if the campaign has several of these.
+    gap_bin, height_bin : array
+        Middles of the bins: gap/h_max, height/h_rms. Those of the wave numbers, and the positions
+        of the nodes of shapes, are in the plan of each cell.
     psd_height : array, shape (cells, wave numbers)
         In m³; NaN for a cell without finished tasks.
     height_density : array, shape (cells, height bins)
@@ -67,8 +65,6 @@ class FieldStatistics:
     """
 
     penetration: Array
-    position: Array
-    wave_number: Array
     gap_bin: Array
     height_bin: Array
     psd_height: Array
@@ -77,6 +73,19 @@ class FieldStatistics:
     gap_density: Array
     in_contact: NDArray[np.int64]
     shapes: tuple[DeformedShape | None, ...]
+
+    def part(self, cells: Sequence[int]) -> FieldStatistics:
+        """The same of some of the cells."""
+        chosen = list(cells)
+        return replace(
+            self,
+            psd_height=self.psd_height[chosen],
+            height_density=self.height_density[chosen],
+            psd_displacement=self.psd_displacement[chosen],
+            gap_density=self.gap_density[chosen],
+            in_contact=self.in_contact[chosen],
+            shapes=tuple(self.shapes[k] for k in chosen),
+        )
 
 
 def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> FieldStatistics:
@@ -87,8 +96,6 @@ def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> Fiel
     gap_density, _ = _average(results, "gap_density", rows)
     return FieldStatistics(
         penetration=results.column("field_penetration"),
-        position=results.column("field_position"),
-        wave_number=results.column("wave_number"),
         gap_bin=results.column("gap_bin"),
         height_bin=results.column("height_bin"),
         psd_height=psd_height,
@@ -100,15 +107,15 @@ def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> Fiel
     )
 
 
-def fitted_slope(campaign: Campaign, wave_number: Array, density: Array) -> tuple[float, float]:
+def fitted_slope(plan: FieldPlan, density: Array) -> tuple[float, float]:
     """Exponent of a power law through a spectrum at small wave numbers, and its standard error.
 
     Least squares in the logarithms over the lowest decade of the profile's spectrum (over its lower
     half if it is shorter than two decades). NaN if fewer than three bins lie there.
     """
-    profile, plan = campaign.profile, field_plan(campaign)
-    lowest = profile.n0 * 2 * np.pi / plan.period
-    span = min(10.0, float(np.sqrt(profile.ratio)))
+    wave_number = plan.wave_number
+    lowest = plan.lowest_harmonic * 2 * np.pi / plan.period
+    span = min(10.0, float(np.sqrt(plan.highest_harmonic / plan.lowest_harmonic)))
     chosen = plan.filled & (wave_number <= lowest * span) & (density > 0)
     if np.sum(chosen) < 3:
         return float("nan"), float("nan")

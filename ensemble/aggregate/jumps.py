@@ -7,7 +7,7 @@ catalogue holds kept those with the largest drops; the statistics say how much e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,18 @@ class JumpStatistics:
     energy: Array
     histogram: NDArray[np.int64]
     truncated: NDArray[np.int64]
+
+    def part(self, cells: Sequence[int]) -> JumpStatistics:
+        """The same of some of the cells."""
+        chosen = list(cells)
+        return replace(
+            self,
+            tasks=self.tasks[chosen],
+            number=self.number[chosen],
+            energy=self.energy[chosen],
+            histogram=self.histogram[chosen],
+            truncated=self.truncated[chosen],
+        )
 
 
 def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpStatistics:

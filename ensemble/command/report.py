@@ -30,13 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Write the report; returns 0."""
     from ensemble.report.write import write_report
-    from ensemble.results.read import slices
 
-    points = slices(args.file)
-    for others in points:
-        # A campaign on further axes has a report for each of their points, in a folder named so.
-        name = ",".join(f"{key}={value:g}" for key, value in others)
-        if others:
-            print(f"\n{name}")
-        write_report(args.file, args.to / name, beside=args.beside, others=others)
+    write_report(args.file, args.to, beside=args.beside)
     return 0

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.curves import QUANTILES
+from ensemble.report.tables.key import key
 from solver.method import BRANCHES
 
 # curve -> (unit, what it is)
@@ -23,28 +25,43 @@ QUANTITIES = {
 
 
 def curves_dataset(data: Aggregate) -> xr.Dataset:
-    """Collect every averaged curve: (hurst, work_of_adhesion, [quantile,] penetration)."""
-    hursts, gammas = data.hursts, data.works_of_adhesion
-    place = [(hursts.index(c.hurst), gammas.index(c.work_of_adhesion)) for c in data.cells]
-    key = ("hurst", "work_of_adhesion")
+    """Collect every averaged curve: (hurst, work_of_adhesion, …, [quantile,] penetration).
+
+    Further axes of the campaign follow γ; NaN where a cell is not there, as keys vary together.
+    """
+    axes: dict[str, list[Any]] = {
+        "hurst": list(data.hursts),
+        "work_of_adhesion": list(data.works_of_adhesion),
+        **{axis.name: sorted(set(axis.values)) for axis in data.further},
+    }
+    place = [
+        tuple(values.index(value) for values, value in zip(axes.values(), key(cell), strict=True))
+        for cell in data.cells
+    ]
+    key_dims, shape = tuple(axes), tuple(map(len, axes.values()))
+    depth = "max_penetration" if data.campaign.has_axis("max_penetration") else "h_max"
     out = xr.Dataset(
         coords={
-            "hurst": ("hurst", list(hursts), _about("1", "Hurst exponent")),
+            "hurst": ("hurst", axes["hurst"], _about("1", "Hurst exponent")),
             "work_of_adhesion": (
                 "work_of_adhesion",
-                list(gammas),
+                axes["work_of_adhesion"],
                 _about("J m-2", "work of adhesion"),
             ),
+            **{
+                axis.name: (axis.name, axes[axis.name], _about(axis.unit, axis.meaning))
+                for axis in data.further
+            },
             "quantile": ("quantile", list(QUANTILES), _about("1", "quantile over realisations")),
             "loading_penetration": (
                 "loading_penetration",
                 data.campaign.loading_penetration,
-                _about("1", "penetration/h_max on loading"),
+                _about("1", f"penetration/{depth} on loading"),
             ),
             "unloading_penetration": (
                 "unloading_penetration",
                 data.campaign.unloading_penetration,
-                _about("1", "penetration/h_max on unloading"),
+                _about("1", f"penetration/{depth} on unloading"),
             ),
         },
         attrs={
@@ -53,29 +70,33 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
             "Conventions": "CF-1.11",
         },
     )
-    count = np.zeros((len(hursts), len(gammas)), dtype=np.int32)
+    count = np.zeros(shape, dtype=np.int32)
     for where, cell in zip(place, data.cells, strict=True):
         count[where] = cell.done
-    out["realisations"] = (key, count, _about("1", "realisations that were averaged"))
+    out["realisations"] = (key_dims, count, _about("1", "realisations that were averaged"))
     for branch in BRANCHES:
         axis = f"{branch}_penetration"
         points = out.sizes[axis]
         for name, (unit, text) in QUANTITIES.items():
-            mean = np.full((len(hursts), len(gammas), points), np.nan)
+            mean = np.full((*shape, points), np.nan)
             std = mean.copy()
-            quantiles = np.full((len(hursts), len(gammas), len(QUANTILES), points), np.nan)
+            quantiles = np.full((*shape, len(QUANTILES), points), np.nan)
             for where, cell in zip(place, data.cells, strict=True):
                 curve = cell.curves[f"{branch}_{name}"]
                 mean[where], std[where], quantiles[where] = curve.mean, curve.std, curve.quantiles
             base = f"{branch}_{name}"
-            out[f"{base}_mean"] = ((*key, axis), mean, _about(unit, f"{text}, mean on {branch}"))
+            out[f"{base}_mean"] = (
+                (*key_dims, axis),
+                mean,
+                _about(unit, f"{text}, mean on {branch}"),
+            )
             out[f"{base}_std"] = (
-                (*key, axis),
+                (*key_dims, axis),
                 std,
                 _about(unit, f"{text}, standard deviation on {branch}"),
             )
             out[f"{base}_quantiles"] = (
-                (*key, "quantile", axis),
+                (*key_dims, "quantile", axis),
                 quantiles,
                 _about(unit, f"{text}, quantiles on {branch}"),
             )

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.cells import Cell
 from ensemble.aggregate.fields import fitted_slope
+from ensemble.campaign.axes import Axis
 from ensemble.report import paper
+from ensemble.report.axes import cell_name, lines_along, place, together
 from ensemble.task.doubt import bound, doubtful
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
@@ -27,8 +29,9 @@ def _outcome(data: Aggregate) -> str:
         (cell for cell in data.cells if cell.done),
         key=lambda cell: cell.estimates["loss_dimensionless"].mean,
     )
-    end = data.campaign.cycle.max_penetration
-    top = f"A loop to Δ/h_max = {end:g} and back until detached loses"
+    ends = sorted({cell.campaign.cycle.max_penetration for cell in cells})
+    end = f"{ends[0]:g}" if len(ends) == 1 else f"{ends[0]:g} … {ends[-1]:g}"
+    top = f"A loop to Δ/h_max = {end} and back until detached loses"
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}."
     low, high = cells[0], cells[-1]
@@ -42,7 +45,7 @@ def _outcome(data: Aggregate) -> str:
 
 def _loss(cell: Cell) -> str:
     dimensionless, loss = cell.estimates["loss_dimensionless"].mean, cell.estimates["loss"].mean
-    return f"W~ = {dimensionless:.3g} or {1e3 * loss:.3g} mJ/m² at {_name(cell)}"
+    return f"W~ = {dimensionless:.3g} or {1e3 * loss:.3g} mJ/m² at {cell_name(cell)}"
 
 
 def _statistical(data: Aggregate) -> str:
@@ -54,15 +57,16 @@ def _statistical(data: Aggregate) -> str:
     counts = sorted({cell.done for cell in data.cells if cell.done})
     many = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
     plural = "realisations" if counts[-1] > 1 else "realisation"
+    point = "cell" if data.further else "(H, γ)"
     if not halves:
-        return f"With {many} {plural} of each (H, γ), how well the mean is known cannot be said."
+        return f"With {many} {plural} of each {point}, how well the mean is known cannot be said."
     width = (
         f"{100 * min(halves):.2g} to {100 * max(halves):.2g} %"
         if len(halves) > 1
         else f"{100 * halves[0]:.2g} %"
     )
     return (
-        f"With {many} {plural} of each (H, γ), the 95 % interval of the mean loss is its mean "
+        f"With {many} {plural} of each {point}, the 95 % interval of the mean loss is its mean "
         f"± {width}."
     )
 
@@ -101,10 +105,10 @@ def missing(data: Aggregate) -> list[str]:
         )
     if data.failed:
         out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.")
-    empty = [_name(cell) for cell in data.cells if not cell.done]
+    empty = [cell_name(cell) for cell in data.cells if not cell.done]
     if empty:
         out.append(f"No task is finished yet for {_listed(empty)}.")
-    few = [_name(cell) for cell in data.cells if cell.done == 1]
+    few = [cell_name(cell) for cell in data.cells if cell.done == 1]
     if few:
         out.append(f"Only one realisation, hence no spread, for {_listed(few)}.")
     return out
@@ -112,27 +116,32 @@ def missing(data: Aggregate) -> list[str]:
 
 def agreement(data: Aggregate) -> list[str]:
     """Sentences on what the averages say; beside the paper's if the campaign is the paper's."""
-    of_paper = paper.is_the_papers(data.campaign)
+    shown = data.shown
+    of_paper = paper.are_its_cells(shown.cells)
     return [
-        *(_table_1(data) if of_paper else []),
-        *(_slopes(data) if of_paper else []),
+        *(_table_1(shown) if of_paper else []),
+        *(_slopes(shown) if of_paper else []),
         *_growth(data, of_paper),
-        *_order_in_slope(data, of_paper),
+        *(
+            sentence
+            for axis in data.further
+            if not together(data, axis) & {"hurst", "work_of_adhesion"}
+            for sentence in _along(data, axis)
+        ),
+        *_order_in_slope(shown, of_paper),
         *_unloading_exceeds_loading(data, of_paper),
-        *_spectrum(data),
+        *_spectrum(shown),
     ]
 
 
 def readings(data: Aggregate) -> list[str]:
     """Which campaign comes nearest to the paper's table, of this one and those beside it."""
     deviations = []
-    for name, campaign, cells in (
-        (data.path.name, data.campaign, data.cells),
-        *((other.path.name, other.campaign, other.cells) for other in data.companions),
+    for name, cells in (
+        (data.path.name, data.cells),
+        *((other.path.name, other.cells) for other in data.companions),
     ):
-        if not paper.is_the_papers(campaign):
-            continue
-        found = _deviations(cells)
+        found = _deviations([cell for cell in cells if paper.is_cell_of(cell)])
         if found:
             deviations.append((float(np.sqrt(np.mean(np.square(found)))), name, len(found)))
     if len(deviations) < 2:
@@ -162,7 +171,7 @@ def quality(data: Aggregate) -> list[str]:
             f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
             f"their estimated error exceeds {100 * most:.2g} % of the loss: {_listed(wrong)}."
         )
-    steep = [_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
+    steep = [cell_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
     if steep:
         out.append(
             f"WARNING: the root mean square slope exceeds {STEEP:g} for {_listed(steep)}: linear "
@@ -174,11 +183,15 @@ def quality(data: Aggregate) -> list[str]:
             f"{truncated} loops made more jumps than the catalogue holds: their smallest drops are "
             "missing from the distribution and from the table of kinds, not from the losses."
         )
-    end = float(data.campaign.unloading_penetration[-1])
-    cut = sum(int(np.sum(cell.values["pull_off_penetration"] < end)) for cell in data.cells)
+    ends = {float(cell.penetration["unloading"][-1]) for cell in data.cells}
+    cut = sum(
+        int(np.sum(cell.values["pull_off_penetration"] < cell.penetration["unloading"][-1]))
+        for cell in data.cells
+    )
     if cut:
+        below = " to ".join(f"{end:g}" for end in sorted({min(ends), max(ends)}))
         out.append(
-            f"{cut} loops detached below Δ/h_max = {end:g}, where the stored unloading curve ends: "
+            f"{cut} loops detached below Δ/h_max = {below}, where the stored unloading curve ends: "
             "their curves are cut, their losses are complete."
         )
     return out
@@ -194,7 +207,7 @@ def doubts(data: Aggregate) -> list[str]:
         wrong = doubtful(data.campaign.solver.accuracy, loss, audit, error)
         for k in np.flatnonzero(wrong):
             share = max(audit[k], error[k] / abs(loss[k]) if loss[k] else np.inf)
-            text = f"row {cell.rows[k]}, {_name(cell)} ({100 * share:.2g} %)"
+            text = f"row {cell.rows[k]}, {cell_name(cell)} ({100 * share:.2g} %)"
             found.append((-share, text))
     return [text for _, text in sorted(found)]
 
@@ -250,17 +263,48 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
     sure = [pair for pair in up if pair.loss.low > 0]
     if len(sure) == len(data.paired):
         return [
-            "The loss grows with γ at every H, profile by profile, beyond the 95 % interval"
+            f"The loss grows with γ at every {'H and further axis' if data.further else 'H'}, "
+            "profile by profile, beyond the 95 % interval"
             f"{'; the paper says the same' if of_paper else ''}."
         ]
     down = [
-        f"H = {pair.hurst:g}, γ = {pair.lower:g} to {pair.upper:g} J/m²"
+        ", ".join(
+            filter(
+                None,
+                (
+                    f"H = {pair.hurst:g}, γ = {pair.lower:g} to {pair.upper:g} J/m²",
+                    place(pair.others),
+                ),
+            )
+        )
         for pair in data.paired
         if pair not in sure
     ]
     return [
         f"The mean loss grows with γ in {len(up)} of {len(data.paired)} steps of γ; not beyond the "
         f"95 % interval in: {_listed(down)}."
+    ]
+
+
+def _along(data: Aggregate, axis: Axis) -> list[str]:
+    """Whether the mean loss is monotone along a further axis, in every line of cells."""
+    for_all = lines_along(data, axis)
+    steps = [np.diff([c.estimates["loss_dimensionless"].mean for c in line]) for line in for_all]
+    steps = [step for step in steps if step.size]
+    if not steps:
+        return []
+    up = sum(bool(np.all(step > 0)) for step in steps)
+    down = sum(bool(np.all(step < 0)) for step in steps)
+    mixed = len(steps) - up - down
+    parts = [
+        f"{verb} in {count}"
+        for verb, count in (("grows", up), ("falls", down), ("is not monotone", mixed))
+        if count
+    ]
+    low, high = axis.values[0], axis.values[-1]
+    return [
+        f"Along {axis.name} from {min(low, high):g} to {max(low, high):g} the mean loss "
+        f"{', '.join(parts)} of {len(steps)} series of cells that are else alike."
     ]
 
 
@@ -289,10 +333,10 @@ def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:
     where = "At equal load, on unloading up to the largest tension, the contact is"
     below = [cell for cell, ratio in ratios if ratio < 1]
     if below:
-        names = _listed([_name(cell) for cell in below])
+        names = _listed([cell_name(cell) for cell in below])
         return [f"{where} not everywhere larger than on loading: {names}."]
     least = min(ratio for _, ratio in ratios)
-    apart = [_name(cell) for cell in data.cells if cell.done and area_ratio(cell) is None]
+    apart = [cell_name(cell) for cell in data.cells if cell.done and area_ratio(cell) is None]
     rest = f" (no load in common away from the turning point: {_listed(apart)})" if apart else ""
     says = "; the paper says the same" if of_paper else ""
     return [
@@ -310,14 +354,18 @@ def _spectrum(data: Aggregate) -> list[str]:
         if cell is None or not fields.penetration.size:
             continue
         density = fields.psd_displacement[data.cells.index(cell), 0, -1]
-        slope, error = fitted_slope(data.campaign, fields.wave_number, density)
+        slope, error = fitted_slope(cell.plan, density)
         if not np.isnan(slope):
-            parts.append(f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f} at {_name(cell)}")
+            parts.append(
+                f"{slope:.2f} ± {error:.2f} against {-(2 + hurst):.1f} at {cell_name(cell)}"
+            )
     if not parts:
         return []
+    depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
+    depth = f"Δ/h_max = {' or '.join(sorted(depths))}"
     return [
         "Slope of the loading spectrum of the deformed surface at small wave numbers and "
-        f"Δ/h_max = {fields.penetration[-1]:.2f}, fitted, against Persson's -(2+H): "
+        f"{depth}, fitted, against Persson's -(2+H): "
         f"{_listed(parts)}."
     ]
 
@@ -373,7 +421,3 @@ def _all(data: Aggregate, name: str) -> NDArray[np.float64]:
 
 def _rms_slope(cell: Cell) -> float:
     return float(np.sqrt(cell.estimates["m2"].mean))
-
-
-def _name(cell: Cell) -> str:
-    return f"H = {cell.hurst:g}, γ = {cell.work_of_adhesion:g} J/m²"

@@ -27,7 +27,6 @@ from ensemble.results.schema import DATASETS, DONE, scales
 from ensemble.task.dataset import KEPT, Dataset
 from solver.jumps import BRANCHES, JUMP_KINDS
 
-_CELL = ("hurst", "work_of_adhesion")
 # Dimensions of the file under the names that they have here.
 _RENAMED = {
     "field_branch": "branch",
@@ -128,8 +127,8 @@ class CampaignResults:
 
     @cached_property
     def losses(self) -> pd.DataFrame:
-        """``losses.csv``: mean losses with 95 % intervals and errors, one row for each (H, γ)."""
-        return _frame(losses.losses(self.averages), _CELL)
+        """``losses.csv``: mean losses with 95 % intervals and errors, one row for each cell."""
+        return _frame(losses.losses(self.averages), self._cell)
 
     @cached_property
     def growth(self) -> pd.DataFrame:
@@ -139,7 +138,7 @@ class CampaignResults:
     @cached_property
     def mechanisms(self) -> pd.DataFrame:
         """Jumps by kind, their number and share of the drops (``jumps.csv``)."""
-        return _frame(mechanisms.jumps(self.averages), (*_CELL, "kind"))
+        return _frame(mechanisms.jumps(self.averages), (*self._cell, "kind"))
 
     @cached_property
     def jumps(self) -> pd.DataFrame:
@@ -157,6 +156,11 @@ class CampaignResults:
         return pd.DataFrame(out)
 
     # ------------------------------------------------------------------ inside
+
+    @property
+    def _cell(self) -> tuple[str, ...]:
+        """The axes that tell the cells apart."""
+        return self.axes[:-1]
 
     def _arranged(self, datasets: Iterable[Dataset]) -> xr.Dataset:
         """Datasets with the task dimension spread over the axes of the campaign."""
@@ -203,7 +207,7 @@ def _axes(campaign: Campaign) -> dict[str, NDArray[Any]]:
 
 
 def _frame(table: Table, index: Sequence[str]) -> pd.DataFrame:
-    names = [column.name.partition(" [work")[0] for column in table.columns]
-    names = ["work_of_adhesion" if name == "work_of_adhesion [J/m^2]" else name for name in names]
+    plain = {column.name: column.name.partition(" [")[0] for column in table.columns}
+    names = [plain[name] if plain[name] in index else name for name in plain]
     frame = pd.DataFrame([list(row) for row in table.rows], columns=names)
     return frame.set_index(list(index)) if index else frame

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from ensemble.aggregate import statistics
 from ensemble.aggregate.average import Aggregate
 from ensemble.report import findings, paper
+from ensemble.report.axes import shown_cells
 from ensemble.report.figures.catalogue import Illustration
 from ensemble.report.figures.style import left_out
 from ensemble.report.tables import losses as loss_tables
@@ -26,7 +27,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         "companions".
     """
     figures = dict(sections)
-    of_paper = paper.is_the_papers(data.campaign)
+    of_paper = paper.are_its_cells(data.shown.cells)
 
     def show(section: str) -> list[str]:
         return [_shown(item, of_paper) for item in figures.get(section, ())]
@@ -38,6 +39,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         *_bullets(findings.missing(data)),
         _summary(data),
         left_out(data),
+        shown_cells(data),
         "## Losses",
         losses.markdown(),
         _footnote(data),
@@ -102,11 +104,17 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
 
 def _summary(data: Aggregate) -> str:
     sweep, cycle = data.campaign.sweep, data.campaign.cycle
+    tops = {cell.campaign.cycle.max_penetration for cell in data.cells}
+    further = "".join(
+        f"{axis.name} = {_list(axis.values)}; "
+        for axis in data.further
+        if axis.name != "max_penetration"
+    )
     return (
         f"{data.done} loops of {data.done + data.failed + data.pending} tasks: "
-        f"H = {_list(sweep.hurst)}; γ = {_list(sweep.work_of_adhesion)} J/m²; "
+        f"H = {_list(sweep.hurst)}; γ = {_list(sweep.work_of_adhesion)} J/m²; {further}"
         f"{sweep.realisations} realisations. Each loop was loaded to Δ/h_max = "
-        f"{cycle.max_penetration:g} in {cycle.load_steps} steps and unloaded until detached; "
+        f"{_list(tops)} in {cycle.load_steps} steps and unloaded until detached; "
         f"method `{data.campaign.solver.method}`. Numbers: `losses.csv`; curves: `curves.nc`."
     )
 
@@ -145,7 +153,7 @@ def _footnote(data: Aggregate) -> str:
         parts.append(
             "races: jumps that another rule of descent would have ended elsewhere, all loops"
         )
-    if paper.is_the_papers(data.campaign):
+    if paper.are_its_cells(data.shown.cells):
         parts.append(f"paper: {paper.REFERENCE}, Table 1, – where it gives none")
     return "; ".join(parts) + "."
 
@@ -168,5 +176,5 @@ def _shown(item: Illustration, of_paper: bool) -> str:
     return f"![{title}]({item.name}.png)\n\n**{title}.** {caption} ([PDF]({item.name}.pdf))"
 
 
-def _list(values: Sequence[float]) -> str:
+def _list(values: Iterable[float]) -> str:
     return ", ".join(f"{value:g}" for value in sorted(values))

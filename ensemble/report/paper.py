@@ -10,7 +10,9 @@ the paper quotes; the turning point from 0.80 (the separations of its Fig. 3 in 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from ensemble.aggregate.cells import Cell
 from ensemble.campaign.tables import Campaign
 
 REFERENCE = "G. Carbone, E. Pierro, G. Recchia, arXiv 1511.08891 (2015)"
@@ -57,8 +59,22 @@ def m2(hurst: float) -> float | None:
     return next((value for h, value in M2.items() if abs(h - hurst) < 1e-9), None)
 
 
+def is_cell_of(cell: Cell) -> bool:
+    """Whether profile, material and path of a cell are a reading of the paper's."""
+    return _is_reading(cell.campaign, [cell.hurst] if cell.others else cell.campaign.sweep.hurst)
+
+
+def are_its_cells(cells: Sequence[Cell]) -> bool:
+    """Whether all of some cells are a reading of the paper's."""
+    return all(is_cell_of(cell) for cell in cells)
+
+
 def is_the_papers(campaign: Campaign) -> bool:
     """Whether profile, material and path of a campaign are a reading of the paper's."""
+    return not campaign.lists and _is_reading(campaign, campaign.sweep.hurst)
+
+
+def _is_reading(campaign: Campaign, hursts: Sequence[float]) -> bool:
     profile, material, cycle = campaign.profile, campaign.material, campaign.cycle
     low, high = _TURNING_POINTS
     return (
@@ -67,15 +83,14 @@ def is_the_papers(campaign: Campaign) -> bool:
         and profile.amplitudes == "deterministic"
         and profile.rolloff == 1
         and cycle.stiffness is None
-        and not campaign.lists
-        and _is_spectrum(campaign)
+        and _is_spectrum(campaign, hursts)
         and _is(material.young, _YOUNG)
         and _is(material.poisson, _POISSON)
         and low - _NEAR <= cycle.max_penetration <= high + _NEAR
     )
 
 
-def _is_spectrum(campaign: Campaign) -> bool:
+def _is_spectrum(campaign: Campaign, hursts: Sequence[float]) -> bool:
     profile = campaign.profile
     if profile.ratio not in _RATIOS:
         return False
@@ -83,7 +98,7 @@ def _is_spectrum(campaign: Campaign) -> bool:
         return _is(profile.h_rms, _H_RMS)
     if profile.c0 is not None:
         return _is(profile.c0, _C0) and profile.ratio == _RATIOS[0]
-    quoted = [m2(hurst) for hurst in campaign.sweep.hurst]
+    quoted = [m2(hurst) for hurst in hursts]
     return profile.m2 is not None and all(q is not None and _is(profile.m2, q) for q in quoted)
 
 

@@ -23,14 +23,17 @@ class Plots:
         self._averages = averages
 
     def _draw(self, name: str) -> list[Axes]:
+        from ensemble.report.axes import common, place
         from ensemble.report.figures import fields, loops, losses
-        from ensemble.report.figures.style import style
+        from ensemble.report.figures.style import say_below, style
 
         draw: Callable[[Aggregate], Figure] = next(
             getattr(room, name) for room in (loops, losses, fields) if hasattr(room, name)
         )
         with style():
-            figure = draw(self._averages())
+            shown = self._averages().shown
+            figure = draw(shown)
+            say_below(figure, place(common(shown)))
             figure.canvas.draw()  # the layout is found with the style's own sizes
         return list(figure.axes)
 

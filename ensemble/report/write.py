@@ -16,7 +16,6 @@ def write_report(
     directory: Path | str,
     stream: IO[str] | None = None,
     beside: Sequence[Path | str] = (),
-    others: tuple[tuple[str, float], ...] = (),
 ) -> Aggregate:
     """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``; print.
 
@@ -30,15 +29,13 @@ def write_report(
         Where the tables go; standard output by default.
     beside : sequence of path
         Results files of other campaigns to compare with.
-    others : tuple, optional
-        The point of a campaign on further axes to report on (:func:`ensemble.results.read.slices`).
 
     Raises
     ------
     InputError
         If there is nothing to report, or the directory cannot be written.
     """
-    data = aggregate(path, beside, others)
+    data = aggregate(path, beside)
     directory = Path(directory)
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -51,6 +48,7 @@ def write_report(
 
 def _write_files(data: Aggregate, directory: Path) -> None:
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
+    from ensemble.report.axes import common, place
     from ensemble.report.curves import write_curves
     from ensemble.report.figures.catalogue import (
         HEIGHTS,
@@ -61,7 +59,7 @@ def _write_files(data: Aggregate, directory: Path) -> None:
         SHAPES,
     )
     from ensemble.report.figures.losses import of_penetration
-    from ensemble.report.figures.style import save, style
+    from ensemble.report.figures.style import save, say_below, style
     from ensemble.report.html import html_page
     from ensemble.report.page import write_page
     from ensemble.report.tables import losses, mechanisms
@@ -84,7 +82,8 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     for _, illustrations in sections:
         for item in illustrations:
             with style():
-                figure = item.draw(data)
+                figure = item.draw(data.shown)
+                say_below(figure, place(common(data.shown)))
             save(figure, directory / item.name)
     page = write_page(data, sections)
     (directory / "report.md").write_text(page, encoding="utf-8")

@@ -22,7 +22,7 @@ from ensemble.results.schema import (
     scales,
     shape_of,
 )
-from ensemble.task.dataset import KEPT, sizes_of
+from ensemble.task.dataset import sizes_of
 
 
 class Results:
@@ -134,66 +134,6 @@ class Results:
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""
         return [text.decode("utf-8", "replace") for text in self.column("error", rows).tolist()]
-
-
-class Slice(Results):
-    """The rows of a results file that share their values on the axes besides H and γ.
-
-    Reads like the results file of a campaign with these values alone.
-
-    Parameters
-    ----------
-    path : path
-    others : tuple
-        ``Task.others`` of the rows.
-    """
-
-    def __init__(self, path: Path | str, others: tuple[tuple[str, float], ...]) -> None:
-        with Results(path) as results:
-            whole, tasks, kept = results.campaign, results.tasks(), results.column(KEPT)
-        super().__init__(path)
-        self._rows = np.array([row for row, t in enumerate(tasks) if t.others == others], np.intp)
-        self._kept = np.flatnonzero(np.isin(kept, self._rows))
-        task = tasks[self._rows[0]]
-        period = whole.at(task).profile.period if whole.has_axis("period") else 2 * np.pi
-        top = whole.penetration_unit(task)
-        names = ("loading_penetration", "unloading_penetration", "field_penetration")
-        self._units = {
-            **dict.fromkeys(names, top),
-            "wave_number": 2 * np.pi / period,
-            "field_position": period / (2 * np.pi),
-        }
-        self._first_dim = {d.name: d.dims[0] for d in datasets(whole)}
-        self.campaign = whole.at(task)
-
-    def __len__(self) -> int:
-        """Number of tasks."""
-        return self._rows.size
-
-    def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
-        """Return a dataset, or some of its rows: of the slice alone."""
-        chosen = slice(None) if rows is None else rows
-        if name == KEPT:
-            values: NDArray[Any] = np.searchsorted(self._rows, super().column(KEPT)[self._kept])
-            return values[chosen]
-        if name in self._first_dim:
-            own = self._kept if self._first_dim[name] == KEPT else self._rows
-            return super().column(name, own[chosen])
-        unit = self._units.get(name, 1.0)
-        values = super().column(name, rows)
-        return values if unit == 1.0 else values * unit
-
-    def tasks(self) -> list[Task]:
-        """Return every task of the slice."""
-        names = [d.name for d in TASK_DATASETS]
-        columns = [self.column(name).tolist() for name in names]
-        return [Task(*values) for values in zip(*columns, strict=True)]
-
-
-def slices(path: Path | str) -> list[tuple[tuple[str, float], ...]]:
-    """Return the points of a results file on its axes besides H and γ; () without any."""
-    with Results(path) as results:
-        return list(dict.fromkeys(task.others for task in results.tasks()))
 
 
 def stretches(rows: NDArray[np.intp]) -> Iterator[tuple[int, tuple[int, int]]]:

@@ -153,7 +153,7 @@ def test_spectra_leave_out_realisations_without_contact(tmp_path):
     assert data.fields.in_contact[0].tolist() == [[5, 5, 5], [4, 5, 5]]
     expected = psd[[0, 1, 3, 4], 1, 0].astype(np.float32).mean(axis=0)
     np.testing.assert_allclose(data.fields.psd_displacement[0, 1, 0], expected, rtol=1e-6)
-    slope, _ = fitted_slope(plan, data.fields.wave_number, data.fields.psd_displacement[0, 0, 2])
+    slope, _ = fitted_slope(field_plan(plan), data.fields.psd_displacement[0, 0, 2])
     assert slope == pytest.approx(-2.8, abs=1e-3)
     assert data.fields.shapes[0].row == 0
 
@@ -167,7 +167,7 @@ def test_a_fitted_slope_knows_its_error():
     pulls = []
     for _ in range(300):
         density = q**-2.8 * np.exp(0.3 * rng.standard_normal(q.size))
-        slope, error = fitted_slope(plan, q, density)
+        slope, error = fitted_slope(field_plan(plan), density)
         pulls.append((slope + 2.8) / error)
     assert abs(np.mean(pulls)) < 0.2
     assert 0.8 < np.std(pulls) < 1.5

@@ -606,7 +606,9 @@ def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
     names = re.findall(r"(\w+\.h5) [\d.]+ % \(5 values\)", sentence)
     assert sorted(names) == ["r.h5", "wider.h5"]  # other.h5 is no reading of the paper's
     found = [
-        data.companions[0].cell(h, g).estimates["loss_dimensionless"].mean / paper.table_1(h, g) - 1
+        data.companions[0].like(data.cell(h, g)).estimates["loss_dimensionless"].mean
+        / paper.table_1(h, g)
+        - 1
         for h, g in paper.TABLE_1
         if h < 0.9
     ]

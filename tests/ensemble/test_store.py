@@ -20,7 +20,7 @@ from ensemble.campaign.file import parse_campaign
 from ensemble.errors import InputError
 from ensemble.results import schema
 from ensemble.results.layout import create
-from ensemble.results.read import Results, Slice, slices
+from ensemble.results.read import Results
 from ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
 from ensemble.results.write import Writer, _RowWriter
 from ensemble.run.lock import RunLock, holder
@@ -265,40 +265,6 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
                     assert results.column("wall_time")[1] == 2.5
     assert len(seen) > 20
     assert states == {(0, 0), (1, 0), (1, 2), (0, 2)} | {(1, 1)}
-
-
-def test_a_slice_reads_as_the_file_of_its_values_alone(tmp_path):
-    """Of a campaign on further axes: the rows at one point of them, and its axes in their units."""
-    axes = {"ratio": "[4, 2]", "max_penetration": "[0.3, 0.6]", "period": "[1e-3, 2e-3]"}
-    several, path = parse_campaign(campaign_text(**axes)), tmp_path / "s.h5"
-    create(path, several)
-    with Writer(path) as writer:
-        for row, task in enumerate(several.tasks()):
-            writer.write_result(row, fake_result(several, task))
-    points = slices(path)
-    assert len(points) == 8
-    others = (("period", 2e-3), ("ratio", 4), ("max_penetration", 0.6))
-    assert others in points
-    chosen = [task for task in several.tasks() if task.others == others]
-    alone = parse_campaign(campaign_text(period="2e-3"))
-    known = {s.name: s.values for s in scales(alone)}
-    with Slice(path, others) as results:
-        assert len(results) == 8
-        assert [(t.hurst, t.seed) for t in results.tasks()] == [(t.hurst, t.seed) for t in chosen]
-        assert results.status().all()
-        losses = [fake_result(several, task)["loss"] for task in chosen]
-        np.testing.assert_array_equal(results.column("loss"), losses)
-        np.testing.assert_array_equal(results.column("loss", slice(2, 4)), losses[2:4])
-        np.testing.assert_array_equal(results.column(KEPT), known[KEPT])
-        np.testing.assert_allclose(results.loading_penetration, known["loading_penetration"])
-        same = known["unloading_penetration"].size
-        stored = results.unloading_penetration
-        np.testing.assert_allclose(stored[:same], known["unloading_penetration"])
-        np.testing.assert_allclose(results.campaign.unloading_penetration, stored)
-        np.testing.assert_allclose(results.column("wave_number"), known["wave_number"])
-        np.testing.assert_allclose(results.column("field_position"), known["field_position"])
-        first = fake_result(several, chosen[0])["field_stress"]
-        np.testing.assert_array_equal(results.column("field_stress", np.array([0]))[0], first)
 
 
 # ---------------------------------------------------------------- files that are refused

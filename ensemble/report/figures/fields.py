@@ -30,8 +30,8 @@ from ensemble.report.figures.style import (
     spread_out,
 )
 from ensemble.report.findings import typical_cell
-from ensemble.task.fields import field_plan
 from solver.method import BRANCHES
+from solver.profile import Array
 
 _LEAST_DENSITY = 1e-6
 # Colour of a branch where both are drawn over the rigid profile.
@@ -55,17 +55,18 @@ def shapes(data: Aggregate) -> Figure:
     )
     if shape is None:
         return figure
-    everywhere = np.arange(fields.position.size)
-    window = _window(data, fields, shape)
+    everywhere = np.arange(cell.plan.position.size)
+    window = _window(cell, shape)
     for (whole, detail), k in zip(panels(figure, len(chosen), 2), chosen, strict=True):
-        separation = shape.h_max * (1 - fields.penetration[k])
+        penetration = cell.plan.penetration[k]
+        separation = shape.h_max * (1 - penetration)
         for axes, part in ((whole, everywhere), (detail, window)):
-            _draw_shape(axes, fields, shape, k, separation, part)
+            _draw_shape(axes, cell.plan.position, shape, k, separation, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
         label_panel(
             whole,
-            rf"{_cell_label(cell)}, $\Delta/h_\mathrm{{max}}$ = {fields.penetration[k]:.2f}, "
+            rf"{_cell_label(cell)}, $\Delta/h_\mathrm{{max}}$ = {penetration:.2f}, "
             f"$s$ = {1e6 * separation:.2f} µm",
         )
         label_panel(detail, "detail")
@@ -117,7 +118,7 @@ def gap_density(data: Aggregate) -> Figure:
                         np.where(values > 0, values, np.nan),
                         color=look(place).colour,
                         linestyle=LINE_OF_BRANCH[branch],
-                        label=f"{fields.penetration[k]:.2f}, {branch}",
+                        label=f"{cell.plan.penetration[k]:.2f}, {branch}",
                     )
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -126,7 +127,7 @@ def gap_density(data: Aggregate) -> Figure:
         label_panel(axes, _cell_label(cell))
     figure.axes[len(hursts) - 1].set_xlabel(r"gap $t/h_\mathrm{max}$")
     plain_decades(figure.axes)
-    legend_above(figure, _penetration_handles(fields, chosen, with_branches=True), 3)
+    legend_above(figure, _penetration_handles(data, chosen, with_branches=True), 3)
     return figure
 
 
@@ -170,37 +171,36 @@ def _spectra(data: Aggregate, b: int) -> Figure:
     hursts = spread_out(data.hursts, MOST_PANELS)
     figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 52 * len(hursts)) * MM, sharex=True)
     fields = data.fields
-    present = field_plan(data.campaign).filled
     chosen = shown_penetrations(fields, 3)
     for (axes,), hurst in zip(panels(figure, len(hursts), 1), hursts, strict=True):
         cell = typical_cell(data, hurst)
         if cell is None:
             continue
         index = data.cells.index(cell)
-        rigid = fields.psd_height[index]
+        rigid, present = fields.psd_height[index], cell.plan.filled
         axes.loglog(
-            fields.wave_number[present], rigid[present], color="0.55", linewidth=2, label="rigid"
+            cell.plan.wave_number[present], rigid[present], color="0.55", linewidth=2, label="rigid"
         )
         for place, k in enumerate(chosen):
             values = fields.psd_displacement[index, b, k]
             if np.any(values > 0):
                 axes.loglog(
-                    fields.wave_number,
+                    cell.plan.wave_number,
                     np.where(values > 0, values, np.nan),
                     color=look(place).colour,
                     linestyle=LINES[place],
                     marker=look(place).marker,
                     markersize=2,
                     markevery=4,
-                    label=f"{fields.penetration[k]:.2f}",
+                    label=f"{cell.plan.penetration[k]:.2f}",
                 )
-        _reference_slopes(axes, hurst, rigid[present], fields.wave_number[present])
+        _reference_slopes(axes, hurst, rigid[present], cell.plan.wave_number[present])
         axes.set_ylabel(r"spectral density $C(q)$ (m³)")
         label_panel(axes, _cell_label(cell))
     plain_decades(figure.axes[: len(hursts)])
     figure.axes[len(hursts) - 1].set_xlabel("wave number $q$ (rad/m)")
     handles = [Line2D([], [], color="0.55", linewidth=2, label="rigid profile")]
-    handles += _penetration_handles(fields, chosen, with_branches=False)
+    handles += _penetration_handles(data, chosen, with_branches=False)
     handles += [
         Line2D([], [], color="0.3", linewidth=0.7, linestyle=":", label="$q^{-(2H+1)}$"),
         Line2D([], [], color="0.3", linewidth=0.7, linestyle="-.", label="$q^{-(2+H)}$"),
@@ -225,15 +225,15 @@ def _reference_slopes(axes: Axes, hurst: float, rigid: np.ndarray, q: np.ndarray
 
 def _draw_shape(
     axes: Axes,
-    fields: FieldStatistics,
+    position: Array,
     shape: DeformedShape,
     k: int,
     separation: float,
     part: NDArray[np.intp],
 ) -> None:
     """Draw the nodes ``part``, counted on beyond the period where they exceed it."""
-    nodes = fields.position.size
-    x = 1e3 * part * (fields.position[1] - fields.position[0])
+    nodes = position.size
+    x = 1e3 * part * (position[1] - position[0])
     part = part % nodes
     rigid = 1e6 * (shape.height[part] - separation)
     axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
@@ -252,17 +252,21 @@ def _draw_shape(
     axes.set_xlim(x[0], x[-1])
 
 
-def _window(data: Aggregate, fields: FieldStatistics, shape: DeformedShape) -> NDArray[np.intp]:
+def _window(cell: Cell, shape: DeformedShape) -> NDArray[np.intp]:
     """Nodes of one and a half of the longest waves around the highest point, across the ends."""
-    nodes = fields.position.size
-    half = min(max(4, round(0.75 * nodes / data.campaign.profile.n0)), nodes // 2)
+    nodes = cell.plan.position.size
+    half = min(max(4, round(0.75 * nodes / cell.campaign.profile.n0)), nodes // 2)
     top = int(np.argmax(shape.height))
     return np.arange(top - half, top + half, dtype=np.intp)
 
 
 def _penetration_handles(
-    fields: FieldStatistics, chosen: list[int], *, with_branches: bool
+    data: Aggregate, chosen: list[int], *, with_branches: bool
 ) -> list[Line2D]:
+    # Where the largest penetration varies with H or γ, only its share is the same for all.
+    tops = {cell.campaign.cycle.max_penetration for cell in data.cells}
+    unit = "h" if len(tops) == 1 else r"\Delta"
+    penetration = data.cells[0].plan.penetration if len(tops) == 1 else data.fields.penetration
     handles = [
         Line2D(
             [],
@@ -270,7 +274,7 @@ def _penetration_handles(
             color=look(place).colour,
             linestyle="-" if with_branches else LINES[place],
             marker="" if with_branches else look(place).marker,
-            label=rf"$\Delta/h_\mathrm{{max}}$ = {fields.penetration[k]:.2f}",
+            label=rf"$\Delta/{unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
         )
         for place, k in enumerate(chosen)
     ]

@@ -112,7 +112,7 @@ def _markers(data: Aggregate, cell: Cell, branch: str, k: int) -> tuple[int, int
 
 def _with_spread(axes: Axes, data: Aggregate, cell: Cell, branch: str, name: str, k: int) -> None:
     part = _in_contact(data, cell, branch)
-    axis = getattr(data.campaign, f"{branch}_penetration")[part]
+    axis = cell.penetration[branch][part]
     curve = cell.curves[f"{branch}_{name}"]
     mean, std = curve.mean[part], curve.std[part]
     axes.plot(

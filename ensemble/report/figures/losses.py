@@ -42,7 +42,7 @@ def loss_against_adhesion(data: Aggregate) -> Figure:
     figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
     axes = figure.axes[0]
     hursts = spread_out(data.hursts, MOST_CURVES)
-    of_paper = paper.is_the_papers(data.campaign)
+    of_paper = paper.are_its_cells(data.cells)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
         _errorbar(
@@ -152,9 +152,12 @@ def loss_against_penetration(data: Aggregate) -> Figure:
 
 def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, Estimate]:
     """W~ of a cell by largest penetration, ascending, over the realisations of all campaigns."""
-    cells = {data.campaign.cycle.max_penetration: data.cell(hurst, gamma)}
+    here = data.cell(hurst, gamma)
+    if here is None:
+        return {}
+    cells: dict[float, Cell | None] = {here.campaign.cycle.max_penetration: here}
     for companion in of_penetration(data):
-        cells[companion.campaign.cycle.max_penetration] = companion.cell(hurst, gamma)
+        cells[companion.campaign.cycle.max_penetration] = companion.like(here)
     there = {top: cell for top, cell in sorted(cells.items()) if cell is not None and cell.done}
     if not there:
         return {}
@@ -310,7 +313,7 @@ def pull_off(data: Aggregate) -> Figure:
 def _second_scale(axes: Axes, data: Aggregate) -> None:
     """Beside kPa, σ~ at the mean h_max of all cells."""
     h_max = np.concatenate([cell.values["h_max"] for cell in data.cells])
-    scale = float(stress_scale(data.campaign, h_max.mean(keepdims=True))[0])
+    scale = float(stress_scale(data.cells[0].campaign, h_max.mean(keepdims=True))[0])
 
     def dimensionless(kilopascal: Any) -> Any:
         return 1e3 * kilopascal / scale

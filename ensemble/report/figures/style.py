@@ -129,6 +129,12 @@ def legend_above(figure: Figure, handles: Sequence[Any], columns: int) -> None:
     figure.legend(handles=handles, loc="outside upper center", ncols=columns)
 
 
+def say_below(figure: Figure, text: str) -> None:
+    """Write below the panels what all of them have in common; nothing if empty."""
+    if text:
+        figure.supxlabel(text, fontsize=6, x=0.99, ha="right")
+
+
 def label_panel(axes: Axes, text: str) -> None:
     """Write what a panel shows into its upper left corner."""
     axes.set_title(text, loc="left", pad=3)

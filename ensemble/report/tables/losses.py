@@ -9,8 +9,8 @@ from ensemble.aggregate.cells import Cell, stress_scale
 from ensemble.aggregate.companions import difference
 from ensemble.aggregate.statistics import Estimate, interval_method
 from ensemble.report import paper
+from ensemble.report.tables.key import axis_columns, key, key_columns
 from ensemble.report.tables.table import (
-    KEY,
     Table,
     TableColumn,
     Value,
@@ -25,9 +25,9 @@ from solver.profile import Array
 
 
 def losses(data: Aggregate) -> Table:
-    """One row for each (H, γ), everything that ``losses.csv`` holds."""
+    """One row for each cell, everything that ``losses.csv`` holds."""
     columns = (
-        *KEY,
+        *key_columns(data),
         TableColumn("n", "n"),
         TableColumn("failed", "failed", only_if_any=True),
         TableColumn("pending", "pending", only_if_any=True),
@@ -81,12 +81,11 @@ def losses(data: Aggregate) -> Table:
 def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
     found = cell.estimates
     audit = cell.values["audit_residual"]
-    stress = cell.values["pull_off_stress"] / stress_scale(data.campaign, cell.values["h_max"])
+    stress = cell.values["pull_off_stress"] / stress_scale(cell.campaign, cell.values["h_max"])
     share = found["small_scale_share"]
     pull_off = found["pull_off_penetration"]
     return [
-        cell.hurst,
-        cell.work_of_adhesion,
+        *key(cell),
         cell.done,
         cell.failed,
         cell.pending,
@@ -94,7 +93,7 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         found["loss_error_dimensionless"].mean,
         _error_of_load_steps(data, cell),
         _error_of_resolution(data, cell),
-        papers_loss(data, cell),
+        papers_loss(cell),
         *_five(found["loss"]),
         interval_method(cell.done),
         found["loss_from_drops"].mean,
@@ -118,14 +117,14 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         pull_off.mean,
         pull_off.sem,
         *(found[name].mean for name in ("h_max", "h_rms", "m0", "m2", "m4")),
-        paper.m2(cell.hurst) if paper.is_the_papers(data.campaign) else None,
+        paper.m2(cell.hurst) if paper.is_cell_of(cell) else None,
         found["wall_time"].mean,
     ]
 
 
-def papers_loss(data: Aggregate, cell: Cell) -> float | None:
-    """Value of the paper's Table 1, None where the campaign or the cell is not the paper's."""
-    if not paper.is_the_papers(data.campaign):
+def papers_loss(cell: Cell) -> float | None:
+    """Value of the paper's Table 1, None where it gives none or the cell is not its own."""
+    if not paper.is_cell_of(cell):
         return None
     return paper.table_1(cell.hurst, cell.work_of_adhesion)
 
@@ -135,9 +134,9 @@ def _sum(values: Array) -> int | None:
 
 
 def beside_the_paper(data: Aggregate) -> Table:
-    """The paper's Table 1, cell by cell; no rows if the campaign is not the paper's."""
+    """The paper's Table 1, cell by cell; no rows for others than the paper's."""
     columns = (
-        *KEY,
+        *key_columns(data),
         TableColumn("n", "n"),
         TableColumn("loss_dimensionless", "W~", number()),
         TableColumn("ci_low", "95 % from", number()),
@@ -148,16 +147,15 @@ def beside_the_paper(data: Aggregate) -> Table:
     )
     rows: list[list[Value]] = []
     for cell in data.cells:
-        value = papers_loss(data, cell)
+        value = papers_loss(cell)
         place = (cell.hurst, cell.work_of_adhesion)
-        if not (cell.done and paper.is_the_papers(data.campaign) and paper.has_cell(*place)):
+        if not (cell.done and paper.is_cell_of(cell) and paper.has_cell(*place)):
             continue
         loss = cell.estimates["loss_dimensionless"]
         known = value is not None and not np.isnan(loss.low)
         rows.append(
             [
-                cell.hurst,
-                cell.work_of_adhesion,
+                *key(cell),
                 cell.done,
                 loss.mean,
                 loss.low,
@@ -194,7 +192,7 @@ def _deviation(data: Aggregate, cell: Cell, kind: str) -> float | None:
         abs(pair.difference.mean)
         for companion in data.companions
         if companion.kind == kind
-        and (other := companion.cell(cell.hurst, cell.work_of_adhesion)) is not None
+        and (other := companion.like(cell)) is not None
         and (pair := difference(cell, other)) is not None
     ]
     return max(found, default=None)
@@ -208,6 +206,7 @@ def paired(data: Aggregate) -> Table:
     """How the loss grows from one γ to the next on the same profiles."""
     columns = (
         TableColumn("hurst", "H"),
+        *axis_columns(data.further),
         TableColumn("work_of_adhesion_from [J/m^2]", "γ from"),
         TableColumn("work_of_adhesion_to [J/m^2]", "to (J/m²)"),
         TableColumn("pairs", "pairs"),
@@ -223,6 +222,7 @@ def paired(data: Aggregate) -> Table:
     rows = [
         [
             pair.hurst,
+            *(value for _, value in pair.others),
             pair.lower,
             pair.upper,
             pair.loss.n,
@@ -239,9 +239,11 @@ def _without_std(estimate: Estimate) -> list[float]:
 
 
 def profiles(data: Aggregate) -> Table:
-    """Statistics of the profiles of each H, and the slope that the paper quotes."""
+    """Statistics of the profiles of each H (and further key of the profile), the paper's slope."""
+    further = [k for k, axis in enumerate(data.further) if axis.table == "profile"]
     columns = (
         TableColumn("hurst", "H"),
+        *axis_columns(data.further[k] for k in further),
         TableColumn("h_rms [m]", "h_rms (µm)", number(unit=1e-6)),
         TableColumn("h_max [m]", "mean h_max (µm)", number(unit=1e-6)),
         TableColumn("m0 [m^2]", "m0 (µm²)", number(unit=1e-12)),
@@ -250,14 +252,18 @@ def profiles(data: Aggregate) -> Table:
         TableColumn("m4 [1/m^2]", "m4 (1/µm²)", number(unit=1e12)),
     )
     rows: list[list[Value]] = []
-    for hurst in data.hursts:
-        cell = max((c for c in data.cells if c.hurst == hurst), key=lambda c: c.done)
+    kinds: dict[tuple[float, ...], list[Cell]] = {}
+    for cell in data.cells:
+        at = (cell.hurst, *(cell.others[k][1] for k in further))
+        kinds.setdefault(at, []).append(cell)
+    for at, alike in kinds.items():
+        cell = max(alike, key=lambda c: c.done)
         mean = {k: cell.estimates[k].mean for k in ("h_rms", "h_max", "m0", "m2", "m4")}
         rows.append(
             [
-                hurst,
+                *at,
                 *(mean[name] for name in ("h_rms", "h_max", "m0", "m2")),
-                paper.m2(hurst) if paper.is_the_papers(data.campaign) else None,
+                paper.m2(cell.hurst) if paper.is_cell_of(cell) else None,
                 mean["m4"],
             ]
         )
@@ -269,7 +275,7 @@ def companions(data: Aggregate) -> Table:
     columns = (
         TableColumn("file", "campaign"),
         TableColumn("differs", "where it differs"),
-        *KEY,
+        *key_columns(data),
         TableColumn("pairs", "pairs"),
         TableColumn("loss_dimensionless_here", "W~ here", number()),
         TableColumn("loss_dimensionless_there", "there", number()),
@@ -282,7 +288,7 @@ def companions(data: Aggregate) -> Table:
     rows: list[list[Value]] = []
     for companion in data.companions:
         for cell in data.cells:
-            other = companion.cell(cell.hurst, cell.work_of_adhesion)
+            other = companion.like(cell)
             pair = difference(cell, other) if other is not None else None
             if pair is None:
                 continue
@@ -290,13 +296,12 @@ def companions(data: Aggregate) -> Table:
                 [
                     companion.path.name,
                     "; ".join(companion.differs) or "nothing",
-                    cell.hurst,
-                    cell.work_of_adhesion,
+                    *key(cell),
                     pair.here.n,
                     pair.here.mean,
                     pair.there.mean,
                     *_without_std(pair.difference),
-                    papers_loss(data, cell) if paper.is_the_papers(companion.campaign) else None,
+                    papers_loss(cell) if other is not None and paper.is_cell_of(other) else None,
                 ]
             )
     return make_table("Beside other campaigns", columns, rows)

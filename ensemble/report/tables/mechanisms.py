@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.fields import fitted_slope
+from ensemble.report.tables.key import key, key_columns
 from ensemble.report.tables.table import (
-    KEY,
     Table,
     TableColumn,
     Value,
@@ -21,10 +21,10 @@ from solver.method import BRANCHES
 
 
 def jumps(data: Aggregate) -> Table:
-    """One row for each (H, γ) and kind: how many jumps, and their share of all drops."""
+    """One row for each cell and kind: how many jumps, and their share of all drops."""
     found = data.jumps
     columns = (
-        *KEY,
+        *key_columns(data),
         TableColumn("kind", "kind"),
         TableColumn("scale", "scale"),
         TableColumn("jumps_per_loop", "jumps a loop", number(3)),
@@ -39,8 +39,7 @@ def jumps(data: Aggregate) -> Table:
                 continue
             rows.append(
                 [
-                    cell.hurst,
-                    cell.work_of_adhesion,
+                    *key(cell),
                     kind,
                     "small" if found.small_scale[j] else "large",
                     float(found.number[k, j] / cell.done),
@@ -52,22 +51,25 @@ def jumps(data: Aggregate) -> Table:
 
 
 def shares_by_kind(data: Aggregate) -> Table:
-    """Share of each kind in the drops, one row for each (H, γ): :func:`jumps` at a glance."""
+    """Share of each kind in the drops, one row for each cell: :func:`jumps` at a glance."""
     found = data.jumps
     used = [j for j in range(len(found.kinds)) if found.number[:, j].any()]
-    columns = (*KEY, *(TableColumn(found.kinds[j], found.kinds[j], percent) for j in used))
+    columns = (
+        *key_columns(data),
+        *(TableColumn(found.kinds[j], found.kinds[j], percent) for j in used),
+    )
     rows: list[list[Value]] = []
     for k, cell in enumerate(data.cells):
         total = float(found.energy[k].sum())
         shares = [float(found.energy[k, j]) / total if total else None for j in used]
-        rows.append([cell.hurst, cell.work_of_adhesion, *shares])
+        rows.append([*key(cell), *shares])
     return make_table("Share of the drops by kind of the jump", columns, rows)
 
 
 def mechanisms(data: Aggregate) -> Table:
-    """Loss by mechanism and pull-off, one row for each (H, γ)."""
+    """Loss by mechanism and pull-off, one row for each cell."""
     columns = (
-        *KEY,
+        *key_columns(data),
         TableColumn("small_scale_share", "small-scale share", percent),
         TableColumn("small_scale_share_ci_low", "95 % from", percent),
         TableColumn("small_scale_share_ci_high", "to", percent),
@@ -82,8 +84,7 @@ def mechanisms(data: Aggregate) -> Table:
         share, pull_off = cell.estimates["small_scale_share"], cell.estimates["pull_off_stress"]
         rows.append(
             [
-                cell.hurst,
-                cell.work_of_adhesion,
+                *key(cell),
                 share.mean,
                 share.low,
                 share.high,
@@ -100,7 +101,7 @@ def mechanisms(data: Aggregate) -> Table:
 def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
     columns = (
-        *KEY,
+        *key_columns(data),
         TableColumn("branch", "branch"),
         TableColumn("penetration", "Δ/h_max", fixed(2)),
         TableColumn("realisations", "n"),
@@ -114,15 +115,14 @@ def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     for index, cell in enumerate(data.cells):
         for branch in branches:
             b = BRANCHES.index(branch)
-            for k, penetration in enumerate(fields.penetration.tolist()):
+            for k, penetration in enumerate(cell.plan.penetration.tolist()):
                 if not fields.in_contact[index, b, k]:
                     continue
                 density = fields.psd_displacement[index, b, k]
-                slope, error = fitted_slope(data.campaign, fields.wave_number, density)
+                slope, error = fitted_slope(cell.plan, density)
                 rows.append(
                     [
-                        cell.hurst,
-                        cell.work_of_adhesion,
+                        *key(cell),
                         branch,
                         penetration,
                         int(fields.in_contact[index, b, k]),

@@ -1,0 +1,77 @@
+"""How the further axes of a campaign, beside H and γ, are named in tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.cells import Cell
+from ensemble.campaign.axes import Axis
+
+_LABELS = {
+    "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
+    "period": r"period $\lambda$ (m)",
+    "n0": "lowest harmonic $n_0$",
+    "ratio": r"$q_\mathrm{max}/q_\mathrm{min}$",
+    "rolloff": r"roll-off $q_\mathrm{r}/q_\mathrm{min}$",
+    "h_rms": r"root mean square height $h_\mathrm{rms}$ (m)",
+    "m2": "mean square slope $m_2$",
+    "c0": "$C_0$ (m²)",
+    "stiffness": "stiffness $k$ (Pa/m)",
+    "young": "Young's modulus $E$ (Pa)",
+    "poisson": r"Poisson's ratio $\nu$",
+}
+
+
+def place(others: Iterable[tuple[str, float]]) -> str:
+    """Return "max_penetration = 0.8, ratio = 8"; empty without further axes."""
+    return ", ".join(f"{name} = {value:g}" for name, value in others)
+
+
+def cell_name(cell: Cell) -> str:
+    """Return "H = 0.8, γ = 0.04 J/m²", and where the cell stands on further axes."""
+    name = f"H = {cell.hurst:g}, γ = {cell.work_of_adhesion:g} J/m²"
+    return f"{name}, {place(cell.others)}" if cell.others else name
+
+
+def axis_label(axis: Axis) -> str:
+    """What stands at an axis of a figure."""
+    return _LABELS.get(axis.name, axis.name)
+
+
+def together(data: Aggregate, axis: Axis) -> set[str]:
+    """Names of the axes that vary together with one, itself included."""
+    groups = data.campaign.sweep.zip
+    return next((set(names) for names in groups if axis.name in names), {axis.name})
+
+
+def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
+    """Finished cells that differ along one axis (and those that go with it) alone, ascending."""
+    moving = together(data, axis)
+    lines: dict[tuple[object, ...], list[Cell]] = {}
+    for cell in data.cells:
+        fixed = tuple(other for other in cell.others if other[0] not in moving)
+        if cell.done:
+            lines.setdefault((cell.hurst, cell.work_of_adhesion, fixed), []).append(cell)
+    return [sorted(line, key=lambda c: dict(c.others)[axis.name]) for line in lines.values()]
+
+
+def common(data: Aggregate) -> list[tuple[str, float]]:
+    """What all cells have alike on the further axes.
+
+    Of :attr:`Aggregate.shown` that is all, but for keys that vary with H or γ.
+    """
+    alike = set(data.cells[0].others).intersection(*(cell.others for cell in data.cells))
+    return [other for other in data.cells[0].others if other in alike]
+
+
+def shown_cells(data: Aggregate) -> str:
+    """A sentence on which cells the figures for each H and γ show; empty if all."""
+    at = place(common(data.shown))
+    if not data.further or not at:
+        return ""
+    return (
+        f"Figures with curves for each H and γ show the cells at {at}, which is said below them; "
+        "all cells are in the tables and in `curves.nc`, and there are figures along each further "
+        "axis."
+    )

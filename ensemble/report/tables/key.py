@@ -1,0 +1,34 @@
+"""The first columns of a table: where a row stands on the axes of the campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ensemble.aggregate.average import Aggregate
+from ensemble.aggregate.cells import Cell
+from ensemble.campaign.axes import Axis
+from ensemble.report.tables.table import KEY, TableColumn, Value
+
+_UNITS = {"1": "", "m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
+_CSV_UNITS = {"1": "", "m": " [m]", "m2": " [m^2]", "Pa": " [Pa]", "Pa m-1": " [Pa/m]"}
+
+
+def key_columns(data: Aggregate) -> tuple[TableColumn, ...]:
+    """What a row is about: H, γ, and every further axis."""
+    return (*KEY, *axis_columns(data.further))
+
+
+def axis_columns(axes: Iterable[Axis]) -> tuple[TableColumn, ...]:
+    """One column for each axis."""
+    return tuple(
+        TableColumn(
+            f"{axis.name}{_CSV_UNITS[axis.unit]}",
+            f"{axis.name} ({_UNITS[axis.unit]})" if _UNITS[axis.unit] else axis.name,
+        )
+        for axis in axes
+    )
+
+
+def key(cell: Cell) -> list[Value]:
+    """Where a cell stands on the axes, under :func:`key_columns`."""
+    return [cell.hurst, cell.work_of_adhesion, *(value for _, value in cell.others)]
