@@ -64,12 +64,15 @@ class Point:
         dn/dd of every edge along the branch, n the outward motion of the contact.
     slope : float
         dY/dd along the branch: Y is p, under a load q0 s.
+    clearance : float
+        Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     """
 
     at: float
     field: GapField
     rate: Array
     slope: float
+    clearance: float = 0.0
 
     @property
     def gaps(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from solver.method import ContactState
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.jump import Jumps
 from solver.sharp.local import advance
-from solver.sharp.states import States, Trace
+from solver.sharp.states import Memory, States, Trace
 from solver.sharp.touch import Located, Nucleation
 
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
@@ -78,7 +78,8 @@ class _Walk:
     pending: list[ContactState]
 
     def __init__(self, point: Point) -> None:
-        self.trail, self.clearance, self.closed, self.pending = [point], 0.0, 0.0, []
+        self.trail, self.closed, self.pending = [point], 0.0, []
+        self.clearance = point.clearance
 
     def add(self, point: Point, closed: float) -> None:
         """Go on to a point; a gap has closed by ``closed`` at most."""
@@ -170,6 +171,10 @@ class Follower:
                 return reached.at, after
             point, wanted = reached, 2 * abs(step)
         trace.states += walk.pending
+        # What has not closed since the last look need not be looked at again.
+        point = replace(point, clearance=max(walk.clearance - walk.closed, 0.0))
+        remembered = Memory(point.field.gaps, point.clearance)
+        trace.states[-1] = replace(trace.states[-1], internal=remembered)
         return target.at, point
 
     def _look(self, trace: Trace, walk: _Walk, branch: Branch) -> Located | None:

@@ -46,6 +46,7 @@ _LEAST_DROP = 2e-3
 # Nearer to a fold than this (in units of the field's accuracy, times h_max) the field's error hides
 # whether there is a minimum.
 _FINEST = 0.5
+_FINER_UNDER_LOAD = 1e-2
 _BEND = 1.5e-4  # largest relative error of the trapezoidal rule over one step
 
 
@@ -111,17 +112,19 @@ class SharpMethod(Method):
         h_max = profile.h_max * self.q0
         critical = float(4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus)))
         weak = _weakness(profile, critical)
-        tolerance = float(np.clip(_FIELD_ACCURACY * accuracy * weak**2, 1e-14, 1e-5))
+        # Under a load s goes like a square root before a fold, and where contact is lost it counts.
+        load = problem.control.is_load
+        finer = _FINER_UNDER_LOAD if load else 1.0
+        tolerance = float(np.clip(_FIELD_ACCURACY * accuracy * weak**2 * finer, 1e-14, 1e-5))
         source = StressSource(profile, tolerance)
         self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
         self.states = States(problem, source, self.edges.count)
-        # Under a load s goes like a square root before a fold, and where contact is lost it counts.
-        late = accuracy if problem.control.is_load else 1.0
+        finest = max(_FINEST * tolerance, _NOISE)
         self.resolution = Resolution(
-            jump=max(_RESOLUTION * accuracy * late, _NOISE) * h_max,
+            jump=max(_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
             bend=float(_BEND * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**1.25),
             scale=h_max,
-            finest=max(_FINEST * tolerance, _NOISE) * h_max,
+            finest=finest * h_max,
             late=_LATE * accuracy,
             least_drop=_LEAST_DROP * problem.work_of_adhesion,
         )
@@ -148,14 +151,14 @@ class SharpMethod(Method):
         """Stress, displacement and gap of ``state`` on n nodes, by quadrature over the gaps."""
         field = None
         if state.patches:
-            field = self.edges.field(state.internal, self.states.place(state))
+            field = self.edges.field(state.internal.gaps, self.states.place(state))
         return fields_of(self.problem, field, state.separation, n)
 
     def openings(self, state: ContactState) -> list[Opening]:
         """Openings of all gaps from their series."""
         if not state.patches:
             return []
-        return openings_of(self.edges.field(state.internal, self.states.place(state)), self.q0)
+        return openings_of(self.edges.field(state.internal.gaps, self.states.place(state)), self.q0)
 
     @on_one_thread
     def follow(self, state: ContactState, prescribed: float) -> Path:
@@ -197,8 +200,10 @@ class SharpMethod(Method):
             trace.states.append(before)
             point = self.jumps.run(trace, before, np.empty((0, 2)), at, target.branch, highest)
         else:
-            gaps = state.internal
+            gaps = state.internal.gaps
             point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
+            if point is not None:
+                point = replace(point, clearance=state.internal.clearance)
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, at))
                 trace.states.append(before)

@@ -9,6 +9,7 @@ import numpy as np
 from solver.jumps import Branch, Jump
 from solver.method import ContactState
 from solver.problem import Problem
+from solver.profile import Array
 from solver.sharp.edges import Counters, Point
 from solver.sharp.field import GapField, Hold
 from solver.sharp.opening import work_of_gaps
@@ -25,6 +26,14 @@ class Trace:
     states: list[ContactState] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
     late: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What a state remembers: the ends of its gaps, and their clearance (``Point.clearance``)."""
+
+    gaps: Array
+    clearance: float
 
 
 def hold_of(problem: Problem) -> Hold:
@@ -95,13 +104,14 @@ class States:
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
         """State of a point of a branch; ``separation`` (m) where it is known without rounding."""
-        return self.of_field(point.field, point.slope, separation)
+        return self.of_field(point.field, point.slope, separation, point.clearance)
 
     def of_field(
         self,
         gap_field: GapField,
         slope: float = float("nan"),
         separation: float | None = None,
+        clearance: float = 0.0,
     ) -> ContactState:
         """State of a field with dY/dd = ``slope``; ``separation`` (m) as in :meth:`of_point`."""
         self.count.energies += 1
@@ -128,7 +138,7 @@ class States:
             contact_fraction=float((right - left).sum() / (2 * np.pi)),
             stiffness=slope * self._per_prescribed,
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=gaps,
+            internal=Memory(gaps, clearance),
         )
 
     def shifted(self, state: ContactState, gap_field: GapField, at: float) -> ContactState:
@@ -147,6 +157,7 @@ class States:
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             stiffness=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
+            internal=Memory(gap_field.gaps, 0.0),
         )
 
     def work(self, before: ContactState, after: ContactState, way: float) -> float:

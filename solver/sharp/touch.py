@@ -38,6 +38,15 @@ class Touch:
 
 
 @dataclass(frozen=True, eq=False)
+class Minima:
+    """Local minima of the openings of all gaps: place, value and curvature, shape (minima,)."""
+
+    theta: Array
+    opening: Array
+    curvature: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Located:
     """The point of a branch at which surfaces touch, where, and how late (in d) at most."""
 
@@ -84,13 +93,13 @@ class Nucleation:
         curvature = crests.curvature / profile.q0
         theta = crests.position * profile.q0
         highest = [Touch(float(a), 0.0, float(c)) for a, c in zip(theta, curvature, strict=True)]
-        overlap = max(self.clearance(t) for t in highest)
+        overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
         return profile.h_max * profile.q0 - overlap, highest
 
-    def minima(self, field: GapField) -> list[Touch]:
+    def minima(self, field: GapField) -> Minima:
         """Local minima of the opening inside the gaps."""
         self.edges.count.openings += 1
-        found: list[Touch] = []
+        found: list[tuple[Array, Array, Array]] = []
         for k in range(len(field.gaps)):
             shape = fine_opening(field, k)
             x, y = shape.theta, shape.opening
@@ -104,31 +113,36 @@ class Nucleation:
             width = x[i + 1] - x[i - 1]
             for j in np.flatnonzero(low < _CLOSE * half * width**2):
                 at[j], low[j], half[j] = _bottom(field, k, shape.modes, at[j], 0.5 * width[j])
-            found += map(Touch, at.tolist(), low.tolist(), (2 * half).tolist())
-        return found
+            found.append((at, low, 2 * half))
+        theta, opening, curvature = (np.concatenate(part) for part in zip(*found, strict=True))
+        return Minima(theta, opening, curvature)
 
-    def clearance(self, touch: Touch) -> float:
-        """Opening left before a patch is put there; negative or zero when it is time."""
-        width = self._width(touch)
+    def clearance(self, opening: Array, curvature: Array) -> Array:
+        """Opening left at minima before a patch is put there; not positive when it is time."""
+        width = self._width(curvature)
         narrowest = 3 * self.edges.smallest
         # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
         # the surface follows it, 10 to 20 here.
-        return touch.opening + (4 * touch.curvature * width**2 if width <= narrowest else 0.0)
+        return np.asarray(opening + np.where(width <= narrowest, 4 * curvature * width**2, 0.0))
 
-    def ready(self, minima: list[Touch]) -> list[Touch]:
+    def ready(self, minima: Minima) -> list[Touch]:
         """Where to put patches: the place of largest overlap, and those that equal it."""
-        over = [(self.clearance(t), t) for t in minima]
-        least = min((value for value, _ in over), default=np.inf)
+        over = self.clearance(minima.opening, minima.curvature)
+        least = float(over.min(initial=np.inf))
         if least > 0:
             return []
         # without adhesion patches come and go smoothly, in any order
         equal = self.equal if self.edges.critical > 0 else np.inf
-        return [t for value, t in over if value <= min(least + equal, 0.0)]
+        return [
+            Touch(float(minima.theta[i]), float(minima.opening[i]), float(minima.curvature[i]))
+            for i in np.flatnonzero(over <= min(least + equal, 0.0))
+        ]
 
-    def least(self, field: GapField) -> tuple[float, list[Touch]]:
+    def least(self, field: GapField) -> tuple[float, Minima]:
         """Least clearance of a field, and all its minima."""
         minima = self.minima(field)
-        return min((self.clearance(t) for t in minima), default=np.inf), minima
+        over = self.clearance(minima.opening, minima.curvature)
+        return float(over.min(initial=np.inf)), minima
 
     def located(self, trail: list[Point], resolution: float) -> tuple[Located | None, float]:
         """First point of a trail at which surfaces touch inside a gap, with the touches.
@@ -185,10 +199,11 @@ class Nucleation:
         return with_patches(
             gaps,
             np.array([t.theta for t in touches]),
-            np.array([self._width(t) for t in touches]),
+            self._width(np.array([t.curvature for t in touches])),
         )
 
-    def _width(self, touch: Touch) -> float:
+    def _width(self, curvature: Array) -> Array:
+        """Width of the patch that is put where the surfaces touch with this curvature."""
         surface = math.pi * self.edges.critical**2 / 8  # Γ
-        first = (16 * surface / (math.pi * touch.curvature**2)) ** (1 / 3)
-        return float(min(max(0.5 * first, 3 * self.edges.smallest), self.edges.longest_step))
+        first = (16 * surface / (math.pi * curvature**2)) ** (1 / 3)
+        return np.clip(0.5 * first, 3 * self.edges.smallest, self.edges.longest_step)

@@ -44,7 +44,7 @@ def test_wave_loses_what_the_closed_form_says(relative):
     assert loop.loss_from_drops == pytest.approx(exact.loss, rel=bound)
     assert [j.kind for j in loop.jumps] == ["snap-in", "pull-off"]
     # beside a fold s goes like a square root of what is prescribed
-    assert loop.jumps[-1].separation == pytest.approx(exact.fold_separation, rel=2e-5)
+    assert loop.jumps[-1].separation == pytest.approx(exact.fold_separation, rel=1e-4)
     if stiffness == 0:
         assert loop.pull_off_stress == pytest.approx(-exact.fold_mean_stress, rel=1e-6)
 
