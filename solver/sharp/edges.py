@@ -9,6 +9,7 @@ Hessian of the energy divided by C).
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,6 +89,12 @@ class Point:
     def separation(self) -> float:
         """Separation q0 s."""
         return self.field.separation
+
+    def cleared(self, clearance: float) -> Point:
+        """Return this point with its clearance known."""
+        point = copy(self)
+        object.__setattr__(point, "clearance", clearance)
+        return point
 
     def predicted(self, at: float) -> Array:
         """Gaps at d = ``at``, along the tangent."""

@@ -172,7 +172,7 @@ class Follower:
             point, wanted = reached, 2 * abs(step)
         trace.states += walk.pending
         # What has not closed since the last look need not be looked at again.
-        point = replace(point, clearance=max(walk.clearance - walk.closed, 0.0))
+        point = point.cleared(max(walk.clearance - walk.closed, 0.0))
         remembered = Memory(point.field.gaps, point.clearance)
         trace.states[-1] = replace(trace.states[-1], internal=remembered)
         return target.at, point

@@ -106,7 +106,7 @@ class Jumps:
                 continue
             least, minima = self.nucleation.least(point.field)
             if least > 0:
-                return replace(point, clearance=least)
+                return point.cleared(least)
             grown = descend(point.field.gaps, self.nucleation.ready(minima))
             if grown is not None and self._same(grown.field.gaps, point.field.gaps):
                 if adhesive and least < -self.nucleation.overlap:

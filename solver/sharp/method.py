@@ -203,7 +203,7 @@ class SharpMethod(Method):
             gaps = state.internal.gaps
             point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
             if point is not None:
-                point = replace(point, clearance=state.internal.clearance)
+                point = point.cleared(state.internal.clearance)
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, at))
                 trace.states.append(before)

@@ -133,7 +133,7 @@ def test_a_window_feels_all_other_gaps(loaded, follow):
     """
     method, state = loaded
     edges, separation = method.edges, state.separation * method.q0
-    gaps = state.internal.copy()
+    gaps = state.internal.gaps.copy()
     count = len(gaps)
     assert count >= 7
     kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
