@@ -25,6 +25,7 @@ _PER_TASK = (
     *("h_max", "h_rms", "m0", "m2", "m4"),
     *("loss", "loss_dimensionless", "loss_from_drops", "loss_small_scale", "loss_large_scale"),
     *("audit_residual", "pull_off_penetration", "pull_off_stress"),
+    "largest_contact_fraction",
     *("wall_time", "cpu_time", "states", "jump_count"),
     *("loss_error", "races", "energy_at_stake"),
 )
@@ -36,6 +37,7 @@ _WITH_INTERVAL = (
     "small_scale_share",
     "pull_off_stress",
     "pull_off_penetration",
+    "largest_contact_fraction",
 )
 
 
@@ -65,7 +67,7 @@ class Cell:
         (loss_small_scale / loss_from_drops); ``loss_error_dimensionless``,
         ``energy_at_stake_dimensionless`` (in W~).
     estimates : dict of Estimate
-        The same, averaged. Only losses and pull-off have an interval.
+        The same, averaged. Only losses, pull-off and largest contact have an interval.
     curves : dict of Curve
         ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
         (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,

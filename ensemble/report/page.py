@@ -23,8 +23,8 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     ----------
     data : Aggregate
     sections : sequence of (heading, illustrations)
-        The figures that were drawn, under the headings "loops", "losses", "mechanisms", "fields",
-        "companions".
+        The figures that were drawn, under the headings "loops", "losses", "axes", "mechanisms",
+        "fields", "companions".
     """
     figures = dict(sections)
     of_paper = paper.are_its_cells(data.shown.cells)
@@ -44,6 +44,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         losses.markdown(),
         _footnote(data),
         *show("losses"),
+        *(["### Along further axes", *show("axes")] if figures.get("axes") else []),
     ]
     beside = loss_tables.beside_the_paper(data)
     if beside.rows:

@@ -37,6 +37,27 @@ class Plots:
             figure.canvas.draw()  # the layout is found with the style's own sizes
         return list(figure.axes)
 
+    def loss_along(self, name: str) -> list[Axes]:
+        """Loss along a further axis of the campaign ("max_penetration"), with intervals.
+
+        Raises
+        ------
+        ValueError
+            If the campaign has no such axis beside H and γ.
+        """
+        from ensemble.report.figures.along import along, with_figure
+        from ensemble.report.figures.style import style
+
+        data = self._averages()
+        axes = {axis.name: axis for axis in with_figure(data)}
+        if name not in axes:
+            known = ", ".join(axes) or "none"
+            raise ValueError(f"{name!r} is no axis with a figure of its own: there are {known}")
+        with style():
+            figure = along(axes[name])(data)
+            figure.canvas.draw()
+        return list(figure.axes)
+
     def contact_against_stress(self) -> list[Axes]:
         """Contact fraction against mean stress, a panel for each H."""
         return self._draw("contact_against_stress")

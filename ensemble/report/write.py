@@ -57,6 +57,7 @@ def _write_files(data: Aggregate, directory: Path) -> None:
         MECHANISMS,
         PENETRATIONS,
         SHAPES,
+        along_axes,
     )
     from ensemble.report.figures.losses import of_penetration
     from ensemble.report.figures.style import save, say_below, style
@@ -75,6 +76,7 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     sections = (
         ("loops", LOOPS),
         ("losses", LOSSES),
+        ("axes", along_axes(data)),
         ("mechanisms", MECHANISMS),
         ("fields", with_shapes),
         ("companions", PENETRATIONS if of_penetration(data) else ()),
@@ -82,8 +84,9 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     for _, illustrations in sections:
         for item in illustrations:
             with style():
-                figure = item.draw(data.shown)
-                say_below(figure, place(common(data.shown)))
+                figure = item.draw(data if item.whole else data.shown)
+                if not item.whole:
+                    say_below(figure, place(common(data.shown)))
             save(figure, directory / item.name)
     page = write_page(data, sections)
     (directory / "report.md").write_text(page, encoding="utf-8")

@@ -36,6 +36,7 @@ COMPILED = {"solver.compiled"}
 FIGURES = {
     "ensemble.loop.figure",
     "ensemble.bench.figure",
+    "ensemble.report.figures.along",
     "ensemble.report.figures.catalogue",
     "ensemble.report.figures.fields",
     "ensemble.report.figures.loops",

@@ -10,7 +10,7 @@ import numpy as np
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tables import Campaign
 from ensemble.results.layout import create
-from ensemble.results.schema import kept_rows
+from ensemble.results.schema import axis_datasets, kept_rows
 from ensemble.task.fields import GAP_EDGES, field_plan
 from solver.jumps import JUMP_KINDS
 
@@ -29,7 +29,7 @@ work_of_adhesion = {gamma}
 realisations = {realisations}
 seed = 1
 [cycle]
-max_penetration = 0.9
+max_penetration = {max_penetration}
 load_steps = 20
 unloading_until = -2.0
 [output]
@@ -38,8 +38,10 @@ field_nodes = 256
 """
 
 
-def campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32, ratio=10) -> Campaign:
-    """The paper's profile, material and path if ``ratio`` is 100; else its own."""
+def campaign(
+    hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32, ratio=10, max_penetration=0.9
+) -> Campaign:
+    """The paper's profile, material and path if ``ratio`` is 100; lists are further axes."""
     return parse_campaign(
         CAMPAIGN.format(
             hurst=list(hurst),
@@ -47,6 +49,7 @@ def campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32, rat
             realisations=realisations,
             jumps=jumps,
             ratio=ratio,
+            max_penetration=max_penetration,
         )
     )
 
@@ -67,7 +70,8 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
     stuck = down > pull_off
     unloading = np.where(stuck, (down - 0.9) * 3 + loading[:, -1:], 0.0)
     share = rng.uniform(0.05, 0.3, n)
-    loss = 0.4 * gamma * (1 + 0.2 * rng.standard_normal(n)) * (1.5 - hurst)
+    top = np.array([campaign.at(t).cycle.max_penetration for t in tasks])
+    loss = (top / 0.9) ** 2 * 0.4 * gamma * (1 + 0.2 * rng.standard_normal(n)) * (1.5 - hurst)
     audit = 0.01 * rng.standard_normal(n)
     drops = loss * (1 - audit)
     out = {
@@ -95,6 +99,7 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "energy_at_stake": np.where(np.arange(n) % 7 == 3, 0.02 * loss, 0.0),
         "pull_off_penetration": pull_off[:, 0],
         "pull_off_stress": -unloading.min(axis=1) * scale,
+        "largest_contact_fraction": np.clip(0.4 * size[:, 0], 0, 1),
         "states": np.full(n, 90, dtype=np.int32),
         "loading_mean_stress": loading * scale[:, None],
         "unloading_mean_stress": unloading * scale[:, None],
@@ -121,6 +126,8 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         ("jump_patches_after", rng.integers(0, 5, (n, slots)), -1, np.int32),
     ):
         out[name] = np.where(used, value, empty).astype(dtype)
+    for place, dataset in enumerate(axis_datasets(campaign)):
+        out[dataset.name] = np.array([t.others[place][1] for t in tasks])
     return out | _fields(campaign, hurst, h_max, rng)
 
 

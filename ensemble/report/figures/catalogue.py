@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from ensemble.aggregate.average import Aggregate
+from ensemble.report.axes import together
 from ensemble.report.figures import fields, loops, losses
+from ensemble.report.figures.along import along, with_figure
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,8 @@ class Illustration:
     draw : callable
     of_paper : str
         The figure or table of the paper that shows the same, if there is one.
+    whole : bool
+        Whether it draws all cells, and not those of :attr:`Aggregate.shown`.
     """
 
     name: str
@@ -32,6 +36,7 @@ class Illustration:
     caption: str
     draw: Callable[[Aggregate], Figure]
     of_paper: str = ""
+    whole: bool = False
 
 
 LOOPS = (
@@ -149,3 +154,33 @@ PENETRATIONS = (
         losses.loss_against_penetration,
     ),
 )
+
+
+def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
+    """One figure for each further axis of the campaign, unless it goes with H or γ."""
+    return tuple(
+        Illustration(
+            f"loss_along_{axis.name}",
+            f"Loss against {axis.name}",
+            "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
+            "little."
+            + (
+                " Contact: the largest of the loop; crosses: mean at the turning point."
+                if axis.name == "max_penetration"
+                else ""
+            )
+            + (
+                f" With it {', '.join(sorted(together(data, axis) - {axis.name}))} varies."
+                if len(together(data, axis)) > 1
+                else ""
+            )
+            + (
+                " Other further axes: as written below the panels."
+                if set(data.further) - {a for a in data.further if a.name in together(data, axis)}
+                else ""
+            ),
+            along(axis),
+            whole=True,
+        )
+        for axis in with_figure(data)
+    )

@@ -45,7 +45,7 @@ def loss_against_adhesion(data: Aggregate) -> Figure:
     of_paper = paper.are_its_cells(data.cells)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
-        _errorbar(
+        errorbar(
             axes,
             np.array([cell.work_of_adhesion for cell in cells]),
             [cell.estimates["loss_dimensionless"] for cell in cells],
@@ -83,7 +83,7 @@ def loss_against_slope(data: Aggregate) -> Figure:
     for place, (k, gamma) in enumerate(shown):
         cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
         cells.sort(key=lambda cell: cell.estimates["m2"].mean)
-        _errorbar(
+        errorbar(
             axes,
             np.array([cell.estimates["m2"].mean for cell in cells]),
             [cell.estimates["loss_dimensionless"] for cell in cells],
@@ -134,7 +134,7 @@ def loss_against_penetration(data: Aggregate) -> Figure:
     tops = [top for _, _, found in curves for top in found]
     apart = 0.012 * (max(tops, default=1.0) - min(tops, default=0.0))
     for place, (k, label, found) in enumerate(curves):
-        _errorbar(
+        errorbar(
             axes,
             np.array(list(found)),
             list(found.values()),
@@ -293,7 +293,7 @@ def pull_off(data: Aggregate) -> Figure:
     hursts = spread_out(data.hursts, MOST_CURVES)
     for k, hurst in enumerate(hursts):
         cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
-        _errorbar(
+        errorbar(
             axes,
             np.array([cell.work_of_adhesion for cell in cells]),
             [cell.estimates["pull_off_stress"] for cell in cells],
@@ -346,7 +346,7 @@ def _occupied(histogram: np.ndarray) -> slice:
     return slice(max(int(filled[0]), stop - 8 * BINS_PER_DECADE), stop)
 
 
-def _errorbar(
+def errorbar(
     axes: Axes,
     x: np.ndarray,
     found: list[Estimate],
@@ -355,6 +355,7 @@ def _errorbar(
     offset: float = 0.0,
     unit: float = 1.0,
 ) -> None:
+    """Draw means with their intervals, in multiples of a unit."""
     mean = np.array([estimate.mean for estimate in found]) / unit
     low = np.array([estimate.low for estimate in found]) / unit
     high = np.array([estimate.high for estimate in found]) / unit

@@ -1,0 +1,182 @@
+"""Averages, tables, curves and figures of a campaign on further axes than H and γ."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+import xarray
+
+import adhesis
+from ensemble.aggregate.average import aggregate
+from ensemble.campaign.file import parse_campaign
+from ensemble.report import paper
+from ensemble.report.figures.catalogue import along_axes
+from ensemble.report.figures.style import style
+from ensemble.report.write import write_report
+from tests.support.synthetic_results import campaign, rows, write
+
+TOPS = (0.5, 0.7, 0.9)
+AXES = {"ratio": [50, 100], "max_penetration": list(TOPS)}
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    plan = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=3, **AXES)
+    values = rows(plan)
+    values["status"][-1] = 0  # the last cell lacks one
+    return write(tmp_path_factory.mktemp("axes") / "r.h5", plan, values)
+
+
+@pytest.fixture(scope="module")
+def data(file):
+    return aggregate(file)
+
+
+@pytest.fixture(scope="module")
+def report(file):
+    """The report without its figures, each of which takes a second."""
+    patch = pytest.MonkeyPatch()
+    drawn: list[str] = []
+
+    def note(_, stem):
+        drawn.append(stem.name)
+        for suffix in (".png", ".pdf"):
+            stem.with_suffix(suffix).write_bytes(b"")
+
+    patch.setattr("ensemble.report.figures.style.save", note)
+    directory = file.parent / "report"
+    write_report(file, directory, io.StringIO())
+    patch.undo()
+    return directory, drawn
+
+
+def test_a_cell_is_one_point_on_all_axes(file, data):
+    assert len(data.cells) == 2 * 2 * 2 * 3
+    with xarray.open_dataset(file, engine="h5netcdf", phony_dims="sort") as raw:
+        for cell in data.cells:
+            mine = (raw.hurst == cell.hurst) & (raw.work_of_adhesion == cell.work_of_adhesion)
+            for name, value in cell.others:
+                mine &= raw[name] == value
+            mine &= raw.status == 1
+            np.testing.assert_array_equal(cell.values["loss"], raw.loss.values[mine.values])
+    assert data.cells[-1].done == 2
+    assert all(cell.done == 3 for cell in data.cells[:-1])
+
+
+def test_differences_are_taken_between_cells_that_differ_in_gamma_alone(data):
+    assert len(data.paired) == 2 * 2 * 3
+    for pair in data.paired:
+        low, high = (
+            next(
+                c
+                for c in data.cells
+                if (c.hurst, c.work_of_adhesion, c.others) == (pair.hurst, gamma, pair.others)
+            )
+            for gamma in (0.01, 0.04)
+        )
+        both = min(low.done, high.done)
+        expected = high.values["loss"][:both] - low.values["loss"][:both]
+        assert (pair.loss.n, pair.lower, pair.upper) == (both, 0.01, 0.04)
+        assert pair.loss.mean == pytest.approx(expected.mean())
+
+
+def test_curves_and_states_of_a_cell_are_in_its_own_units(data):
+    for cell in data.cells:
+        top = dict(cell.others)["max_penetration"]
+        assert cell.penetration["loading"][-1] == pytest.approx(top)
+        assert cell.penetration["unloading"][0] == pytest.approx(top)
+        assert cell.plan.penetration[-1] == pytest.approx(top)
+
+
+def test_figures_show_one_place_on_the_further_axes_that_has_results(file, data, tmp_path):
+    assert {cell.others for cell in data.shown.cells} == {
+        (("ratio", 100), ("max_penetration", 0.9))
+    }
+    assert [(c.hurst, c.work_of_adhesion) for c in data.shown.cells] == [
+        (0.7, 0.01), (0.7, 0.04), (0.8, 0.01), (0.8, 0.04)
+    ]  # fmt: skip
+    for k, cell in enumerate(data.shown.cells):
+        whole = data.cells.index(cell)
+        np.testing.assert_array_equal(data.shown.jumps.number[k], data.jumps.number[whole])
+        np.testing.assert_array_equal(
+            data.shown.fields.psd_height[k], data.fields.psd_height[whole]
+        )
+    values = rows(data.campaign)
+    values["status"][values["max_penetration"] > 0.8] = 0
+    early = aggregate(write(tmp_path / "r.h5", data.campaign, values))
+    assert {c.others[1] for c in early.shown.cells} == {("max_penetration", 0.7)}
+
+
+def test_the_papers_cells_alone_stand_beside_the_paper(data):
+    found = {cell.others for cell in data.cells if paper.is_cell_of(cell)}
+    assert found == {(("ratio", 100), ("max_penetration", 0.9))}
+
+
+def test_tables_curves_and_page_have_every_axis(report, data):
+    directory, drawn = report
+    for name in ("losses", "growth", "jumps", "slopes"):
+        with (directory / f"{name}.csv").open(encoding="utf-8") as stream:
+            table = list(csv.DictReader(stream))
+        assert {(r["ratio"], r["max_penetration"]) for r in table} == {
+            (str(ratio), str(top)) for ratio in (50, 100) for top in TOPS
+        }, name
+    with xarray.open_dataset(directory / "curves.nc") as curves:
+        assert curves.sizes["ratio"] == 2
+        for cell in data.cells:
+            at = {"hurst": cell.hurst, "work_of_adhesion": cell.work_of_adhesion}
+            mean = curves.loading_contact_fraction_mean.sel(**at, **dict(cell.others))
+            np.testing.assert_array_equal(mean, cell.curves["loading_contact_fraction"].mean)
+        assert "max_penetration" in curves.loading_penetration.attrs["long_name"]
+    assert {"loss_along_ratio", "loss_along_max_penetration"} < set(drawn)
+    page = (directory / "report.md").read_text(encoding="utf-8")
+    assert "show the cells at ratio = 100, max_penetration = 0.9" in page
+    assert "Along max_penetration from 0.5 to 0.9 the mean loss" in page
+
+
+def test_figures_along_an_axis_hold_the_means_there(data):
+    item = next(i for i in along_axes(data) if i.name == "loss_along_max_penetration")
+    with style():
+        figure = item.draw(data)
+    lines = [axes.containers[1].lines[0] for axes in figure.axes]  # the second γ
+    for line, name, unit, hurst in zip(
+        lines,
+        np.repeat(
+            ["loss_dimensionless", "pull_off_stress", "pull_off_penetration",
+             "largest_contact_fraction"], 2
+        ),
+        np.repeat([1, 1e3, 1, 1], 2),
+        [0.7, 0.8] * 4,
+        strict=True,
+    ):  # fmt: skip
+        cells = [
+            c
+            for c in data.cells
+            if (c.hurst, c.work_of_adhesion) == (hurst, 0.04) and c.others[0] == ("ratio", 100)
+        ]
+        np.testing.assert_allclose(line.get_xdata(), TOPS, atol=0.01)
+        mean = [c.estimates[name].mean / unit for c in cells]
+        np.testing.assert_allclose(line.get_ydata(), mean)
+
+
+def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):
+    text = campaign(hurst=(0.7, 0.8), gamma=(0.04,), realisations=2, ratio=[8, 10]).text
+    plan = parse_campaign(text.replace("seed = 1", 'seed = 1\nzip = [["hurst", "ratio"]]'))
+    found = aggregate(write(tmp_path / "r.h5", plan, rows(plan)))
+    assert [(c.hurst, *c.others) for c in found.shown.cells] == [
+        (0.7, ("ratio", 8)), (0.8, ("ratio", 10))
+    ]  # fmt: skip
+    assert along_axes(found) == ()
+    assert not found.paired
+
+
+def test_opened_tables_and_figures_have_every_axis(file):
+    results = adhesis.open(file)
+    names = ["hurst", "work_of_adhesion", "ratio", "max_penetration"]
+    assert results.losses.index.names == names
+    assert results.mechanisms.index.names == [*names, "kind"]
+    assert len(results.plot.loss_along("ratio")) == 2
+    with pytest.raises(ValueError, match="there are ratio, max_penetration"):
+        results.plot.loss_along("young")
