@@ -27,8 +27,12 @@ _NOISE = 1e-3  # a rise of the energy below this share of the work done both way
 _TIE = 1e-3  # two ways off a saddle whose gains differ by less are equal
 _LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
 
+_MET = 0.4  # edges this close to another descent's track, in longest steps, are on it
+_LOOKS = 3  # in so many looks one after the other
+_LOOK_EVERY = 4  # fields
+
 # How a descent ended.
-RESTING, NARROW, UNFINISHED, LOST = 0, 1, 2, 3
+RESTING, NARROW, UNFINISHED, LOST, MET = 0, 1, 2, 3, 4
 
 
 @compiled
@@ -52,7 +56,9 @@ def descend(
     law: Law,
     rules: Rules,
     panels: Panels,
-) -> tuple[Array, int, int, int, Kinds]:
+    track: Array,
+    astray: bool,
+) -> tuple[Array, int, int, int, Kinds, Array, bool]:
     """Descend in energy, d being ``prescribed``, for at most ``most`` steps.
 
     Edges move in proportion to their excess energy release rates, by no more than the longest step
@@ -63,11 +69,15 @@ def descend(
     While edges run, a tangent serves several steps, unless an edge turns; the openings are always
     fresh. A step that raised the energy is taken back and halved.
 
+    ``track``, shape (n, 2L), holds the edges that another descent went through. One that has been
+    away from it (``astray``) and comes back to it has met it.
+
     Returns
     -------
-    gaps, how it ended, fields, tangents, kinds
+    gaps, how it ended, fields, tangents, kinds, passed, astray
         RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
-        length, UNFINISHED after the last step, LOST where the edges have no field.
+        length, UNFINISHED after the last step, LOST where the edges have no field, MET where they
+        are on the track again. ``passed`` is the way of this descent, as ``track``.
     """
     edges = 2 * gaps.shape[0]
     fields = 0
@@ -82,6 +92,10 @@ def descend(
     values = np.zeros(edges)
     matrix = np.zeros((edges, edges))  # tangent, or eigenvectors of the Hessian
     kinds = least
+    passed = np.empty((64, edges))
+    passed[0] = gaps.ravel()
+    count = 1
+    looks = 0
     while fields < most:
         fields += 1
         held = runners > 0 and reuses < _REUSES
@@ -89,7 +103,7 @@ def descend(
         kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
         of = solve(gaps, prescribed, law.hold, kinds, 1 if held else 2, rules, panels)
         if not np.isfinite(of.pressure):
-            return gaps, LOST, fields, tangents, kinds
+            return gaps, LOST, fields, tangents, kinds, passed[:count], astray
         residual, drift = imbalance(of, law, panels)
         # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²; where the
         # surfaces overlap, C < 0, contact grows all the same
@@ -112,8 +126,15 @@ def descend(
             share = min(1.0, 2 * share)
         force = fresh
         longest = share * law.longest
-        alone = 2 * longest if held and runners == 1 else longest
+        alone = 2 * longest if runners == 1 else longest
         limit = limits(table, alone)
+        if track.shape[0] > 0 and fields % _LOOK_EVERY == 0:
+            away = _distance(gaps.ravel(), track, law.longest)
+            off = away > _MET * law.longest
+            astray = astray or off
+            looks = looks + 1 if astray and not off else 0
+            if looks == _LOOKS:
+                return gaps, MET, fields, tangents, kinds, passed[:count], astray
         if held:
             reuses += 1
         else:
@@ -157,19 +178,52 @@ def descend(
                     step = way if onwards >= backwards * (1 - _TIE) else -way
             size = np.abs(step).max()
         if not size < np.inf:
-            return gaps, LOST, fields, tangents, kinds
+            return gaps, LOST, fields, tangents, kinds, passed[:count], astray
         runners = 0
         for e in range(edges):
-            if abs(step[e]) > (0.5 if equal_speeds else 0.25) * longest:
+            if abs(step[e]) > 0.5 * longest:
                 runners += 1
         before = gaps
         gaps = moved_gaps(gaps, step)
         last = step
+        if count == passed.shape[0]:
+            longer = np.empty((2 * count, edges))
+            longer[:count] = passed
+            passed = longer
+        passed[count] = gaps.ravel()
+        count += 1
         if narrowest(gaps) < law.smallest:
-            return gaps, NARROW, fields, tangents, kinds
+            return gaps, NARROW, fields, tangents, kinds, passed[:count], astray
         if size < law.near:
-            return gaps, RESTING, fields, tangents, kinds
-    return gaps, UNFINISHED, fields, tangents, kinds
+            return gaps, RESTING, fields, tangents, kinds, passed[:count], astray
+    return gaps, UNFINISHED, fields, tangents, kinds, passed[:count], astray
+
+
+@compiled
+def _distance(at: Array, track: Array, longest: float) -> float:
+    """Largest distance of an edge from the track, where that is nearest; inf if it is far."""
+    least = np.inf
+    for i in range(track.shape[0] - 1):
+        along = 0.0
+        square = 0.0
+        widest = 0.0
+        for e in range(at.shape[0]):
+            way = track[i + 1, e] - track[i, e]
+            off = at[e] - track[i, e]
+            widest = max(widest, abs(way), 0.25 * abs(off))
+            if widest > 2.5 * longest:  # far, or between the tracks of two descents
+                break
+            along += way * off
+            square += way * way
+        if widest > 2.5 * longest or square == 0:
+            continue
+        share = min(max(along / square, 0.0), 1.0)
+        worst = 0.0
+        for e in range(at.shape[0]):
+            way = track[i + 1, e] - track[i, e]
+            worst = max(worst, abs(at[e] - track[i, e] - share * way))
+        least = min(least, worst)
+    return least
 
 
 @compiled

@@ -10,7 +10,7 @@ Hessian of the energy divided by C).
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from solver.method import PathError
 from solver.profile import Array
 from solver.sharp.balance import Law
 from solver.sharp.coordinate import map_gaps
-from solver.sharp.descent import LOST, NARROW, RESTING, descend
+from solver.sharp.descent import LOST, MET, NARROW, RESTING, descend
 from solver.sharp.equilibrium import equilibrium
 from solver.sharp.far import solve_many_plain
 from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution, choose_kinds
@@ -46,6 +46,29 @@ class Counters:
     openings: int = 0
     newton_steps: int = 0
     descent_steps: int = 0
+
+
+@dataclass
+class Track:
+    """Edges that a descent went through, for another one to be compared with.
+
+    Attributes
+    ----------
+    ways : list of arrays, shape (n, 2L)
+        One for every set of gaps on the way.
+    astray, met : bool
+        Whether the other descent has left the track, and come back to it.
+    """
+
+    ways: list[Array] = field(default_factory=list)
+    astray: bool = False
+    met: bool = False
+
+    def of(self, edges: int) -> Array:
+        """The track where there are so many edges."""
+        return np.concatenate(
+            [np.empty((0, edges)), *(w for w in self.ways if w.shape[1] == edges)]
+        )
 
 
 class FullContact(Exception):
@@ -213,17 +236,24 @@ class EdgeMechanics:
         return Point(prescribed, field, rate, slope)
 
     def relax(
-        self, gaps: Array, prescribed: float, reach: float, *, equal_speeds: bool = False
+        self,
+        gaps: Array,
+        prescribed: float,
+        reach: float,
+        *,
+        equal_speeds: bool = False,
+        track: Track | None = None,
     ) -> Point | Array:
         """Descend in energy, what is prescribed being fixed, to the next minimum.
 
-        By linear kinetics, or with ``equal_speeds`` by the rule it is compared with.
+        By linear kinetics, which leaves its ``track``; or with ``equal_speeds`` by the rule it is
+        compared with, until that has met the track.
 
         Returns
         -------
         Point or array
             The minimum, or the gaps without those gaps and patches that have closed or vanished on
-            the way (an empty array when no contact is left).
+            the way (an empty array when no contact is left, or the track is met).
 
         Raises
         ------
@@ -238,15 +268,28 @@ class EdgeMechanics:
         left = _DESCENT_LIMIT
         kinds = _ANY
         rests = 0
+        track = track or Track()
+        other = track.of(gaps.size if equal_speeds else 0)
         while left > 0:
-            lower = descend if len(gaps) < self.many else descend_many
-            gaps, ended, fields, tangents, kinds = lower(
-                gaps, prescribed, left, kinds, equal_speeds, law, RULES, self.source.panels
-            )
+            panels = self.source.panels
+            if len(gaps) < self.many:
+                gaps, ended, fields, tangents, kinds, way, track.astray = descend(
+                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels, other,
+                    track.astray,
+                )  # fmt: skip
+                if not equal_speeds:
+                    track.ways.append(way)
+            else:
+                gaps, ended, fields, tangents, kinds = descend_many(
+                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels
+                )
             self.count.fields += fields
             self.count.descent_steps += fields
             self.count.derivatives += tangents
             left -= fields
+            if ended == MET:
+                track.met = True
+                return np.empty((0, 2))
             if ended == LOST:
                 raise PathError(f"there is no field of these edges at q0 s = {prescribed:.9g}")
             if ended == NARROW:

@@ -22,6 +22,7 @@ from solver.sharp.field import (
     Kinds,
     PlainSolution,
     Rules,
+    Solution,
     choose_kinds,
     edge_openings,
     plain,
@@ -31,6 +32,15 @@ from solver.sharp.linear import is_definite
 from solver.sharp.source import Panels
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+
+
+@compiled
+def _faint(of: Solution, residual: Array, law: Law) -> bool:
+    """Whether the force on every edge is that of rounding."""
+    for e in range(residual.shape[0]):
+        if not abs(residual[e] * (2 * of.opening[e] - residual[e])) <= law.faint:
+            return False
+    return True
 
 
 @compiled
@@ -49,8 +59,8 @@ def equilibrium(
     Returns whether a stable equilibrium was found with no edge moving further than ``reach``, its
     gaps, its solution, the rate dn/dd of every edge along the branch (d is what is prescribed),
     dY/dd along it (Y is p, under a load q0 s), and the number of corrections. ``least`` are the
-    least kinds of the gaps, or empty. If not
-    ``patient``, edges out of equilibrium by no more than ``law.near`` are taken as they are.
+    least kinds of the gaps, or empty. If not ``patient``, edges out of equilibrium by no more than
+    ``law.near``, or by forces that are rounding, are taken as they are.
 
     Raises
     ------
@@ -81,7 +91,7 @@ def equilibrium(
             _, matrix = symmetric(of, tangent, law.overlapping)
             found = is_definite(matrix) or not patient
             break
-        if not patient and size <= law.near:
+        if not patient and (size <= law.near or _faint(of, residual, law)):
             found = True
             break
         travelled += step

@@ -10,7 +10,7 @@ import numpy as np
 from solver.jumps import Branch
 from solver.method import ContactState, PathError
 from solver.profile import Array
-from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point, outward
+from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point, Track, outward
 from solver.sharp.states import States, Trace
 from solver.sharp.touch import Nucleation, Touch
 
@@ -137,22 +137,24 @@ class Jumps:
         """
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
-        point = self._relax(gaps, at)
+        track = Track()
+        point = self._relax(gaps, at, track=track)
         if not rivals and self._may_have_raced(gaps, point):
             try:
-                rival = self._relax(gaps, at, equal_speeds=True)
+                rival = self._relax(gaps, at, equal_speeds=True, track=track)
             except FullContact as full:
                 rivals.append(full)
             else:
-                if not self._alike(rival, point):
+                if not track.met and not self._alike(rival, point):
                     rivals.append(rival)
         return point
 
-    def _relax(self, gaps: Array, at: float, *, equal_speeds: bool = False) -> Point | None:
+    def _relax(
+        self, gaps: Array, at: float, *, equal_speeds: bool = False, track: Track | None = None
+    ) -> Point | None:
+        reach = CORRECTED * self.edges.wave
         while len(gaps):
-            found = self.edges.relax(
-                gaps, at, CORRECTED * self.edges.wave, equal_speeds=equal_speeds
-            )
+            found = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds, track=track)
             if isinstance(found, Point):
                 return found
             gaps = found

@@ -15,7 +15,8 @@ import numpy as np
 from solver.compiled import compiled
 from solver.profile import Array
 
-_CLOSE = 0.9  # a step is long enough at this share of the limit
+_CLOSE = 0.97  # a step is long enough at this share of the limit
+_AIM = 0.99  # the share that is aimed at
 _TRIES = 60
 _SETTLED = 36.0  # exp(-36) is rounding
 _FAINT = 1e-3  # share of the force below which an unstable mode is not pulled
@@ -83,7 +84,9 @@ def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: 
         return step
     low = 0.0
     high = np.inf
-    time = 1 / fastest
+    below = 0.0  # of the limit, at the time ``low``
+    above = np.inf
+    time = _AIM / fastest
     for _ in range(_TRIES):
         modes = _progress(values, parts, time)
         worst = 0.0
@@ -95,8 +98,10 @@ def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: 
             worst = max(worst, abs(total) / limit[e])
         if worst > 1 or not np.isfinite(worst):
             high = time
+            above = worst
         else:
             low = time
+            below = worst
             if worst > _CLOSE:
                 return step
             slowest = np.inf
@@ -106,11 +111,13 @@ def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: 
             if slowest * time > _SETTLED:
                 return step
         if np.isinf(high):
-            time *= 4
-        elif low == 0:
-            time *= 0.25
+            time *= min(4.0, max(1.02, _AIM / worst))
+        elif not above < 4:
+            time = 0.5 * (low + high) if high < 2 * low or low == 0 else np.sqrt(low * high)
         else:
-            time = 0.5 * (low + high) if high < 2 * low else np.sqrt(low * high)
+            # between the two times, where the line through both would be at the aim
+            share = (_AIM - below) / (above - below)
+            time = low + min(max(share, 0.02), 0.98) * (high - low)
     # an edge passes its limit within rounding of the time: a step in the flow's last direction
     for e in range(n):
         step[e] /= worst

@@ -110,9 +110,9 @@ def descend_many(
                 window, outside, outer = open_window(
                     of, parts, edges, first, width, 0.0, law, rules, panels
                 )
-            moved, ended, some, more, moved_kinds = descend(
+            moved, ended, some, more, moved_kinds, _, _ = descend(
                 window, prescribed, min(_STEPS, most - fields), window_kinds, equal_speeds, law,
-                rules, with_outside(panels, outside),
+                rules, with_outside(panels, outside), np.empty((0, window.size)), False,
             )  # fmt: skip
             fields += some
             tangents += more
