@@ -140,6 +140,11 @@ def test_figures_along_an_axis_hold_the_means_there(data):
     item = next(i for i in along_axes(data) if i.name == "loss_along_max_penetration")
     with style():
         figure = item.draw(data)
+    for axes in figure.axes:
+        low, high = axes.get_ylim()
+        for container in axes.containers:
+            values = container.lines[0].get_ydata()
+            assert low <= min(values) <= max(values) <= high
     lines = [axes.containers[1].lines[0] for axes in figure.axes]  # the second γ
     for line, name, unit, hurst in zip(
         lines,

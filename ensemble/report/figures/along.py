@@ -81,8 +81,8 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
                 if name == "largest_contact_fraction":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
-            if name != "pull_off_penetration":
-                axes.set_ylim(bottom=0)
+        if name != "pull_off_penetration":
+            row[0].set_ylim(bottom=0)  # when the panels, which share it, are all drawn
         row[0].set_ylabel(label)
     for axes, hurst in zip(grid[0], hursts, strict=True):
         label_panel(axes, f"H = {hurst:g}")
