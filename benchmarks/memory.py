@@ -1,7 +1,7 @@
 """Do minor loops come back to the state that they left? Counts it on random rough profiles.
 
 Each path loads to 0.8 h_max, then wanders: unloading, loading and unloading again between random
-turning points, and goes out. Every minor loop on the way is a trial. ``python examples/memory.py``.
+turning points, and goes out. Every minor loop on the way is a trial.
 """
 
 from __future__ import annotations
