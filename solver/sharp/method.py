@@ -37,7 +37,7 @@ from solver.sharp.touch import Nucleation
 _RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
 _NOISE = 1e-13  # of h_max: no jump is located more finely
 # Error of the loss that the field's makes, in units of the accuracy, with room to spare.
-_FIELD_SHARE = 0.02
+_FIELD_SHARE = 0.05
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
 # A jump may be late by a work of this share of its drop (in units of the accuracy), a jump whose
 # drop is negligible beside the work of adhesion by that share of the latter.

@@ -136,3 +136,24 @@ def test_edges_that_are_no_numbers_have_no_field():
     assert method.edges.equilibrium(gaps, 1e-3, 0.1) is None
     with pytest.raises(PathError, match="no field"):
         method.edges.relax(gaps, 1e-3, 0.1)
+
+
+def test_the_error_told_covers_the_error_made_on_random_scenes():
+    """Against a run at a hundredth of the accuracy; and it is not told ten times too large."""
+    rng = np.random.default_rng(11)
+    told = []
+    for _ in range(6):
+        n0, ratio = int(rng.integers(2, 4)), int(rng.choice([2, 3]))
+        profile = profile_of(rng.uniform(0.2, 0.9), n0, ratio, int(rng.integers(10**6)), "rayleigh")
+        share = 10 ** rng.uniform(-2.5, 0.3)
+        gamma = share * SOLID.modulus * 1e-12 * 2 * np.pi / PERIOD * n0
+        depth = rng.uniform(0.3, 0.95)
+        result, tight = (
+            loop(profile, gamma, max_penetration=depth, load_steps=8, accuracy=accuracy)
+            for accuracy in (1e-3, 1e-5)
+        )
+        error = abs(result.loss - tight.loss_from_drops)
+        assert error < result.loss_error
+        assert min(jump.energy_drop for jump in result.jumps) > 0
+        told.append(result.loss_error / error)
+    assert np.median(told) < 10
