@@ -48,6 +48,11 @@ def _loss(cell: Cell) -> str:
     return f"W~ = {dimensionless:.3g} or {1e3 * loss:.3g} mJ/m² at {cell_name(cell)}"
 
 
+def _percent(share: float) -> str:
+    """Return two digits of a share, in percent and without an exponent."""
+    return f"{float(f'{100 * share:.2g}'):g}"
+
+
 def _statistical(data: Aggregate) -> str:
     halves = [
         (found.high - found.low) / 2 / abs(found.mean)
@@ -61,9 +66,9 @@ def _statistical(data: Aggregate) -> str:
     if not halves:
         return f"With {many} {plural} of each {point}, how well the mean is known cannot be said."
     width = (
-        f"{100 * min(halves):.2g} to {100 * max(halves):.2g} %"
+        f"{_percent(min(halves))} to {_percent(max(halves))} %"
         if len(halves) > 1
-        else f"{100 * halves[0]:.2g} %"
+        else f"{_percent(halves[0])} %"
     )
     return (
         f"With {many} {plural} of each {point}, the 95 % interval of the mean loss is its mean "
