@@ -95,7 +95,10 @@ def fake_engine(behaviour: str) -> Engine:
 
 if __name__ == "__main__":
     from ensemble.command import run
+    from ensemble.command.main import main
 
+    if sys.argv[2] != "run":
+        sys.exit(main(sys.argv[2:]))
     parser = argparse.ArgumentParser(prog="adhesis run")
     run.add_arguments(parser)
     args = parser.parse_args(sys.argv[3:])
