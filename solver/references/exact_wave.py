@@ -8,16 +8,17 @@ state by state. For a single wave only; the adhesive area is measured along the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from solver.jumps import Branch, Jump
-from solver.method import ContactState, Fields, Method, MethodReport, Opening, Path
+from solver.method import ContactState, Fields, Method, MethodReport, Opening, Path, PathError
 from solver.problem import Problem
 from solver.profile import Array
-from solver.references.single_wave import SingleWave
+from solver.references.single_wave import SingleWave, WaveLoop
 
 
 @dataclass(frozen=True)
@@ -60,33 +61,45 @@ class ExactWave(Method):
             measure="arc",
         )
 
-    def follow(self, state: ContactState, separation: float) -> Path:
+    def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the stable branch; see :class:`~solver.method.Method`."""
-        branch: Branch = "loading" if separation <= state.separation else "unloading"
+        control, amplitude = self.problem.control, self.wave.amplitude
+        branch: Branch = "unloading"
+        if prescribed <= self.problem.prescribed_in(state):
+            branch = "loading"
         states: list[ContactState] = []
         jumps: list[Jump] = []
+        first = control.prescribed(amplitude, 0.0)
+        apart = state.separation if control.is_load else prescribed
         if not state.patches:
-            if separation > self.wave.amplitude or self._contact_width(separation) == 0:
-                return Path((self.detached(separation),), ())
-            before = self.detached(self.wave.amplitude)
-            state = self._state(self.wave.touch_half_width)
+            if prescribed > first or self._contact_width(prescribed) == 0:
+                return Path((self.detached(apart),), ())
+            before = self.detached(amplitude)
+            state = self._state(self._loop.touch_half_width)
             states += [before, state]
             if state.patches:
                 jumps.append(Jump.between(before, state, branch, self.wave.period))
-            if separation == self.wave.amplitude:
+            if prescribed == first:
                 return Path(tuple(states), tuple(jumps))
         a_from = state.internal or 0.0  # without adhesion contact grows from a point
-        a_to = self._contact_width(separation)
+        a_to = self._contact_width(prescribed)
         way = np.linspace(a_from, a_to, self.states_per_step + 1)[1:]
         states += [self._state(float(a)) for a in way[:-1]]
-        if separation > self.wave.loop.fold_separation:
-            before = self._state(self.wave.fold_half_width)
-            after = self.detached(self.wave.loop.fold_separation)
-            states += [before, after, self.detached(separation)]
+        loop = self._loop
+        end = control.prescribed(loop.fold_separation, loop.fold_mean_stress)
+        if prescribed > end:
+            before = self._state(loop.fold_half_width)
+            after = self.detached(loop.fold_separation if control.is_load else end)
+            states += [before, after]
+            if not control.is_load:
+                states.append(self.detached(prescribed))
             if before.patches:
-                jumps.append(Jump.between(before, after, branch, self.wave.period))
+                jump = Jump.between(before, after, branch, self.wave.period)
+                if control.is_load:  # the load's own work is not counted (solver.control)
+                    jump = replace(jump, energy_drop=before.energy / self.wave.period)
+                jumps.append(jump)
         else:
-            states.append(self._state(a_to, separation))
+            states.append(self._state(a_to, prescribed if control.is_fixed else None))
         return Path(tuple(states), tuple(jumps))
 
     def fields(self, state: ContactState, n: int) -> Fields:
@@ -113,9 +126,31 @@ class ExactWave(Method):
         """Return the only choice there is."""
         return ExactWaveReport(self.name, self.chosen, self.states_per_step)
 
-    def _contact_width(self, separation: float) -> float:
-        """Half-width at ``separation``, or at the end of the branch beyond it."""
-        return self.wave.half_width(min(separation, self.wave.loop.fold_separation))
+    @cached_property
+    def _loop(self) -> WaveLoop:
+        """The exact loop under the control."""
+        control = self.problem.control
+        return self.wave.loop if control.is_fixed else self.wave.loop_under(control.stiffness)
+
+    def _contact_width(self, prescribed: float) -> float:
+        """Half-width where x is ``prescribed``, or at the end of the branch beyond it.
+
+        Raises
+        ------
+        PathError
+            If the wave has run to full contact.
+        """
+        control, loop = self.problem.control, self._loop
+        end = control.prescribed(loop.fold_separation, loop.fold_mean_stress)
+        if control.is_fixed:
+            return self.wave.half_width(min(prescribed, end))
+        if prescribed >= end:
+            return loop.fold_half_width
+        drive = -prescribed if control.is_load else self.wave.amplitude - prescribed
+        try:
+            return self.wave.half_width_under(control.stiffness, drive)
+        except ValueError:
+            raise PathError(self.problem.full_contact(prescribed)) from None
 
     def _state(self, a: float, separation: float | None = None) -> ContactState:
         s = float(self.wave.separation(a)) if separation is None else separation
@@ -124,12 +159,15 @@ class ExactWave(Method):
         left = (self.crest - a) % self.wave.period
         edges: Array = np.array([[left, left + 2 * a]])
         adhesion = float(self.wave.adhesion_energy(a))
+        stress, wave = float(self.wave.mean_stress(a)), self.wave
+        held = self.problem.control.potential(0.0, s, stress, wave.amplitude, wave.period)
         return ContactState(
             separation=s,
             edges=edges,
-            mean_stress=float(self.wave.mean_stress(a)),
+            mean_stress=stress,
             elastic_energy=float(self.wave.energy(a)) - adhesion,
             adhesion_energy=adhesion,
             contact_fraction=2 * a / self.wave.period,
+            hold_energy=held,
             internal=a,
         )

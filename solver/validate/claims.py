@@ -279,8 +279,9 @@ def parabola(judge: Judge) -> Iterator[Row]:
 
     errors = result.mean_stress[on] - parabola_load(a, radius, MODULUS, gamma) / PERIOD
     bounds = curved(a) + judge.unknown_width(wave, a, result.separation[on])
-    own = np.abs(wave.mean_stress(a) * PERIOD - parabola_load(a, radius, MODULUS, gamma)).max()
-    note = f"the wave itself differs from the parabola by up to {own / PERIOD / p_star:.1e}"
+    own = np.abs(wave.mean_stress(a) * PERIOD - parabola_load(a, radius, MODULUS, gamma))
+    most = own.max(initial=0) / PERIOD / p_star
+    note = f"the wave itself differs from the parabola by up to {most:.1e}"
     claim = "parabola: mean stress / p* at a half-width"
     yield judge.worst(claim, errors / p_star, bounds / p_star, note)
     a_least, load = parabola_pull_off(radius, MODULUS, gamma)
