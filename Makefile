@@ -1,6 +1,6 @@
 # make help lists what there is. tools/setup.sh does nothing when nothing has changed.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test run test test-kills fuzz lint bench docs figures-of-docs check-package clean lock
+.PHONY: help setup setup-test setup-slurm run test test-kills fuzz lint bench docs figures-of-docs check-package clean lock
 SHELL := /bin/bash
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
@@ -15,24 +15,27 @@ setup:  ## everything that adhesis needs, into .venv (ADHESIS_APT=no: no system 
 	@tools/setup.sh
 
 setup-test:
+	@tools/setup.sh --test
+
+setup-slurm:
 	@tools/setup.sh --slurm
 
 run: setup  ## the example campaign on all cores, then its report (CAMPAIGN=file.toml for another)
 	@jobs/local.sh $(CAMPAIGN)
 
-lint: setup  ## ruff and mypy
+lint: setup-test  ## ruff and mypy
 	$(bin)/ruff check .
 	$(bin)/mypy
 
-test: setup-test  ## the whole test suite, MPI and (where it can be installed) Slurm included
+test: setup-slurm  ## the whole test suite, MPI and (where it can be installed) Slurm included
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
 	    export MPIRUN && exec $(bin)/python -m pytest -rs $(ARGS)
 
-test-kills: setup  ## 20 kills each of a worker, of rank 0 and of the whole job (about 4 minutes)
+test-kills: setup-test  ## 20 kills each of a worker, of rank 0 and of the whole job (about 4 minutes)
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
 	    export MPIRUN ADHESIS_KILLS=20 && exec $(bin)/python -m pytest tests/ensemble/test_mpi.py -k random_moments
 
-fuzz: setup  ## new examples from a seed that is printed, for FOR=600 seconds
+fuzz: setup-test  ## new examples from a seed that is printed, for FOR=600 seconds
 	@$(bin)/python tools/fuzz.py --seconds $(FOR)
 
 bench: setup  ## speed against error of each method
@@ -47,11 +50,8 @@ check-package: setup  ## wheel and source distribution, used in a bare environme
 figures-of-docs: setup  ## every figure of README and docs, by its command, stamped (half an hour)
 	$(bin)/python tools/figures_of_docs.py $(ARGS)
 
-lock: setup  ## requirements.lock from the versions in .venv
-	@{ sed '/^[^#]/d' requirements.lock; \
-	    $(bin)/pip freeze --all --exclude-editable | grep -vE '^(pip|wheel|mpich|h5py)\b'; \
-	    $(bin)/python -c 'import h5py; print(f"h5py=={h5py.__version__}")'; } > .setup/lock
-	mv .setup/lock requirements.lock
+lock: setup-test  ## both lists of versions, from .venv
+	$(bin)/python tools/lock.py
 
 clean:  ## removes .venv, caches and the example's results; built wheels stay in .setup
 	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build *.egg-info \

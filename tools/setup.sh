@@ -2,9 +2,11 @@
 # Sets up everything that `make run` and `make test` need, in .venv of this checkout.
 #
 #   tools/setup.sh            MPI, parallel HDF5, Python packages, adhesis itself
+#   tools/setup.sh --test     besides, what tests and linters need (requirements-test.lock)
 #   tools/setup.sh --slurm    besides, as root on Debian or Ubuntu, the Slurm that tests/ensemble/test_slurm.py starts
 #
-# Does nothing if nothing has changed since the last time. Environment:
+# What does not wait for one another is done side by side, and every ten seconds a line says what is
+# under way. Does nothing if nothing has changed since the last time. Environment:
 #   PYTHON            the interpreter for .venv (default: python3)
 #   HDF5_DIR          a parallel HDF5 to build h5py against (default: looked for)
 #   ADHESIS_APT=no   never install system packages
@@ -17,8 +19,17 @@ cd "$root"
 venv=$root/.venv
 log=$root/.setup/setup.log
 stamp=$venv/adhesis-setup
-slurm=no
-if [ "${1:-}" = --slurm ]; then slurm=yes; fi
+tests=no slurm=no
+for option; do
+    case $option in
+        --test) tests=yes ;;
+        --slurm) slurm=yes tests=yes ;;
+        *)
+            echo "setup: $option is none of --test, --slurm" >&2
+            exit 2
+            ;;
+    esac
+done
 SECONDS=0
 warnings=()
 
@@ -38,25 +49,67 @@ die() {
     say "failed: $*" >&2
     exit 1
 }
-# step TEXT COMMAND…: one line with the time it took; its output goes to the log.
-step() {
-    local text=$1 start=$SECONDS
-    shift
-    printf 'setup: %s ... ' "$text"
-    if "$@" >>"$log" 2>&1; then
-        printf '%d s\n' $((SECONDS - start))
-    else
-        printf 'failed after %d s\n' $((SECONDS - start))
-        return 1
-    fi
+
+# Parts: commands in the background, each with its log, waited for with words.
+declare -A pid text since code
+under_way=()
+# part NAME TEXT COMMAND…: begin it
+part() {
+    local name=$1
+    text[$name]=$2 since[$name]=$SECONDS
+    shift 2
+    set -m # a process group of its own, which can be ended whole
+    "$@" >".setup/$name.log" 2>&1 </dev/null &
+    set +m
+    pid[$name]=$!
+    under_way+=("$name")
 }
-# required TEXT COMMAND…: a step without which there is no installation.
+# finish NAME: wait for it; its exit code. A line for every part that ends meanwhile, and every ten
+# seconds one with what is under way.
+finish() {
+    local name still words last=$SECONDS
+    while :; do
+        still=() words=''
+        for name in "${under_way[@]}"; do
+            words="${text[$name]}: $((SECONDS - since[$name])) s"
+            if kill -0 "${pid[$name]}" 2>/dev/null; then
+                still+=("$name")
+                continue
+            fi
+            code[$name]=0
+            wait "${pid[$name]}" || code[$name]=$?
+            if [ "${code[$name]}" != 0 ]; then words+=", failed"; fi
+            cat ".setup/$name.log" >>"$log"
+            say "$words"
+        done
+        under_way=("${still[@]}")
+        if [ -n "${code[$1]:-}" ]; then return "${code[$1]}"; fi
+        if ((SECONDS - last >= 10)); then
+            last=$SECONDS words=''
+            for name in "${under_way[@]}"; do
+                words+="${words:+; }${text[$name]} ($((SECONDS - since[$name])) s)"
+            done
+            say "at $SECONDS s: $words"
+        fi
+        sleep 0.1
+    done
+}
+# step NAME TEXT COMMAND…: a part that is waited for at once
+step() { part "$@" && finish "$1"; }
+# required NAME: the end of a part without which there is no installation
 required() {
-    if ! step "$@"; then
-        tail -n 25 "$log" >&2
-        die "$1 (all of it in $log)"
+    if ! finish "$1"; then
+        tail -n 25 ".setup/$1.log" >&2
+        die "${text[$1]} (all of it in .setup/$1.log)"
     fi
 }
+end_parts() {
+    local name
+    for name in "${under_way[@]}"; do kill -- "-${pid[$name]}" 2>/dev/null || true; done
+}
+trap end_parts EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
 
 # ---------------------------------------------------------------------------------- what is here
 
@@ -125,17 +178,18 @@ find_parallel_hdf5() {
 }
 has_mpi() { command -v mpirun >/dev/null || command -v mpiexec >/dev/null; }
 
-key() {
-    cat pyproject.toml requirements.lock tools/setup.sh tools/mpi.sh
+key() { # FILE…: what an installation depends on
+    cat pyproject.toml tools/setup.sh tools/mpi.sh "$@"
     # Another place, interpreter or MPI module is another installation.
     printf '%s\n' "$root" "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" \
         "$(command -v mpicc)" "${HDF5_DIR:-}"
 }
-digest() { key | sha256sum | cut -d ' ' -f 1; }
-
-ready() {
-    find_python && [ -x "$venv/bin/adhesis" ] && [ -e "$stamp" ] && [ "$(cat "$stamp")" = "$(digest)" ]
+digest() { key "$@" | sha256sum | cut -d ' ' -f 1; }
+is_stamped() { # STAMP FILE…
+    [ -e "$1" ] && [ "$(cat "$1")" = "$(digest "${@:2}")" ]
 }
+ready() { find_python && [ -x "$venv/bin/adhesis" ] && is_stamped "$stamp" requirements.lock; }
+needs_tests() { [ "$tests" = yes ] && ! is_stamped "$stamp-test" requirements.lock requirements-test.lock; }
 
 # missing PACKAGE…: those that dpkg does not have
 missing() {
@@ -155,23 +209,62 @@ need_slurm() {
     [ "$slurm" = yes ] && ! command -v slurmctld >/dev/null && [ ! -e .setup/no-slurm ] && can_apt
 }
 install_slurm() {
-    if ! step "system packages for the test of the batch script: $SLURM" apt_install $SLURM; then
+    if ! step slurm "system packages for the test of the batch script: $SLURM" apt_install $SLURM; then
         # Tried once: the test is skipped and says so, and set-up stays quick.
         touch .setup/no-slurm
     fi
 }
 
+# Not the launcher's and not another installation's: what is in .venv is what is meant.
+unset PYTHONPATH PYTHONHOME
+export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 PIP_PROGRESS_BAR=off
+# The lists hold all that is needed, so nothing has to be resolved. Byte code is made of what is
+# imported, at the end: most of pandas and scipy never is.
+pip() { "$venv/bin/python" -m pip "$@"; }
+install() { pip install --no-deps --no-compile "$@"; }
+locked() { grep -E "^($1)==" requirements.lock; }
+install_tests() { install $(grep -v '^#' requirements-test.lock); }
+
 mkdir -p .setup/wheels
 if ready; then
-    if need_slurm; then install_slurm; else say "nothing to do"; fi
+    if needs_tests; then
+        : >"$log"
+        part tests "packages for tests and linters" install_tests
+        required tests
+        digest requirements.lock requirements-test.lock >"$stamp-test"
+        if need_slurm; then install_slurm; fi
+        say "done in $SECONDS s"
+    elif need_slurm; then
+        install_slurm
+    else
+        say "nothing to do"
+    fi
     exit 0
 fi
 : >"$log"
 
-# ------------------------------------------------------------------------------- system packages
+# ------------------------------------------------------------------- system packages, build tools
 
-system_packages() {
-    local wanted=''
+make_venv() {
+    if [ ! -x "$venv/bin/pip" ] || ! "$venv/bin/python" -m pip --version; then
+        "$python" -m venv "$venv"
+    fi
+}
+install_tools() { make_venv && install $(locked 'setuptools|Cython|numpy|pkgconfig|packaging'); }
+begin_tools() {
+    say "using $("$python" -V) ($python)"
+    if [ -x "$venv/bin/python" ] &&
+        [ "$("$venv/bin/python" -c 'import sys; print(sys.version, sys.base_prefix)' 2>/dev/null)" != \
+            "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" ]; then
+        say "replacing .venv, which belongs to another Python"
+        rm -rf "$venv"
+    fi
+    rm -f "$stamp" "$stamp-test"
+    part tools "virtual environment .venv with build tools" install_tools
+}
+# Sets wanted: the system's packages that are missing
+missing_system_packages() {
+    wanted=''
     if ! find_python; then wanted="python3 python3-venv python3-dev"; fi
     if [ -n "${python:-}" ] && [[ $python = /usr/bin/* ]]; then
         # Debian's own interpreter comes without these; pyenv, conda and modules bring them along.
@@ -180,14 +273,19 @@ system_packages() {
     fi
     if ! find_parallel_hdf5 || ! has_mpi; then wanted+=" $SYSTEM"; fi
     wanted=$(missing $wanted)
-    if [ -n "$wanted" ]; then
-        step "system packages: ${wanted% }" apt_install $wanted || warn "apt-get could not install ${wanted% }"
-    fi
 }
 
-if can_apt; then system_packages; fi
+wanted=
+if can_apt; then missing_system_packages; fi
+if [ -n "$wanted" ]; then
+    part system "system packages ${wanted% }" apt_install $wanted
+    # A Python that is there and complete need not wait.
+    if [[ $wanted != *python3* ]] && find_python && has_venv; then begin_tools; fi
+    finish system || warn "apt-get could not install ${wanted% } (see .setup/system.log)"
+fi
 find_python || die "Python 3.11 or newer is missing (say which with PYTHON=…)"
 has_venv || die "the venv module of $python is missing (Debian: apt-get install python3-venv)"
+if [ -z "${pid[tools]:-}" ]; then begin_tools; fi
 
 # --------------------------------------------------------------------------------- what to build
 
@@ -203,38 +301,34 @@ elif ! has_headers; then
 fi
 if ! has_mpi; then why_serial=${why_serial:-"no mpirun in PATH"}; fi
 
-# ------------------------------------------------------------------------------- Python packages
+# ------------------------------------------- side by side: h5py, the solver's code, all other packages
 
-say "using $("$python" -V) ($python)"
-if [ -x "$venv/bin/python" ] &&
-    [ "$("$venv/bin/python" -c 'import sys; print(sys.version, sys.base_prefix)' 2>/dev/null)" != \
-        "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" ]; then
-    say "replacing .venv, which belongs to another Python"
-    rm -rf "$venv"
-fi
-if [ ! -x "$venv/bin/pip" ] || ! "$venv/bin/python" -m pip --version >/dev/null 2>&1; then
-    required "virtual environment .venv" "$python" -m venv "$venv"
-fi
-rm -f "$stamp"
-# Not the launcher's and not another installation's: what is in .venv is what is meant.
-unset PYTHONPATH PYTHONHOME
-export PIP_DISABLE_PIP_VERSION_CHECK=1
-pip() { "$venv/bin/python" -m pip --no-input "$@"; }
-locked() { grep -E "^($1)==" requirements.lock; }
+SOLVER='numba|llvmlite|scipy|pyFFTW|threadpoolctl'
+TOOLS='setuptools|Cython|numpy|pkgconfig|packaging'
 
 build_h5py() {
     # Two compile jobs and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
     # Without isolation, or the build would first compile an old mpi4py from source.
     local config=$root/.setup/build.cfg
     printf '[build_ext]\nparallel = 2\n' >"$config"
-    DIST_EXTRA_CONFIG=$config CC=$compiler HDF5_MPI=ON HDF5_DIR=$hdf5 CFLAGS='-O1 -g0 -w' \
-        "$venv/bin/python" -m pip --no-input wheel --no-cache-dir --no-build-isolation --no-deps \
-        --no-binary=h5py --wheel-dir "$wheels.new" "h5py==$H5PY" &&
+    install $(locked mpi4py) &&
+        DIST_EXTRA_CONFIG=$config CC=$compiler HDF5_MPI=ON HDF5_DIR=$hdf5 CFLAGS='-O1 -g0 -w' \
+            pip wheel --no-cache-dir --no-build-isolation --no-deps \
+            --no-binary=h5py --wheel-dir "$wheels.new" "h5py==$H5PY" &&
         rm -rf "$wheels" && mv "$wheels.new" "$wheels"
 }
+compile_kernels() {
+    PYTHONPATH=$root OPENBLAS_NUM_THREADS=1 "$venv/bin/python" -c '
+import sys
+from ensemble.command.main import main
+sys.exit(main(["warm"]))'
+}
+install_rest() {
+    install $(grep -Ev "^(#|h5py==|($SOLVER|$TOOLS)==)" requirements.lock) &&
+        if [ "$tests" = yes ]; then install_tests; fi
+}
 
-required "Python packages: build tools" pip install --quiet $(locked 'setuptools|Cython|numpy|pkgconfig|packaging|mpi4py')
-build=
+required tools
 if [ -z "$why_serial" ]; then
     # One folder for each combination: a serial wheel or one of another MPI must not be taken for it.
     wheels=.setup/wheels/$({
@@ -247,56 +341,52 @@ if [ -z "$why_serial" ]; then
     if compgen -G "$wheels/h5py-*.whl" >/dev/null; then
         say "h5py for $hdf5: built before, in $wheels"
     else
-        say "h5py for $hdf5: building in the background (1-4 min)"
         rm -rf "$wheels.new"
-        start=$SECONDS
-        build_h5py >.setup/h5py.log 2>&1 &
-        build=$!
+        part h5py "building h5py for $hdf5" build_h5py
     fi
 fi
-required "Python packages: the rest of requirements.lock" pip install --quiet $(grep -Ev '^(#|h5py==)' requirements.lock)
-
-# Needs nothing of h5py, and takes the other core while that is built.
-compile_kernels() {
-    rm -f .setup/warm.log
-    PYTHONPATH=$root OPENBLAS_NUM_THREADS=1 "$venv/bin/python" -c '
-import sys
-from ensemble.command.main import main
-sys.exit(main(["warm"]))' >.setup/warm.log 2>&1
-}
-if step "compiling the solver for this processor (once)" compile_kernels; then
-    say "$(tail -n 1 .setup/warm.log)"
+part solver "packages of the solver" install $(locked "$SOLVER")
+required solver
+part kernels "compiling the solver for this processor (once)" compile_kernels
+part rest "all other packages" install_rest
+required rest
+if finish kernels; then
+    say "$(tail -n 1 .setup/kernels.log)"
 else
-    cat .setup/warm.log >>"$log"
-    warn "the solver is not compiled yet (see .setup/warm.log); the first loop does it"
+    warn "the solver is not compiled yet (see .setup/kernels.log); the first loop does it"
 fi
-
-if [ -n "$build" ]; then
-    printf 'setup: h5py ... '
-    if wait "$build"; then
-        printf '%d s\n' $((SECONDS - start))
-    else
-        printf 'failed\n'
-        tail -n 15 .setup/h5py.log
-        why_serial="h5py could not be built against $hdf5 (see .setup/h5py.log)"
-    fi
+if [ -n "${pid[h5py]:-}" ] && ! finish h5py; then
+    tail -n 15 .setup/h5py.log
+    why_serial="h5py could not be built against $hdf5 (see .setup/h5py.log)"
 fi
 install_h5py() { # WHAT… from a wheel, whatever is installed now
-    pip install --quiet --no-deps --force-reinstall "$@"
+    install --force-reinstall "$@"
 }
 has_mpi_h5py() { "$venv/bin/python" -c 'import h5py, sys; sys.exit(not h5py.get_config().mpi)' 2>>"$log"; }
 if [ -z "$why_serial" ]; then
-    step "installing h5py with parallel HDF5" install_h5py "$wheels"/h5py-*.whl || true
+    step installing "installing h5py with parallel HDF5" install_h5py "$wheels"/h5py-*.whl || true
     has_mpi_h5py || why_serial="the h5py in $wheels has no MPI or cannot be loaded"
 fi
 if [ -n "$why_serial" ]; then
-    required "installing h5py without MPI" install_h5py --only-binary=h5py "h5py==$H5PY"
+    part serial "installing h5py without MPI" install_h5py --only-binary=h5py "h5py==$H5PY"
+    required serial
 fi
 if ! has_mpi; then
-    step "no mpirun in PATH: one from the package mpich" pip install --quiet "mpich==$MPICH" ||
+    step mpich "no mpirun in PATH: one from the package mpich" install "mpich==$MPICH" ||
         warn "no MPI: install one (Debian: openmpi-bin); adhesis run works in one process only"
 fi
-required "adhesis, editable" pip install --quiet --no-deps --no-build-isolation --editable .
+finish_installation() {
+    install --no-build-isolation --editable . || return 1
+    # Byte code of what commands import, also for users who may not write here.
+    "$venv/bin/python" -c '
+from importlib import import_module
+from ensemble.command.main import COMMANDS
+for name in COMMANDS:
+    import_module(f"ensemble.command.{name}")
+import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, xarray'
+}
+part adhesis "adhesis itself" finish_installation
+required adhesis
 
 # ----------------------------------------------------------------- the mpirun that fits, and Slurm
 
@@ -307,7 +397,7 @@ sees_two() { # MPIRUN: do two ranks that it starts see each other?
         allow_ranks 2 1
         cd /tmp && timeout 60 "$1" -n 2 "$venv/bin/python" -c \
             'from mpi4py import MPI; print(MPI.COMM_WORLD.size, end=" ", flush=True)' \
-            </dev/null 2>>"$log"
+            </dev/null
     ) || return 1
     [ "${sizes//[[:space:]]/}" = 22 ] # the ranks' lines may run into each other
 }
@@ -323,7 +413,7 @@ choose_launcher() {
     done
     return 1
 }
-step "two ranks that see each other" choose_launcher ||
+step ranks "two ranks that see each other" choose_launcher ||
     warn "no mpirun here starts ranks that mpi4py sees as one job: adhesis run works in one process only (adhesis doctor tells more)"
 
 if need_slurm; then install_slurm; fi
@@ -331,5 +421,6 @@ if need_slurm; then install_slurm; fi
 if [ -n "$why_serial" ]; then
     warn "no parallel writing, rank 0 writes the results file: $why_serial"
 fi
-digest >"$stamp"
+if [ "$tests" = yes ]; then digest requirements.lock requirements-test.lock >"$stamp-test"; fi
+digest requirements.lock >"$stamp"
 say "done in $SECONDS s (adhesis doctor tells what was found)"

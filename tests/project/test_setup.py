@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.metadata
 import os
 import re
 import shutil
@@ -14,6 +15,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPTS = sorted([*ROOT.glob("jobs/*.sh"), *ROOT.glob("tools/*.sh"), ROOT / ".ci" / "run"])
@@ -30,8 +32,8 @@ def names(requirements: list[str]) -> set[str]:
     return {re.split(r"[^\w.-]", text)[0].lower() for text in requirements}
 
 
-def locked() -> dict[str, str]:
-    lines = (ROOT / "requirements.lock").read_text().splitlines()
+def locked(name: str = "requirements.lock") -> dict[str, str]:
+    lines = (ROOT / name).read_text().splitlines()
     pairs = [line.split("==") for line in lines if line and not line.startswith("#")]
     return {name.lower().replace("_", "-"): version for name, version in pairs}
 
@@ -74,17 +76,32 @@ def test_dependencies_are_what_is_imported() -> None:
     assert imported | LOADED_BY_NAME == {IMPORTED_AS.get(name, name) for name in declared}
 
 
-def test_lock_holds_all_that_is_declared_and_nothing_of_this_machine() -> None:
+def test_lists_of_versions_hold_all_that_is_declared_and_nothing_of_this_machine() -> None:
     extras = project()["optional-dependencies"]
     assert isinstance(extras, dict)
-    declared = names(list(project()["dependencies"]))  # type: ignore[call-overload]
-    declared |= names(extras["dev"]) | names(extras["mpi"])
-    assert declared <= set(locked())
+    runs, tests = locked(), locked("requirements-test.lock")
+    assert names(list(project()["dependencies"]) + extras["mpi"]) <= set(runs)  # type: ignore[call-overload]
     # What building h5py without isolation needs in the environment.
-    assert {"setuptools", "cython", "pkgconfig", "packaging", "numpy", "mpi4py"} <= set(locked())
-    text = (ROOT / "requirements.lock").read_text()
-    assert "://" not in text
-    assert "@" not in text
+    assert {"setuptools", "cython", "pkgconfig", "packaging", "numpy", "mpi4py"} <= set(runs)
+    assert names(extras["dev"] + extras["instruments"]) <= set(tests)
+    assert set(runs) & set(tests) == set()  # `make run` installs no more than it needs
+    for name in ("requirements.lock", "requirements-test.lock"):
+        text = (ROOT / name).read_text()
+        assert "://" not in text
+        assert "@" not in text
+
+
+def test_lists_of_versions_leave_nothing_to_resolve() -> None:
+    """Set-up installs them without asking what else they need."""
+    for lists in (["requirements.lock"], ["requirements.lock", "requirements-test.lock"]):
+        listed = {name: version for file in lists for name, version in locked(file).items()}
+        for name in listed:
+            for text in importlib.metadata.requires(name) or ():
+                other = Requirement(text)
+                if other.marker is None or other.marker.evaluate({"extra": ""}):
+                    key = re.sub(r"[-_.]+", "-", other.name).lower()
+                    assert key in listed, f"{name} needs {other}"
+                    assert listed[key] in other.specifier, f"{name} needs {other}"
 
 
 def test_make_help_lists_every_target() -> None:
