@@ -11,7 +11,7 @@
 #   HDF5_DIR          a parallel HDF5 to build h5py against (default: looked for)
 #   ADHESIS_APT=no   never install system packages
 # Lists of packages are words on purpose.
-# shellcheck disable=SC2046,SC2086,SC2030,SC2031
+# shellcheck disable=SC2046,SC2086,SC2030,SC2031,SC2154
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -39,6 +39,7 @@ SYSTEM="gcc libc6-dev openmpi-bin libopenmpi-dev libhdf5-openmpi-dev"
 SLURM="slurmctld slurmd slurm-client munge"
 
 . tools/mpi.sh
+. tools/parts.sh
 
 say() { printf 'setup: %s\n' "$*"; }
 warn() {
@@ -50,62 +51,12 @@ die() {
     exit 1
 }
 
-# Parts: commands in the background, each with its log, waited for with words.
-declare -A pid text since code
-under_way=()
-# part NAME TEXT COMMAND…: begin it
-part() {
-    local name=$1
-    text[$name]=$2 since[$name]=$SECONDS
-    shift 2
-    set -m # a process group of its own, which can be ended whole
-    "$@" >".setup/$name.log" 2>&1 </dev/null &
-    set +m
-    pid[$name]=$!
-    under_way+=("$name")
-}
-# finish NAME: wait for it; its exit code. A line for every part that ends meanwhile, and every ten
-# seconds one with what is under way.
-finish() {
-    local name still words last=$SECONDS
-    while :; do
-        still=() words=''
-        for name in "${under_way[@]}"; do
-            words="${text[$name]}: $((SECONDS - since[$name])) s"
-            if kill -0 "${pid[$name]}" 2>/dev/null; then
-                still+=("$name")
-                continue
-            fi
-            code[$name]=0
-            wait "${pid[$name]}" || code[$name]=$?
-            if [ "${code[$name]}" != 0 ]; then words+=", failed"; fi
-            cat ".setup/$name.log" >>"$log"
-            say "$words"
-        done
-        under_way=("${still[@]}")
-        if [ -n "${code[$1]:-}" ]; then return "${code[$1]}"; fi
-        if ((SECONDS - last >= 10)); then
-            last=$SECONDS words=''
-            for name in "${under_way[@]}"; do
-                words+="${words:+; }${text[$name]} ($((SECONDS - since[$name])) s)"
-            done
-            say "at $SECONDS s: $words"
-        fi
-        sleep 0.1
-    done
-}
-# step NAME TEXT COMMAND…: a part that is waited for at once
-step() { part "$@" && finish "$1"; }
 # required NAME: the end of a part without which there is no installation
 required() {
     if ! finish "$1"; then
         tail -n 25 ".setup/$1.log" >&2
         die "${text[$1]} (all of it in .setup/$1.log)"
     fi
-}
-end_parts() {
-    local name
-    for name in "${under_way[@]}"; do kill -- "-${pid[$name]}" 2>/dev/null || true; done
 }
 trap end_parts EXIT
 trap 'exit 130' INT
@@ -179,7 +130,7 @@ find_parallel_hdf5() {
 has_mpi() { command -v mpirun >/dev/null || command -v mpiexec >/dev/null; }
 
 key() { # FILE…: what an installation depends on
-    cat pyproject.toml tools/setup.sh tools/mpi.sh "$@"
+    cat pyproject.toml tools/setup.sh tools/mpi.sh tools/parts.sh "$@"
     # Another place, interpreter or MPI module is another installation.
     printf '%s\n' "$root" "$("$python" -c 'import sys; print(sys.version, sys.base_prefix)')" \
         "$(command -v mpicc)" "${HDF5_DIR:-}"
