@@ -50,6 +50,13 @@ def warm_up(
     return seen
 
 
+def warm_missing(methods: Collection[str], say: Callable[[str], None]) -> None:
+    """Compile those methods whose code is not kept for this processor; see :func:`warm_up`."""
+    missing = [method for method in methods if compiled_in(method) is None]
+    if missing:
+        warm_up(missing, say)
+
+
 def _listed(methods: Collection[str]) -> str:
     words = sorted(methods, reverse=True)
     return f"the method{'s' if len(words) > 1 else ''} {' and '.join(words)}"

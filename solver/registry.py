@@ -45,6 +45,9 @@ def make_method(
     chosen = None
     if name == "auto":
         name, chosen = choose(problem, nodes_per_wave)
+    from solver.told import tell_of_compiling
+
+    tell_of_compiling()
     method: Method
     if name == "grid":
         from solver.grid.method import GridMethod

@@ -24,6 +24,7 @@ from solver.problem import Problem
 from solver.profile import self_affine_profile
 from solver.registry import make_method
 from solver.sharp.method import SharpMethod
+from solver.told import hushed
 
 COMPILED_METHODS = ("sharp", "grid")
 
@@ -63,7 +64,7 @@ def warm(
     Compilation
         How many functions were compiled now, and the time that it took.
     """
-    with watch_compilation(tell) as seen, _without_collecting():
+    with watch_compilation(tell) as seen, hushed(), _without_collecting():
         for method in methods:
             if to_installation:
                 with kept_in_installation():

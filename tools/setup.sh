@@ -293,12 +293,13 @@ if [ -z "$why_serial" ]; then
         say "h5py for $hdf5: built before, in $wheels"
     else
         rm -rf "$wheels.new"
-        part h5py "building h5py for $hdf5" build_h5py
+        say "building h5py for $hdf5"
+        part h5py "building h5py" build_h5py
     fi
 fi
 part solver "packages of the solver" install $(locked "$SOLVER")
 required solver
-part kernels "compiling the solver for this processor (once)" compile_kernels
+part kernels "compiling the solver" compile_kernels
 part rest "all other packages" install_rest
 required rest
 if finish kernels; then

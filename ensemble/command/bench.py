@@ -11,6 +11,7 @@ import csv
 import math
 import platform
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 from rich.console import Console
@@ -20,6 +21,9 @@ from rich.table import Table
 from ensemble.bench.compare import FULL, QUICK, Line, benchmark, growth, ratios
 from ensemble.bench.page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page, record
 from ensemble.errors import InputError
+from ensemble.ticker import tell, ticking
+from ensemble.warm import warm_missing
+from solver.warm import COMPILED_METHODS
 
 _DEFAULT = Path("out/benchmark")
 _WIDTH = 120
@@ -52,16 +56,21 @@ def execute(args: argparse.Namespace) -> int:
         args.to.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"--to is {str(args.to)!r}: {error.strerror}") from error
+    warm_missing(COMPILED_METHODS, tell)  # or the first run of each would do it, silently
     # A file or a pipe has no width of its own; the tables need this one.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True
-    ) as progress:
+    live = sys.stderr.isatty()
+    with (
+        Progress(
+            SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), transient=True
+        ) as progress,
+        nullcontext() if live else ticking("adhesis bench: measuring"),
+    ):
         task = progress.add_task("measuring")
 
         def show(line: Line) -> None:
             run = line.run
-            if not sys.stderr.isatty():  # no spinner there; half an hour of silence is too long
+            if not live:  # no spinner there; half an hour of silence is too long
                 print(run.scene.name, *line_cells(line), sep="  ", file=sys.stderr, flush=True)
             progress.update(task, description=f"{run.scene.title}: {run.method}, {run.described}")
 

@@ -28,6 +28,7 @@ from ensemble.loop.record import (
     write_json,
     write_npz,
 )
+from ensemble.ticker import tell
 from ensemble.trace.options import (
     add_reading_arguments,
     given,
@@ -35,7 +36,7 @@ from ensemble.trace.options import (
     trace_of,
     what_was_read,
 )
-from ensemble.warm import warm_up
+from ensemble.warm import warm_missing
 from solver.loop import LoopResult, Progress, run_loop, run_loops
 from solver.material import HalfSpace
 from solver.method import Branch, ContactState, Method, PathError
@@ -43,7 +44,6 @@ from solver.path import PathResult, run_path
 from solver.problem import Problem
 from solver.profile import Array, Profile, profile_from_heights, self_affine_profile
 from solver.registry import METHOD_NAMES, make_method
-from solver.warm import compiled_in
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 _PERIOD, _N0, _RATIO, _H_RMS = 2e-3 * np.pi, 10, 100, 1e-6
@@ -128,8 +128,7 @@ def execute(args: argparse.Namespace) -> int:
         method = make_method(
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
-    if compiled_in(method.name) is None:
-        warm_up([method.name], _quiet if args.quiet else _tell)
+    warm_missing([method.name], _quiet if args.quiet else tell)
     nodes = _field_nodes(args, method) if penetrations else 0
     picked = FieldStates(method, penetrations)
     try:
@@ -329,10 +328,6 @@ def _field_nodes(args: argparse.Namespace, method: Method) -> int:
 
 
 # ---------------------------------------------------------------------- progress
-
-
-def _tell(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 def _quiet(_: str) -> None:

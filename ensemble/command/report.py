@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ensemble.ticker import ticking
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
@@ -31,5 +33,6 @@ def execute(args: argparse.Namespace) -> int:
     """Write the report; returns 0."""
     from ensemble.report.write import write_report
 
-    write_report(args.file, args.to, beside=args.beside)
+    with ticking("adhesis report: tables and figures"):
+        write_report(args.file, args.to, beside=args.beside)
     return 0

@@ -6,12 +6,15 @@ import argparse
 import json
 import math
 import sys
+from contextlib import nullcontext
 from dataclasses import asdict
 
 from rich.console import Console
 from rich.table import Table
 
 from ensemble.errors import InputError
+from ensemble.ticker import tell, ticking
+from ensemble.warm import warm_missing
 from solver.validate.claims import METHODS, Row, validate
 
 _EXCEEDED = 1
@@ -34,14 +37,27 @@ def execute(args: argparse.Namespace) -> int:
     for name in args.method or ():
         if name not in METHODS:
             raise InputError(f"method is {name!r}: it must be one of {', '.join(METHODS)}")
-    rows = validate(names, on_row=_follow)
+    warm_missing(names, tell)  # a time of compiling is no time of a method
+    live = sys.stderr.isatty()
+    lines = not args.json and not sys.stdout.isatty()
+    judged: list[Row] = []
+
+    def follow(row: Row) -> None:
+        judged.append(row)
+        if live:
+            _follow(row)
+        if lines:
+            print(_line(row), flush=True)
+
+    def so_far() -> str:
+        return f"adhesis validate: {len(judged)} claims judged"
+
+    with nullcontext() if live else ticking(so_far):
+        rows = validate(names, on_row=follow)
     if args.json:
         print(json.dumps([_record(row) for row in rows], indent=1, allow_nan=False))
-    elif sys.stdout.isatty():
+    elif not lines:
         Console().print(_table(rows))
-    else:
-        for row in rows:
-            print(_line(row))
     failed = [row for row in rows if not row.passed]
     if not args.json:
         print(f"{len(rows) - len(failed)} of {len(rows)} claims hold")
@@ -49,9 +65,8 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _follow(row: Row) -> None:
-    """Show on stderr, if that is a terminal, how far the validation has come."""
-    if sys.stderr.isatty():
-        print(f"\r\033[K{row.method}: {row.claim}", end="", file=sys.stderr, flush=True)
+    """Show on the terminal how far the validation has come."""
+    print(f"\r\033[K{row.method}: {row.claim}", end="", file=sys.stderr, flush=True)
 
 
 def _record(row: Row) -> dict[str, object]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 _LIVE_INTERVAL = 0.5  # s
-_LINE_INTERVALS = (5.0, 60.0)  # s: at first, and grown to
+_LINE_INTERVALS = (5.0, 60.0)  # s: at first, and at most
+_LINES_AT_LEAST = 40  # the time between lines is this part of the time so far: 15 s after 10 min
 _MOST_FAILURES_SHOWN = 5
 _BAR_WIDTH = 16  # with the text, most lines fit into 80 columns
 
@@ -81,7 +82,8 @@ class ProgressLine:
         if now >= self._next:
             self._show()
             if self._live is None:
-                self._interval = min(1.5 * self._interval, _LINE_INTERVALS[1])
+                first, most = _LINE_INTERVALS
+                self._interval = min(max(first, (now - self._started) / _LINES_AT_LEAST), most)
             self._next = now + self._interval
 
     def failure(self, what: str, error: str) -> None:

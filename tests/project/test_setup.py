@@ -43,7 +43,7 @@ def test_script_is_well_formed(script: Path) -> None:
     subprocess.run(["bash", "-n", script], check=True)
     text = script.read_text()
     assert "\r" not in text
-    if script.name != "mpi.sh":  # that one is sourced
+    if script.name not in ("mpi.sh", "parts.sh"):  # those are sourced
         assert text.startswith("#!/")
         assert os.access(script, os.X_OK)
     if shutil.which("shellcheck"):
@@ -121,6 +121,77 @@ def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
     )
     assert "nothing to do" in done.stdout
     assert stamp.stat().st_mtime_ns == before
+
+
+def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
+    """Run a script with tools/parts.sh; its exit code and what it says."""
+    (tmp_path / ".setup").mkdir(exist_ok=True)
+    head = f"""
+        set -eu
+        say() {{ printf 'setup: %s\\n' "$*"; }}
+        log={tmp_path}/log TELL_EVERY=1
+        . {ROOT}/tools/parts.sh
+    """
+    done = subprocess.run(
+        ["bash", "-c", head + text],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stderr == ""
+    return done.returncode, done.stdout.splitlines()
+
+
+def test_parts_of_set_up_go_on_side_by_side_and_tell_of_themselves(tmp_path: Path) -> None:
+    # Each waits for the other: one after another they would never end.
+    code, lines = parts(
+        tmp_path,
+        """
+        meet() { touch "$1"; until [ -e "$2" ]; do sleep 0.05; done; echo "met $2"; }
+        late() { sleep 2.5; meet b a; }
+        part first "the first" meet a b
+        part second "the second" late
+        finish second
+        finish first
+        """,
+    )
+    assert code == 0
+    assert "setup: at 1 s: the first (1 s); the second (1 s)" in lines
+    assert "setup: at 2 s: the first (2 s); the second (2 s)" in lines
+    told = [re.sub(r"\d+ s", "", line) for line in lines if " at " not in line]
+    assert sorted(told) == ["setup: the first: ", "setup: the second: "]
+    assert "met b" in (tmp_path / ".setup" / "first.log").read_text()
+    assert "met a" in (tmp_path / "log").read_text()
+
+
+def test_a_part_of_set_up_that_fails_is_told_and_none_is_left_behind(tmp_path: Path) -> None:
+    code, lines = parts(
+        tmp_path,
+        """
+        trap end_parts EXIT
+        long() { sleep 50 & echo $! >child; wait; }
+        fail() { until [ -s child ]; do sleep 0.05; done; return 3; }
+        part long "what goes on" long
+        part fails "what fails" fail
+        finish fails || exit $?
+        """,
+    )
+    assert code == 3
+    assert re.fullmatch(r"setup: what fails: \d+ s, failed", lines[-1])
+    child = (tmp_path / "child").read_text().strip()
+
+    def is_alive() -> bool:
+        try:
+            return "sleep" in Path(f"/proc/{child}/cmdline").read_text()
+        except OSError:
+            return False
+
+    end = time.monotonic() + 10
+    while is_alive():
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def test_local_script_asks_for_a_campaign() -> None:

@@ -1,0 +1,49 @@
+"""No silence while something takes long: a line every so often, and none of what is over."""
+
+from __future__ import annotations
+
+import time
+
+from ensemble.run.progress import Counts, ProgressLine
+from ensemble.ticker import ticking
+
+
+def test_what_takes_long_is_told_and_what_is_over_is_not() -> None:
+    said: list[str] = []
+    done = [0]
+    with ticking(lambda: f"{done[0]} of 2", said.append, every=0.05):
+        end = time.monotonic() + 20
+        while len(said) < 2 and time.monotonic() < end:
+            done[0] = len(said)
+            time.sleep(0.005)
+    assert said[0] == "0 of 2 (0 s)"
+    assert said[1].startswith("1 of 2")
+    told = len(said)
+    with ticking("no sooner than it is due", said.append, every=60.0):
+        pass
+    time.sleep(0.1)
+    assert len(said) == told
+
+
+def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(monkeypatch) -> None:
+    class Log:
+        lines: tuple[float, ...] = ()
+
+        def write(self, text: str) -> None:
+            self.lines += (now[0],) if text.strip() else ()
+
+        def flush(self) -> None: ...
+
+        def isatty(self) -> bool:
+            return False
+
+    now, log = [0.0], Log()
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    progress = ProgressLine(Counts(total=10, done_before=0), lambda: None, log)
+    while now[0] < 36000.0:
+        progress.tick()
+        now[0] += 0.5
+    gaps = [(a, b - a) for a, b in zip(log.lines, log.lines[1:], strict=False)]
+    assert max(gap for at, gap in gaps if at < 600.0) <= 15.5
+    assert max(gap for _, gap in gaps) <= 60.5
+    assert len(log.lines) < 800  # ten hours: a log that can be read
