@@ -11,13 +11,14 @@ from ensemble.trace.prepare import prepare_trace
 from ensemble.trace.read import read_trace
 from solver.control import Control
 from solver.jumps import Jump
-from solver.loop import LoopResult, run_loop, run_loops
+from solver.loop import LoopResult, run_loop
 from solver.material import HalfSpace
 from solver.method import ContactState, Fields, Method, Opening, Path
 from solver.path import MinorLoop, PathResult, run_path
 from solver.problem import Problem
 from solver.profile import Profile, profile_from_heights, self_affine_profile, single_wave
 from solver.registry import make_method
+from solver.turns import run_loops
 
 __all__ = [
     "ContactState",

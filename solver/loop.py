@@ -8,7 +8,7 @@ of the energy drops at the jumps are the same energy. They are computed independ
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from time import process_time
 from typing import TypeVar
@@ -228,6 +228,36 @@ class LoopResult:
         # under a load the last state lies where contact was lost, off the axis
         return np.interp(np.arange(place[-1] + 1), place, values[chosen])
 
+    def at(self, branch: Branch, drives: Array, values: Array) -> Array:
+        """Values of one branch wherever it passes, straight lines between its states.
+
+        Parameters
+        ----------
+        branch : {"loading", "unloading"}
+        drives : array, shape (places,)
+            Δ/h_max at fixed separation, u_tot/h_max for a stiffness; Δ/h_max under a load too, as
+            its jumps there are lines.
+        values : array, shape (states,)
+
+        Returns
+        -------
+        array, shape (places,)
+            After a jump at the very place; 0 out of contact; NaN beyond the turning point.
+        """
+        chosen = self.states(branch)
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        control = Control() if control.is_load else control
+        x = control.prescribed(self.separation[chosen], self.mean_stress[chosen])
+        wanted = h_max * (1.0 - drives)
+        sign = -1.0 if branch == "loading" else 1.0  # of the way that the branch goes
+        x, wanted = sign * x, sign * wanted
+        turn = x[-1] if branch == "loading" else x[0]
+        near = 1e-12 * h_max
+        beyond = wanted > turn + near if branch == "loading" else wanted < turn - near
+        left, right = (0.0, None) if branch == "loading" else (None, 0.0)
+        found = np.interp(wanted, x, values[chosen].astype(float), left, right)
+        return np.where(beyond, np.nan, found)
+
     def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
         """Indices of the states of one branch, optionally only those on the load-step axis."""
         chosen = self.branch == branch
@@ -301,69 +331,9 @@ def run_loop(
     started = process_time()
     record = Record(on_state)
     axis = Axis(turning_point, load_steps)
-    *_, (_, state) = _load(method, record, [axis(i) for i in range(load_steps + 1)], progress)
-    _unload(method, record, state, axis, load_steps, progress)
-    return _result(method, record, turning_point, load_steps, started)
-
-
-def run_loops(
-    method: Method,
-    *,
-    max_penetration: Sequence[float] | None = None,
-    max_stress: Sequence[float] | None = None,
-    load_steps: int,
-    progress: Progress | None = None,
-) -> tuple[LoopResult, ...]:
-    """Loops that share one loading branch: it is followed once, and left at every turning point.
-
-    Parameters
-    ----------
-    method : Method
-    max_penetration, max_stress : sequence of float, shape (loops,)
-        The turning points, different ones: Δ/h_max or u_tot/h_max, or Pa under a load.
-    load_steps : int
-        Equal steps up to the largest turning point; every unloading branch goes on with that step.
-    progress : callable, optional
-        See :data:`Progress`.
-
-    Returns
-    -------
-    tuple of LoopResult
-        One a turning point, ascending. ``load_steps`` counts those of its own loading branch, and
-        ``seconds`` holds that branch up to the turning point and the unloading from there.
-
-    Raises
-    ------
-    ValueError
-        If a cycle cannot be run (:func:`check_cycle`), or a turning point is given twice, or none.
-    PathError
-        As in :func:`run_loop`.
-
-    References
-    ----------
-    docs/theory.md, "8. Paths and controls"
-    """
-    points = turning_of(method.problem, max_penetration, max_stress)
-    turns = sorted(points)
-    if not turns or len(set(turns)) < len(turns):
-        raise ValueError(f"turning points are {list(points)}: there must be some, all different")
-    for turn in turns:
-        check_cycle(turn, load_steps, method.problem.control)
-    axis = Axis(turns[-1], load_steps)
-    loading = Record()
-    results: list[LoopResult] = []
-    spent = 0.0  # CPU time of the loading branch so far
-    started = process_time()
-    drives = axis.between(0.0, turns[-1], turns)
-    for steps, (drive, state) in enumerate(_load(method, loading, drives, progress)):
-        if drive in turns:
-            spent += process_time() - started
-            started = process_time() - spent
-            record = loading.copy()
-            _unload(method, record, state, axis, axis.above(drive), progress)
-            results.append(_result(method, record, drive, steps, started))
-            started = process_time()
-    return tuple(results)
+    state = _load(method, record, [axis(i) for i in range(load_steps + 1)], progress)
+    unload(method, record, state, axis, load_steps, progress)
+    return result_of(method, record, turning_point, load_steps, started)
 
 
 def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None) -> T:
@@ -385,40 +355,71 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
 
 def _load(
     method: Method, record: Record, drives: Sequence[float], progress: Progress | None
-) -> Iterator[tuple[float, ContactState]]:
-    """Load from first touch through the load steps ``drives``; gives the state at each."""
+) -> ContactState:
+    """Load from first touch through the load steps ``drives``; gives the state at the last."""
     state = method.detached(method.problem.profile.h_max)
     record.visit("loading", False, state)
     for drive in drives:
         state = record.extend("loading", method.follow(state, method.problem.prescribed(drive)))
         if progress is not None:
             progress("loading", drive, state)
-        yield drive, state
+    return state
 
 
-def _unload(
+def unload(
     method: Method,
     record: Record,
     state: ContactState,
     axis: Axis,
     index: int,
     progress: Progress | None,
+    marks: Sequence[float] = (),
 ) -> None:
-    """Go back by load steps, the next one below ``index``, until contact is lost."""
+    """Go back by load steps, the next one below ``index``, until contact is lost.
+
+    Parameters
+    ----------
+    method : Method
+    record : Record
+        Of the loading branch; it gets the unloading branch too.
+    state : ContactState
+        At the turning point.
+    axis : Axis
+    index : int
+        Number of the first load step at or above the turning point.
+    progress : callable, optional
+        See :data:`Progress`.
+    marks : sequence of float
+        Further places below the turning point, none of them a load step, at which a step ends.
+
+    Raises
+    ------
+    PathError
+        If the path cannot be followed or does not end.
+    """
     # The turning point belongs to both branches: it starts the unloading curve.
     record.visit("unloading", True, state)
     i = index
     stride = 1
+    ahead = sorted(marks)
     while state.patches:
         i -= stride
-        drive = axis(i)
-        if _too_far(method.problem, drive, (index - i) / axis.load_steps):
-            raise PathError(f"still in contact at {drive:g}")
+        end = axis(i)
+        if _too_far(method.problem, end, (index - i) / axis.load_steps):
+            raise PathError(f"still in contact at {end:g}")
         if index - i >= _STROKES_AT_STEP * axis.load_steps:
             stride = _stride(method.problem, axis, i, stride)
-        state = record.extend("unloading", method.follow(state, method.problem.prescribed(drive)))
-        if progress is not None:
-            progress("unloading", drive, state)
+        stops = []
+        while ahead and ahead[-1] > end:
+            stops.append(ahead.pop())
+        for drive in [*stops, end]:
+            state = record.extend(
+                "unloading", method.follow(state, method.problem.prescribed(drive))
+            )
+            if progress is not None:
+                progress("unloading", drive, state)
+            if not state.patches:
+                break
 
 
 def _too_far(problem: Problem, drive: float, strokes: float) -> bool:
@@ -440,7 +441,7 @@ def _stride(problem: Problem, axis: Axis, index: int, last: int) -> int:
     return max(1, min(2 * last, int(wanted)))
 
 
-def _result(
+def result_of(
     method: Method, record: Record, turning_point: float, load_steps: int, started: float
 ) -> LoopResult:
     """The loop of a record; ``started`` is the CPU time at which it was begun, in s."""

@@ -31,6 +31,16 @@ class Axis:
         """Number of the first load step at or above ``drive``."""
         return math.ceil(drive * self.load_steps / self.top - _NEAR)
 
+    def apart(self, places: Sequence[float], others: Sequence[float] = ()) -> list[float]:
+        """Those of the places that are no load step, none of the others, and differ."""
+        near = _NEAR * self.top / self.load_steps
+        found: list[float] = []
+        for place in sorted(places):
+            step = self(round(place * self.load_steps / self.top))
+            if all(abs(place - other) > near for other in (step, *others, *found[-1:])):
+                found.append(place)
+        return found
+
     def between(self, start: float, end: float, marks: Sequence[float] = ()) -> list[float]:
         """Load steps of a leg from ``start`` to ``end``, both included, and the marks on the way.
 

@@ -7,11 +7,13 @@ Every key has one rule. What a campaign means is here; how its file is read is i
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ensemble.campaign.axes import Axis, Value, aligned, points
 from ensemble.campaign.rules import (
@@ -289,6 +291,39 @@ class Campaign:
             self._at[task.others] = replace(self, sweep=sweep, lists=(), finest=finest, **tables)
         return self._at[task.others]
 
+    @cached_property
+    def _turning(self) -> Axis | None:
+        """The axis of turning points, unless other keys vary with it."""
+        for group in self._groups:
+            if len(group) == 1 and group[0].name == "max_penetration":
+                return group[0]
+        return None
+
+    def branch_of(self, task: Task) -> Hashable | None:
+        """What the tasks that share a task's loading branch have in common; None if it has its own.
+
+        They differ in their turning point alone.
+        """
+        if self._turning is None:
+            return None
+        rest = tuple(other for other in task.others if other[0] != self._turning.name)
+        return (task.hurst, task.work_of_adhesion, task.realisation, rest)
+
+    @property
+    def branch_loops(self) -> int:
+        """Number of loops that share a loading branch."""
+        return 1 if self._turning is None else len(self._turning.values)
+
+    def sharing(self, task: Task) -> list[Task]:
+        """Return the tasks that share a task's loading branch, by turning point, and it itself."""
+        if self._turning is None:
+            return [task]
+        name, values = self._turning.name, self._turning.values
+        return [
+            replace(task, others=tuple((n, value if n == name else v) for n, v in task.others))
+            for value in values
+        ]
+
     def identity(self, task: Task) -> tuple[Any, ...]:
         """What tells a task from all others, also in a campaign that grew new axes."""
         here = self.at(task)
@@ -313,7 +348,23 @@ class Campaign:
             for hurst, gamma, *others in self.cells
             for realisation, seed in enumerate(seeds)
         ]
-        return tasks[part.number - 1 :: part.of]
+        return tasks if part == WHOLE else [tasks[row] for row in self.rows(part).tolist()]
+
+    def rows(self, part: Part = WHOLE) -> NDArray[np.int64]:
+        """Rows of the whole campaign that belong to a part, ascending.
+
+        Tasks that share a loading branch go to the same part.
+        """
+        if part == WHOLE or self._turning is None:
+            return part.rows(self.task_count)
+        branches = np.arange(self.task_count).reshape(-1, self.realisations)
+        first: dict[tuple[Value, ...], int] = {}
+        turn = [axis.name for axis in self.axes].index(self._turning.name)
+        for number, cell in enumerate(self.cells):
+            rest = cell[:turn] + cell[turn + 1 :]
+            branches[number] = first.setdefault(rest, len(first)) * self.realisations
+        branches += np.arange(self.realisations)
+        return np.flatnonzero(branches.ravel() % part.of == part.number - 1)
 
     @cached_property
     def loading_penetration(self) -> Array:

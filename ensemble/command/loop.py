@@ -37,13 +37,14 @@ from ensemble.trace.options import (
     what_was_read,
 )
 from ensemble.warm import warm_missing
-from solver.loop import LoopResult, Progress, run_loop, run_loops
+from solver.loop import LoopResult, Progress, run_loop
 from solver.material import HalfSpace
 from solver.method import Branch, ContactState, Method, PathError
 from solver.path import PathResult, run_path
 from solver.problem import Problem
 from solver.profile import Array, Profile, profile_from_heights, self_affine_profile
 from solver.registry import METHOD_NAMES, make_method
+from solver.turns import run_loops
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 _PERIOD, _N0, _RATIO, _H_RMS = 2e-3 * np.pi, 10, 100, 1e-6

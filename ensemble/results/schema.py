@@ -71,14 +71,14 @@ def datasets(campaign: Campaign) -> tuple[Dataset, ...]:
 
 def kept_rows(campaign: Campaign, part: Part = WHOLE) -> NDArray[np.intp]:
     """Return the rows of the tasks that keep their fields, in the file of a part."""
-    realisation = part.rows(campaign.task_count) % campaign.realisations
+    realisation = campaign.rows(part) % campaign.realisations
     return np.flatnonzero(realisation < campaign.output.field_realisations)
 
 
 def scales(campaign: Campaign, part: Part = WHOLE) -> tuple[Scale, ...]:
     """Return the dimensions of the results file of a campaign, or of a part of it."""
     return (
-        Scale("task", part.rows(campaign.task_count), "1", "row of the task in the whole campaign"),
+        Scale("task", campaign.rows(part), "1", "row of the task in the whole campaign"),
         *row_scales(campaign),
         Scale(KEPT, kept_rows(campaign, part), "1", "row of a task that keeps its fields"),
     )

@@ -25,6 +25,7 @@ from typing import Any, Literal, Protocol
 
 from ensemble.run.attempt import Compute, GivenUp, Outcome, attempt
 from ensemble.run.schedule import Schedule
+from ensemble.run.units import Units
 
 Deliver = Callable[[Outcome], Outcome]
 Collect = Callable[[Outcome], None]
@@ -83,23 +84,33 @@ def work_alone(
     deliver: Deliver,
     collect: Collect,
     limits: Limits,
+    units: Units | None = None,
 ) -> str | None:
     """Do every task in this process; returns why it stopped early, or None."""
+    units = units or Units()
     while (reason := limits.stop()) is None:
-        task = schedule.take(limits.time_left())
-        if task is None:
+        first = schedule.take(limits.time_left())
+        if first is None:
             return "no time left for another task" if schedule.waiting else None
-        try:
-            outcome = attempt(
-                compute, task, MASTER, lambda: limits.stop() is not None, limits.task_seconds
-            )
-        except GivenUp:
-            return limits.stop()
-        outcome = deliver(outcome)
-        if outcome.error is None:
-            schedule.measured(group_of[task], outcome.seconds)
-        collect(outcome)
+        for task in units.tasks(first):
+            if (reason := limits.stop()) is not None:
+                return reason
+            try:
+                outcome = attempt(
+                    compute, task, MASTER, lambda: limits.stop() is not None, limits.task_seconds
+                )
+            except GivenUp:
+                return limits.stop()
+            outcome = deliver(outcome)
+            if done := units.answered(task, _measured(outcome)):
+                schedule.measured(group_of[done[0]], done[1])
+            collect(outcome)
     return reason if schedule.waiting else None
+
+
+def _measured(outcome: Outcome) -> float | None:
+    """Time of a task that has a result."""
+    return outcome.seconds if outcome.error is None else None
 
 
 class Master:
@@ -118,6 +129,8 @@ class Master:
         Called often while nothing arrives (progress).
     clock, sleep : callable
         Replaced when the run is simulated.
+    units : Units, optional
+        Tasks that go to one worker together; the schedule knows the first one of each.
     """
 
     def __init__(
@@ -130,8 +143,10 @@ class Master:
         tick: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        units: Units | None = None,
     ) -> None:
         self._channel = channel
+        self._units = units or Units()
         self._schedule = schedule
         self._group_of = group_of
         self._collect = collect
@@ -202,13 +217,14 @@ class Master:
             self._halt(message[1])
             return
         if kind == "given up":
+            self._units.answered(message[1], None)
             self._answered(rank, message[1])
             self._hand_out()
             return
         outcome: Outcome = message[1]
         self._answered(rank, outcome.task)
-        if outcome.error is None:
-            self._schedule.measured(self._group_of[outcome.task], outcome.seconds)
+        if done := self._units.answered(outcome.task, _measured(outcome)):
+            self._schedule.measured(self._group_of[done[0]], done[1])
         self._hand_out()
         self._collect(outcome)
         self._hand_out()  # what was collected may have brought further tasks
@@ -225,13 +241,15 @@ class Master:
             if len(sent) != load or not self._has_room(sent):
                 heapq.heappop(self._room)
                 continue
-            task = self._schedule.take(self._limits.time_left())
-            if task is None:
+            first = self._schedule.take(self._limits.time_left())
+            if first is None:
                 return
-            seconds = self._schedule.mean(self._group_of[task])
-            sent[task] = math.inf if seconds is None else seconds
+            seconds = self._schedule.mean(self._group_of[first])
+            tasks = self._units.tasks(first)
+            for task in tasks:
+                sent[task] = math.inf if seconds is None else seconds / len(tasks)
+                self._channel.send(rank, ("task", task))
             heapq.heapreplace(self._room, (len(sent), rank))
-            self._channel.send(rank, ("task", task))
 
     @staticmethod
     def _has_room(sent: Mapping[int, float]) -> bool:

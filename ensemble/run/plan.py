@@ -236,7 +236,7 @@ def _plan(results: Results) -> Plan:
     times: dict[Group, tuple[float, int]] = {}
     seconds = results.column("wall_time").tolist()
     for row in np.flatnonzero(status == DONE).tolist():
-        group = tasks[row].cell
+        group = group_of(results.campaign, tasks[row])
         sum_before, count = times.get(group, (0.0, 0))
         times[group] = (sum_before + seconds[row], count + 1)
     rows, batches = np.flatnonzero(status == PENDING).tolist(), None
@@ -255,6 +255,14 @@ def _plan(results: Results) -> Plan:
         failed=int(np.sum(status == FAILED)),
         times=times,
     )
+
+
+def group_of(campaign: Campaign, task: Task) -> Group:
+    """What tasks that take about the same time have in common: their cell.
+
+    Of tasks that share a loading branch it leaves out where they turn.
+    """
+    return campaign.sharing(task)[0].cell if campaign.branch_of(task) else task.cell
 
 
 def prior(task: Task) -> float:

@@ -16,9 +16,9 @@ from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, file_size
-from ensemble.run.plan import prior
+from ensemble.run.plan import group_of, prior
 from ensemble.run.progress import duration
-from ensemble.task.compute import run_task
+from ensemble.task.compute import Runner
 from ensemble.task.row import Row
 
 # Loops are tried out for so long (s), one realisation of every cell after the other.
@@ -102,7 +102,7 @@ def price(
     part: Part = WHOLE,
     *,
     seconds: float = PILOT_SECONDS,
-    compute: Callable[[Campaign, Task], Row] = run_task,
+    compute: Callable[[Campaign, Task], Row] | None = None,
     on_pilot: Callable[[Task, float], None] = lambda task, seconds: None,
 ) -> Price:
     """Estimate what a campaign costs; writes nothing.
@@ -119,11 +119,12 @@ def price(
     part : Part, optional
     seconds : float
         How long loops are tried out.
-    compute : callable
+    compute : callable, optional
         Computes a task.
     on_pilot : callable
         Called after each loop that was tried out, with its CPU time in s.
     """
+    compute = compute or Runner()
     tasks = campaign.tasks(part)
     times: dict[tuple[float, ...], list[float]] = {task.cell: [] for task in tasks}
     done: set[Task] = set()
@@ -140,7 +141,10 @@ def price(
     unknown = {task.cell for task in left if not times[task.cell]}
     pilots, spent, end = 0, 0.0, time.monotonic() + seconds
     # The cheapest first, so that as many cells as possible are met; realisation by realisation.
-    order = sorted((t for t in left if t.cell in unknown), key=lambda t: (t.realisation, prior(t)))
+    order = sorted(
+        (t for t in left if t.cell in unknown),
+        key=lambda t: (t.realisation, prior(t), group_of(campaign, t)),
+    )
     for task in order:
         if time.monotonic() > end:
             break

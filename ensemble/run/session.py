@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -19,11 +19,12 @@ from ensemble.run.attempt import Compute, Outcome, StopCheck
 from ensemble.run.dispatch import Limits, Master, Worker, work_alone
 from ensemble.run.interrupt import StopSignals
 from ensemble.run.lock import RunLock
-from ensemble.run.plan import Group, Plan, Selection, prepare, prior
+from ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
 from ensemble.run.progress import Counts, ProgressLine
 from ensemble.run.ranks import MpiChannel, one_a_node_first, together
 from ensemble.run.schedule import Schedule
-from ensemble.task.compute import check_task, methods_of, run_task
+from ensemble.run.units import Units
+from ensemble.task.compute import Runner, check_task, methods_of
 from ensemble.task.doubt import doubtful
 from ensemble.task.row import Row
 from solver.loop import Progress
@@ -85,7 +86,7 @@ class Engine:
         The methods that tasks are computed by: they are compiled before the first task.
     """
 
-    compute: Callable[[Campaign, Task, Progress | None], Row] = run_task
+    compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
     check: Callable[[Campaign, Task], None] = check_task
     writer: Callable[[Path, Any], RowWriter] = Writer
     all_write: bool = bool(h5py.get_config().mpi)
@@ -252,7 +253,10 @@ class _Session:
         self._started = time.monotonic()
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Counts(total=total, done_before=plan.done)
-        self._groups: Mapping[int, Group] = {row: t.cell for row, t in enumerate(plan.tasks)}
+        self._groups: Mapping[int, Group] = {
+            row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
+        }
+        self._units = Units({row: campaign.branch_of(t) for row, t in enumerate(plan.tasks)})
         self._limits = Limits(
             stop=self._stop,
             time_left=self._time_left,
@@ -270,6 +274,7 @@ class _Session:
                 self._write,
                 lambda outcome: self._count(outcome, progress, schedule),
                 self._limits,
+                self._units,
             )
         finally:
             progress.close()
@@ -284,7 +289,11 @@ class _Session:
         progress = ProgressLine(
             self._counts, lambda: self._estimate(schedule, master.in_flight, workers)
         )
-        master = Master(channel, schedule, self._groups, collect, self._limits, tick=progress.tick)
+        master = Master(
+            *(channel, schedule, self._groups, collect, self._limits),
+            tick=progress.tick,
+            units=self._units,
+        )
         try:
             return master.run()
         finally:
@@ -355,15 +364,20 @@ class _Session:
             assert self._writer is not None
             self._writer.mark(spare, needed=False)
             self._counts.total += len(further)
-            schedule.add(further)
+            schedule.add(self._units.form(further))
         progress.tick()
 
     def _schedule(self) -> Schedule:
-        priors: dict[Hashable, float] = {task.cell: prior(task) for task in self._plan.tasks}
-        rounds = {row: task.realisation for row, task in enumerate(self._plan.tasks)}
-        schedule = Schedule(self._plan.rows, self._groups, priors, rounds)
+        tasks = self._plan.tasks
+        priors: dict[Hashable, float] = {
+            self._groups[row]: prior(task) for row, task in enumerate(tasks)
+        }
+        rounds = {row: task.realisation for row, task in enumerate(tasks)}
+        first = self._units.form(self._plan.rows)
+        schedule = Schedule(first, self._groups, priors, rounds)
         for group, (seconds, count) in self._plan.times.items():
-            schedule.measured(group, seconds, count)
+            # of loops that share a loading branch the time is that of all of them
+            schedule.measured(group, seconds, max(1, round(count / self._campaign.branch_loops)))
         return schedule
 
     def _stop(self) -> str | None:

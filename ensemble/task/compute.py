@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
 
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import Task
@@ -14,10 +15,11 @@ from ensemble.task.row import Row, row_of, row_scales
 from solver.control import Control
 from solver.loop import Progress, run_loop
 from solver.material import HalfSpace
-from solver.method import Method
+from solver.method import Branch, Method
 from solver.problem import Problem
-from solver.profile import self_affine_profile
+from solver.profile import Array, self_affine_profile
 from solver.registry import make_method
+from solver.turns import LoadingBranch
 
 
 def make_problem(campaign: Campaign, task: Task) -> Problem:
@@ -85,17 +87,87 @@ def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -
     progress : callable, optional
         Called after each load step; it may raise to give the task up.
     """
-    wall, cpu = time.perf_counter(), time.process_time()
-    method = _make_method(campaign, task)
-    plan = field_plan(campaign, task)
-    recorder = FieldRecorder(plan, method, keep=task.realisation < plan.realisations)
-    loop = run_loop(
-        method,
-        max_penetration=campaign.at(task).cycle.max_penetration,
-        load_steps=campaign.cycle.load_steps,
-        progress=progress,
-        on_state=recorder.on_state,
-    )
-    row = row_of(loop, sizes_of(row_scales(campaign))) | recorder.row()
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    return {"wall_time": wall, "cpu_time": cpu, **row}
+    return Runner()(campaign, task, progress)
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """The loading branch of the last task, which the next one may go on with."""
+
+    campaign: Campaign
+    key: Hashable
+    turn: float
+    branch: LoadingBranch
+
+
+class Runner:
+    """Computes tasks one after the other, each with the bits of :func:`run_task`.
+
+    The tasks of a campaign with several turning points share a loading branch
+    (:meth:`ensemble.campaign.tables.Campaign.branch_of`): it is kept from one task to the next, as
+    long as the turning points ascend.
+    """
+
+    def __init__(self) -> None:
+        self._shared: _Shared | None = None
+
+    def __call__(self, campaign: Campaign, task: Task, progress: Progress | None = None) -> Row:
+        """Compute one loop; arguments as those of :func:`run_task`.
+
+        The times in the row are those of this call, so that what a loading branch took counts once:
+        with the first loop that needed it.
+        """
+        wall, cpu = time.perf_counter(), time.process_time()
+        here = campaign.at(task)
+        plan = field_plan(campaign, task)
+        keep = task.realisation < plan.realisations
+        sizes = sizes_of(row_scales(campaign))
+        turn = here.cycle.max_penetration
+        key = campaign.branch_of(task)
+        if key is None:
+            method = _make_method(campaign, task)
+            recorder = FieldRecorder(plan, method, keep=keep)
+            loop = run_loop(
+                method,
+                max_penetration=turn,
+                load_steps=campaign.cycle.load_steps,
+                progress=progress,
+                on_state=recorder.on_state,
+            )
+            row = row_of(loop, sizes)
+        else:
+            branch = self._branch(campaign, task, key, turn)
+            self._shared = None  # what is interrupted is not gone on with
+            recorder = FieldRecorder(plan, branch.method, keep=keep)
+            try:
+                loop = branch.loop(
+                    turn,
+                    marks=plan.penetration.tolist(),
+                    progress=progress,
+                    on_state=recorder.on_state,
+                )
+            except Exception:
+                self._shared = _Shared(campaign, key, turn, branch)
+                raise
+            self._shared = _Shared(campaign, key, turn, branch)
+            axes: dict[Branch, Array] = {
+                "loading": turn * campaign.loading_penetration,
+                "unloading": turn * campaign.unloading_penetration,
+            }
+            row = row_of(loop, sizes, axes)
+        row |= recorder.row()
+        wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+        return {"wall_time": wall, "cpu_time": cpu, **row}
+
+    def _branch(self, campaign: Campaign, task: Task, key: Hashable, turn: float) -> LoadingBranch:
+        """The loading branch that a task leaves, as far as it was followed for the last one."""
+        last = self._shared
+        if last is not None and last.campaign is campaign and last.key == key and last.turn < turn:
+            return last.branch
+        others = campaign.sharing(task)
+        return LoadingBranch(
+            _make_method(campaign, task),
+            [campaign.at(other).cycle.max_penetration for other in others],
+            load_steps=campaign.cycle.load_steps,
+            marks=[mark for o in others for mark in field_plan(campaign, o).penetration.tolist()],
+        )

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ensemble.campaign.tables import Campaign
 from ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
@@ -17,6 +18,7 @@ from ensemble.task.fields import FIELD_DATASETS, field_plan, field_scales
 from solver.jumps import BRANCHES, JUMP_KINDS, Jump
 from solver.loop import LoopResult
 from solver.method import Branch
+from solver.profile import Array
 
 Row = dict[str, Any]
 """Values of one task by dataset; those of kept fields only where the task keeps them."""
@@ -231,7 +233,9 @@ def row_scales(campaign: Campaign) -> tuple[Scale, ...]:
     )
 
 
-def row_of(loop: LoopResult, sizes: Mapping[str, int]) -> Row:
+def row_of(
+    loop: LoopResult, sizes: Mapping[str, int], axes: Mapping[Branch, Array] | None = None
+) -> Row:
     """Return the row of a loop, without its times and fields.
 
     Parameters
@@ -241,14 +245,22 @@ def row_of(loop: LoopResult, sizes: Mapping[str, int]) -> Row:
         Lengths of the dimensions of :func:`row_scales`. Curves are zero after detachment and cut
         where their axis ends; of more jumps than the catalogue holds those with the largest drops
         are kept, in the order of the path.
+    axes : mapping of arrays, optional
+        Penetrations (:meth:`solver.loop.LoopResult.at`) of the curves of each branch, where these
+        are not the loop's load steps.
     """
     row: Row = {d.name: d.value(loop) for d in (*NUMBERS, JUMP_COUNT) if d.value is not None}
     for branch, curves in CURVES.items():
         for dataset in curves:
             (length,) = row_shape(dataset, sizes)
             assert dataset.value is not None
+            values = dataset.value(loop)
+            if axes is not None:
+                found = loop.at(branch, axes[branch], values)
+                row[dataset.name] = found if dataset.dtype == FLOAT else _rounded(found, dataset)
+                continue
             curve = np.zeros(length, dataset.dtype)
-            on_axis = loop.on_axis(branch, dataset.value(loop))[:length]
+            on_axis = loop.on_axis(branch, values)[:length]
             curve[: len(on_axis)] = on_axis
             row[dataset.name] = curve
     drops = np.array([j.energy_drop for j in loop.jumps])
@@ -259,3 +271,9 @@ def row_of(loop: LoopResult, sizes: Mapping[str, int]) -> Row:
         column[: len(largest)] = [dataset.value(loop, loop.jumps[i]) for i in largest]
         row[dataset.name] = column
     return row
+
+
+def _rounded(values: Array, dataset: Dataset) -> NDArray[Any]:
+    """Numbers between states as whole ones; the fill value where there are none."""
+    known = np.isfinite(values)
+    return np.where(known, np.rint(np.where(known, values, 0)), dataset.fill).astype(dataset.dtype)

@@ -14,6 +14,7 @@ from numba import njit
 from ensemble.run.attempt import GivenUp, Outcome, attempt
 from ensemble.run.dispatch import AHEAD, MOST_AHEAD, Limits, Master, Overdue, work_alone
 from ensemble.run.schedule import Schedule
+from ensemble.run.units import Units
 
 
 class SimulatedRanks:
@@ -363,3 +364,53 @@ def test_attempts_work_in_a_thread_too():
     thread.start()
     thread.join()
     assert seen == ["given up"]
+
+
+def test_tasks_of_a_unit_go_to_one_worker_and_count_as_one():
+    """Whatever their number, and each of them is answered."""
+    units = Units({task: task // 3 for task in range(30)})
+    first = units.form([t for t in range(30) if t != 4])
+    assert first == list(range(0, 30, 3))
+    assert units.tasks(3) == (3, 5)
+    seconds = [0.2 + 0.01 * task for task in range(30)]
+    group_of = dict.fromkeys(range(30), 0)
+    schedule = Schedule(first, group_of, {0: 1.0})
+    channel = SimulatedRanks(4, seconds)
+    collected: list[Outcome] = []
+    master = Master(
+        *(channel, schedule, group_of, collected.append, Limits()),
+        clock=channel.clock,
+        sleep=channel.sleep,
+        units=units,
+    )
+    assert master.run() is None
+    done = sorted(outcome.task for outcome in collected)
+    assert done == [task for task in range(30) if task != 4]
+    ranks = {(outcome.task // 3, outcome.rank) for outcome in collected}
+    assert len(ranks) == 10
+    whole = sum(seconds[task] for task in done)
+    assert schedule.mean(0) == pytest.approx(whole / 10)
+
+
+def test_a_unit_that_failed_in_part_tells_no_time():
+    units = Units({0: "a", 1: "a"})
+    assert units.form([0, 1, 2]) == [0, 2]
+    assert units.answered(0, 1.5) is None
+    assert units.answered(1, None) is None
+    assert units.answered(2, 1.0) == (2, 1.0)
+    assert units.form([1]) == [1]  # computed again alone
+    assert units.answered(1, 0.5) == (1, 0.5)
+
+
+def test_one_process_does_a_unit_at_once_and_stops_between_its_tasks():
+    units = Units({0: "a", 1: "b", 2: "a", 3: "b"})
+    group_of = dict.fromkeys(range(4), 0)
+    schedule = Schedule(units.form(range(4)), group_of, {0: 1.0})
+    order: list[int] = []
+
+    def compute(task, check):
+        order.append(task)
+
+    limits = Limits(stop=lambda: "enough" if len(order) == 3 else None)
+    reason = work_alone(schedule, group_of, compute, lambda o: o, lambda o: None, limits, units)
+    assert (reason, order) == ("enough", [0, 2, 1])

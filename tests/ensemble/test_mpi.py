@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,8 +14,13 @@ import time
 
 import pytest
 
+from ensemble.campaign.file import load_campaign
+from ensemble.campaign.tasks import Part
+from ensemble.results.merge import merge
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE
+from ensemble.results.write import Writer
+from ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     MPIRUN,
     ROOT,
@@ -47,6 +53,28 @@ def test_real_loops_have_the_same_bits_for_any_number_of_ranks(tmp_path):
         assert process.returncode == 0, process.stderr
     for ranks in (2, 3, 4):
         assert differences(tmp_path / "1.h5", tmp_path / f"{ranks}.h5") == []
+
+
+def test_turning_points_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
+    """Also where some loops that share a loading branch are there already, and others not."""
+    some = {"hurst": "[0.8]", "work_of_adhesion": "[0.04]", "load_steps": "8"}
+    path = write_campaign(tmp_path, max_penetration="[0.3, 0.45, 0.6]", **some)
+    campaign, whole = load_campaign(path), tmp_path / "whole.h5"
+    assert run_campaign(campaign, whole).done == 6
+    process = adhesis("run", path, "--out", tmp_path / "ranks.h5", ranks=3)
+    assert process.returncode == 0, process.stderr
+    assert differences(tmp_path / "ranks.h5", whole) == []
+    resumed = tmp_path / "resumed.h5"
+    shutil.copy(whole, resumed)
+    with Writer(resumed) as writer:
+        writer.reset([1, 2, 4])
+    assert run_campaign(campaign, resumed).computed == 3
+    assert differences(resumed, whole) == []
+    parts = [tmp_path / "1.h5", tmp_path / "2.h5"]
+    for k, part in enumerate(parts, start=1):
+        assert run_campaign(campaign, part, options=Options(part=Part(k, 2))).done == 3
+    merge(parts, tmp_path / "merged.h5")
+    assert differences(tmp_path / "merged.h5", whole) == []
 
 
 def test_more_ranks_than_tasks(tmp_path, whole):

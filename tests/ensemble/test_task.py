@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ensemble.campaign.file import parse_campaign
-from ensemble.task.compute import make_problem, run_task
+from ensemble.campaign.tasks import Part
+from ensemble.task.compute import Runner, make_problem, run_task
 from ensemble.task.dataset import KEPT, row_shape, sizes_of
 from ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from solver.jumps import JUMP_KINDS, Jump
@@ -78,21 +79,104 @@ def test_the_catalogue_keeps_the_largest_drops_in_the_order_of_the_path():
 
 
 def test_a_task_on_further_axes_has_the_bits_of_a_campaign_of_its_values():
-    axes = {"ratio": "[2, 4]", "max_penetration": "[0.3, 0.6]", "young": "[1e6, 2e6]"}
+    axes = {"ratio": "[2, 4]", "poisson": "[0.3, 0.5]", "young": "[1e6, 2e6]"}
     several = parse_campaign(campaign_text(**axes))
     task = several.tasks()[-1]
     alone = parse_campaign(campaign_text(young="2e6"))
     one, two = run_task(several, task), run_task(alone, alone.tasks()[-1])
     for name in ("loss", "loss_from_drops", "loading_mean_stress", "jump_penetration", "h_max"):
         assert np.asarray(one[name]).tobytes() == np.asarray(two[name]).tobytes(), name
-    size = two["unloading_mean_stress"].size  # stored until the same Δ/h_max for the smallest
-    assert one["unloading_mean_stress"].size == 2 * (size - 5) + 5
-    np.testing.assert_array_equal(one["unloading_mean_stress"][:size], two["unloading_mean_stress"])
-    assert several.penetration_unit(task) == 0.6
     coarse = several.tasks()[0]
     assert several.at(coarse).profile.ratio == 2
     small = run_task(several, coarse)
     assert small["psd_height"].shape == one["psd_height"].shape
+
+
+TURNS = campaign_text(max_penetration="[0.3, 0.45, 0.6]", load_steps="12")
+
+
+def bits(row):
+    return {
+        k: np.asarray(v).tobytes() for k, v in row.items() if k not in ("wall_time", "cpu_time")
+    }
+
+
+def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_computed():
+    """One alone, all in turn, some left out, out of order, after one that was given up."""
+    campaign = parse_campaign(TURNS)
+    first = campaign.tasks()[0]
+    tasks = campaign.sharing(first)
+    assert [campaign.at(task).cycle.max_penetration for task in tasks] == [0.3, 0.45, 0.6]
+    alone = [bits(run_task(campaign, task)) for task in tasks]
+    together = Runner()
+    assert [bits(together(campaign, task)) for task in tasks] == alone
+    for order in ([0, 2], [2, 0, 1]):
+        some = Runner()
+        assert [bits(some(campaign, tasks[i])) for i in order] == [alone[i] for i in order]
+
+    def give_up(branch, *_):
+        if branch == "unloading":
+            raise KeyboardInterrupt
+
+    stopped = Runner()
+    stopped(campaign, tasks[0])
+    with pytest.raises(KeyboardInterrupt):
+        stopped(campaign, tasks[1], give_up)
+    assert bits(stopped(campaign, tasks[1])) == alone[1]
+    other = campaign.sharing(campaign.tasks()[1])
+    assert bits(stopped(campaign, other[2])) == bits(run_task(campaign, other[2]))
+
+
+def test_loops_that_share_a_loading_branch_are_those_of_campaigns_of_their_own():
+    """Losses to the accuracy of jumps, curves and fields where the axes of a row have them."""
+
+    def sharp(turns):
+        text = campaign_text(max_penetration=turns, load_steps="12", method='"sharp"')
+        return parse_campaign(text.replace("nodes_per_wave = 16\n", ""))
+
+    campaign = sharp("[0.3, 0.45, 0.6]")
+    runner = Runner()
+    for task in campaign.sharing(campaign.tasks()[0]):
+        turn = campaign.at(task).cycle.max_penetration
+        own = sharp(str(turn))
+        one, two = runner(campaign, task), run_task(own, own.tasks()[0])
+        assert one["loss"] == pytest.approx(two["loss"], rel=1e-4)
+        for name in ("loading_mean_stress", "unloading_mean_stress", "unloading_contact_fraction"):
+            shared, separate = one[name], two[name]
+            size = min(shared.size, separate.size)
+            # between states of the shared branch a curve is a straight line
+            np.testing.assert_allclose(
+                shared[:size], separate[:size], atol=0.03 * np.abs(separate).max()
+            )
+        for name in ("psd_displacement", "gap_density"):
+            kept, wanted = np.isfinite(one[name]), np.isfinite(two[name])
+            np.testing.assert_array_equal(kept, wanted)
+        assert one["field_gap"].shape == two["field_gap"].shape
+        np.testing.assert_allclose(
+            one["field_displacement"], two["field_displacement"], atol=2e-9, equal_nan=True
+        )
+
+
+def test_the_time_of_a_shared_loading_branch_counts_once(monkeypatch):
+    """The sum over the loops is what the process took."""
+    clock = iter(range(1000))
+    monkeypatch.setattr("ensemble.task.compute.time.process_time", lambda: float(next(clock)))
+    campaign, runner = parse_campaign(TURNS), Runner()
+    rows = [runner(campaign, task) for task in campaign.sharing(campaign.tasks()[0])]
+    assert [row["cpu_time"] for row in rows] == [1.0, 1.0, 1.0]
+    assert next(clock) == 6
+
+
+def test_a_part_has_whole_loading_branches():
+    campaign = parse_campaign(TURNS)
+    parts = [Part(k, 3) for k in (1, 2, 3)]
+    rows = [campaign.rows(part).tolist() for part in parts]
+    assert sorted(row for part in rows for row in part) == list(range(campaign.task_count))
+    tasks = campaign.tasks()
+    keys = [{campaign.branch_of(tasks[row]) for row in part} for part in rows]
+    assert sum(map(len, keys)) == len(set().union(*keys))
+    assert {len(part) for part in rows} <= {6, 9}
+    assert campaign.tasks(parts[0]) == [tasks[row] for row in rows[0]]
 
 
 def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():

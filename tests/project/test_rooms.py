@@ -75,6 +75,7 @@ SOLVER_FOR_ENSEMBLE = {
     "solver.references.single_wave",
     "solver.registry",
     "solver.trace",
+    "solver.turns",
     "solver.validate.claims",
     "solver.warm",
 }
