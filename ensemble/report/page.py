@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ensemble.aggregate import statistics
 from ensemble.aggregate.average import Aggregate
+from ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from ensemble.report import findings, paper
 from ensemble.report.axes import shown_cells
 from ensemble.report.figures.catalogue import Illustration
@@ -122,16 +122,14 @@ def _summary(data: Aggregate) -> str:
 
 def _footnote(data: Aggregate) -> str:
     counts = {cell.done for cell in data.cells}
-    methods = {statistics.interval_method(n) for n in counts} - {"none"}
-    bootstrap = (
-        f"the BCa bootstrap at the expanded level ({statistics.RESAMPLES} resamples, fixed seed)"
-    )
+    methods = {interval_method(n) for n in counts} - {"none"}
+    both = "Student's t and Hall's transformation of it, the further end on each side"
     interval = {
         frozenset(): "",
-        frozenset({"bootstrap"}): f"; 95 % interval of the mean by {bootstrap}",
+        frozenset({"transformed"}): f"; 95 % interval of the mean by {both}",
         frozenset({"student"}): "; 95 % interval of the mean by Student's t",
-        frozenset({"bootstrap", "student"}): f"; 95 % interval of the mean by {bootstrap}, for "
-        f"fewer than {statistics.FEWEST_FOR_BOOTSTRAP} realisations by Student's t",
+        frozenset({"transformed", "student"}): f"; 95 % interval of the mean by {both}, for "
+        f"fewer than {FEWEST_FOR_SKEWNESS} realisations by Student's t",
     }[frozenset(methods)]
     kinds = {companion.kind for companion in data.companions}
     steps = (

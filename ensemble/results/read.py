@@ -66,6 +66,19 @@ class Results:
 
     def _check_shapes(self) -> None:
         wanted = scales(self.campaign, self.part)
+        known_names = [known.name for known in (*wanted, *datasets(self.campaign))]
+        missing = [name for name in known_names if name not in self._file]
+        if missing:
+            by = str(self.attributes.get("adhesis_version", "an unknown version"))
+            commit = str(self.attributes.get("commit", "unknown"))
+            if commit != "unknown":
+                by += f" (commit {commit[:12]})"
+            more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+            raise InputError(
+                f"{self.path} was written by adhesis {by}, whose results files do not hold "
+                f"{', '.join(missing[:3])}{more}: read it with that version, or compute the "
+                "campaign again into another file"
+            )
         for scale in wanted:
             if self._file[scale.name].shape != scale.values.shape:
                 raise ValueError(scale.name)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ensemble.campaign.precision import relative_error
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful
@@ -143,11 +144,11 @@ def _groups(
 
     def precision(i: int) -> dict[str, Any]:
         """How well the loss of a cell is known, and how well it is to be."""
-        from ensemble.campaign.precision import half_width
-
-        width = half_width(column["loss"][done & (group_of == i)])
-        known = width if np.isfinite(width) else None
-        return {"relative_error": known, "wanted_relative_error": wanted}
+        now = relative_error(column["loss"][done & (group_of == i)])
+        return {
+            "relative_error": now if np.isfinite(now) else None,
+            "wanted_relative_error": wanted,
+        }
 
     seconds = mean_and_error("wall_time")
     loss, scaled = mean_and_error("loss"), mean_and_error("loss_dimensionless")

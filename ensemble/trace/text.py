@@ -26,6 +26,10 @@ _MISSING = frozenset(
 )  # fmt: skip
 _FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-]*")  # of a line: perhaps several, with commas
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
+# A name and its unit, in brackets or behind a stroke or "in"; what follows is the next name.
+_NAME_AND_UNIT = re.compile(
+    r"[^(\[<{/]*?(?:\([^)]*\)|\[[^\]]*\]|<[^>]*>|\{[^}]*\}|\s*/\s*[^\W\d]+|\sin\s+[^\W\d]+)(?=[\s,]|$)[\s,]*"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +87,7 @@ def read_table(path: Path, delimiter: str | None = None, decimal: str | None = N
     header = [line.strip().lstrip(_COMMENT).strip() for line in lines[:start]]
     rows, places = _rows(path, lines, start, count, delimiter, decimal)
     # Of one column, a line of the header is a name as a whole.
-    fields = [(line,) if count == 1 else tuple(_split(line, delimiter, True)) for line in header]
+    fields = [(line,) if count == 1 else _names(line, delimiter, count) for line in header]
     return Table(
         columns=np.array(rows).T.reshape(count, -1),
         header=tuple(line for line in header if line),
@@ -190,6 +194,21 @@ def _one_comma(path: Path, sample: Sequence[str]) -> str:
         f"{path} has rows such as {sample[0].strip()!r}, which can be one number with a decimal "
         "comma or two: give --decimal"
     )
+
+
+def _names(line: str, delimiter: str, count: int) -> tuple[str, ...]:
+    """Fields of a line of the header, which need not be set apart as the numbers are."""
+    fields = _split(line, delimiter, True)
+    for sign in DELIMITERS:
+        if len(fields) == count:
+            break
+        fields = _split(line, sign, True)
+    if len(fields) != count:
+        # "x (mm) h (um)": a name ends where its unit does.
+        named = _NAME_AND_UNIT.findall(line)
+        if "".join(named).split() == line.split():
+            fields = [field.strip(" ,") for field in named]
+    return tuple(fields)
 
 
 def _split(line: str, delimiter: str, header: bool = False) -> list[str]:

@@ -44,7 +44,7 @@ _OTHER_NAMES = {
 _CLEAR = [n for n in (*METRES, *_OTHER_NAMES) if n.lower() not in ("m", "in", "a")]
 _WORD = "|".join(sorted(map(re.escape, _CLEAR), key=len, reverse=True))
 _IN_TEXT = re.compile(rf"(?<![^\W\d_])({_WORD})(?![^\W_])(?!\s*[/^²])", re.IGNORECASE)
-_IN_BRACKETS = re.compile(r"[(\[<{/=:]\s*(m|in|a)\s*(?=[)\]>}]|$)", re.IGNORECASE)
+_IN_BRACKETS = re.compile(r"(?:[(\[<{/=:]|\bin\s)\s*(m|in|a)\s*(?=[)\]>}]|$)", re.IGNORECASE)
 
 _X = re.compile(
     r"\b(x|pos(ition)?s?|lateral|horizontal|distances?|length|lengths|weg|abstand|länge)\b", re.I

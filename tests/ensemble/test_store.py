@@ -297,10 +297,13 @@ def test_truncated_files_are_refused(path, share):
     assert "is not a results file of adhesis, or it is damaged" in refused(path)
 
 
-def test_a_file_that_lacks_a_dataset_is_refused(path):
+def test_a_file_of_before_a_dataset_came_to_be_is_refused_with_its_version(path):
     with h5py.File(path, "r+") as file:
         del file["loss"]
-    assert "damaged" in refused(path)
+        file.attrs["adhesis_version"], file.attrs["commit"] = "0.9.0", "0123456789abcdef"
+    said = refused(path)
+    assert "was written by adhesis 0.9.0 (commit 0123456789ab)" in said
+    assert "do not hold loss: read it with that version" in said
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

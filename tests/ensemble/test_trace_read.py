@@ -46,6 +46,14 @@ UM = "x (µm);z (µm)"
 TEXTS: dict[str, list[str]] = {
     "csv": ["x [um],z [um]", *rows(",", ".")],
     "comment header": ["# Position / µm   Height / µm", *rows("  ", ".")],
+    "names and units between single spaces": ["# x (mm) h (um)", *rows(" ", ".", 1e3, 1e6, ".7f")],
+    "brackets and spaces": ["# x [mm]  z [µm]", *rows(" ", ".", 1e3, 1e6, ".7f")],
+    "strokes and spaces": ["# x / mm z / µm", *rows("  ", ".", 1e3, 1e6, ".7f")],
+    "units in words": ["% position in mm, height in m", *rows(" ", ".", 1e3, 1, ".12f")],
+    "a header with other signs": [
+        "#x (mm); profile z (µm)",
+        *rows("\t", ".", 1e3, 1e6, ".7f"),
+    ],
     "tabs": ["Distance (mm)\tHeight (nm)", *rows("\t", ".", 1e3, 1e9, ".7f")],
     "semicolons and decimal commas": [UM, *rows(";", ",")],
     "tabs and decimal commas": ["Weg [mm]\tHöhe [µm]", *rows("\t", ",", 1e3, 1e6, ".7f")],

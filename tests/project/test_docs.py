@@ -64,6 +64,8 @@ NOT_RUN = {
     ),
     "python benchmarks/trace_coverage.py --cases 20 --json out/coverage.json": "takes minutes; "
     "test_trace_answer.py runs two cases",
+    "python benchmarks/precision_coverage.py --campaigns 4000": "takes minutes; "
+    "test_precision.py asks four kinds of a thousand",
     'pip install "adhesis[instruments]"': "needs a network",
 }
 # Blocks that are neither code nor commands, by how they begin.

@@ -7,7 +7,8 @@ import numpy as np
 from ensemble.aggregate.average import Aggregate
 from ensemble.aggregate.cells import Cell, stress_scale
 from ensemble.aggregate.companions import difference
-from ensemble.aggregate.statistics import Estimate, interval_method
+from ensemble.aggregate.statistics import Estimate
+from ensemble.interval import interval_method
 from ensemble.report import paper
 from ensemble.report.tables.key import axis_columns, key, key_columns
 from ensemble.report.tables.table import (

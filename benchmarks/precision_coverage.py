@@ -1,0 +1,139 @@
+"""How often the 95 % interval of a mean holds the mean: at a fixed number, and at the stop.
+
+    python benchmarks/precision_coverage.py --campaigns 1000
+    python benchmarks/precision_coverage.py --fixed --campaigns 20000
+
+Losses are made up, of known mean 1. The first table is of campaigns with ``[stop]``: each cell gets
+batches until the rule has enough, and the interval at that moment either holds 1 or does not. The
+second is of so many realisations and no rule, Student's interval beside the one that is used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from ensemble.campaign.precision import enough, looks
+from ensemble.interval import interval
+
+Array = NDArray[np.float64]
+Draw = Callable[[np.random.Generator, tuple[int, int]], Array]
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Made-up losses of mean 1; ``std`` is that of one of them."""
+
+    name: str
+    draw: Draw
+    std: float
+
+
+def lognormal(sigma: float) -> Losses:
+    """Of this standard deviation of the logarithm."""
+    return Losses(
+        f"lognormal, σ = {sigma:g}",
+        lambda rng, shape: rng.lognormal(-(sigma**2) / 2, sigma, shape),
+        float(np.sqrt(np.expm1(sigma**2))),
+    )
+
+
+def pareto(k: float) -> Losses:
+    """Of density ∝ x^-(k + 1): no k-th moment."""
+    return Losses(
+        f"Pareto, exponent {k:g}",
+        lambda rng, shape: (rng.pareto(k, shape) + 1) * (k - 1) / k,
+        float(1 / np.sqrt(k * (k - 2))),
+    )
+
+
+KINDS = (
+    Losses(
+        "normal, standard deviation 0.25 of the mean",
+        lambda rng, shape: rng.normal(1, 0.25, shape),
+        0.25,
+    ),
+    lognormal(0.5),
+    lognormal(1.0),
+    Losses("exponential", lambda rng, shape: rng.exponential(1, shape), 1.0),
+    Losses(
+        "Student's t with 3 degrees, standard deviation 0.5",
+        lambda rng, shape: 1 + 0.5 / np.sqrt(3) * rng.standard_t(3, shape),
+        0.5,
+    ),
+    pareto(4.0),
+    pareto(3.0),
+    pareto(2.5),
+)
+# Numbers of realisations of the table without a rule.
+FIXED = (3, 5, 7, 10, 20, 50, 100)
+
+
+def at_the_stop(
+    losses: Losses, wanted: float, campaigns: int, *, batch: int = 8, most: int = 1000
+) -> tuple[float, float, float]:
+    """Coverage, median number of realisations, and share of campaigns that went to the end."""
+    rng = np.random.default_rng(11)
+    at, held, counts = looks(batch, batch, most), 0, []
+    for _ in range(campaigns):
+        values = losses.draw(rng, (1, most))[0]
+        count = enough(values, at, wanted)
+        assert count is not None
+        low, high = interval(values[:count])
+        held += bool(low <= 1 <= high)
+        counts.append(count)
+    return held / campaigns, float(np.median(counts)), float(np.mean(np.array(counts) == most))
+
+
+def at_a_number(losses: Losses, n: int, ensembles: int) -> tuple[float, float, float]:
+    """Coverage of the interval and of Student's, and the ratio of their mean widths."""
+    values = losses.draw(np.random.default_rng([11, n]), (ensembles, n))
+    low, high = interval(values)
+    mean, half = values.mean(axis=-1), stdtrit(n - 1, 0.975) * values.std(axis=-1, ddof=1)
+    half = half / np.sqrt(n)
+    return (
+        float(np.mean((low <= 1) & (high >= 1))),
+        float(np.mean(np.abs(mean - 1) <= half)),
+        float(np.mean(high - low) / np.mean(2 * half)),
+    )
+
+
+def main() -> None:
+    """Print one of the two tables."""
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser.add_argument("--campaigns", type=int, default=1000)
+    parser.add_argument("--batch", type=int, default=8)
+    parser.add_argument("--most", type=int, default=1000)
+    parser.add_argument("--fixed", action="store_true", help="at fixed numbers, without a rule")
+    options = parser.parse_args()
+    if options.fixed:
+        print("| losses |", " | ".join(f"n = {n}" for n in FIXED), "|")
+        for losses in KINDS:
+            row = [at_a_number(losses, n, options.campaigns) for n in FIXED]
+            cells = [f"{used:.3f}, {students:.3f}, {width:.2f}" for used, students, width in row]
+            print(f"| {losses.name} |", " | ".join(cells), "|", flush=True)
+        return
+    print("| losses | ± 20 % | ± 10 % | ± 5 % |")
+    for losses in KINDS:
+        cells = []
+        for wanted in (0.2, 0.1, 0.05):
+            held, median, ended = at_the_stop(
+                losses, wanted, options.campaigns, batch=options.batch, most=options.most
+            )
+            least = (1.96 * losses.std / wanted) ** 2
+            end = f"; {ended:.0%} at the end" if ended else ""
+            cells.append(f"{held:.1%} ({median:.0f} of {least:.0f}{end})")
+        print(f"| {losses.name} |", " | ".join(cells), "|", flush=True)
+
+
+if __name__ == "__main__":
+    main()

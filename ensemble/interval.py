@@ -1,0 +1,77 @@
+"""The 95 % interval of a mean: the one that tables print and that ``[stop]`` goes by.
+
+For five values or more it reaches as far on each side as the further of two intervals:
+
+- Student's, which is exact for values with a normal distribution, and too narrow on the side of
+  the tail for skewed ones: it misses the mean of twenty exponential values in 8 % of all ensembles,
+  not in 5 %, nearly always from below;
+- Hall's, by the cubic that takes the skewness out of Student's t (Hall 1992, J. R. Stat. Soc. B
+  54, 221), with Student's quantiles for normal ones. It follows skewness, and where a tail is heavy
+  but even it takes the accident of one sample for skewness.
+
+Neither is safe alone; docs/theory.md has the measured coverage of all three. Of fewer values no
+skewness can be told: those have Student's. Nothing is drawn at random, and nothing weighs: a run
+with ``[stop]`` looks at its intervals as it goes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
+
+CONFIDENCE = 0.95
+FEWEST_FOR_SKEWNESS = 5
+
+Array = NDArray[np.float64]
+
+
+def interval_method(n: int) -> str:
+    """How the interval of ``n`` values is found: "transformed", "student" or "none"."""
+    return "transformed" if n >= FEWEST_FOR_SKEWNESS else "student" if n >= 2 else "none"
+
+
+def interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
+    """Interval of the mean over the last axis.
+
+    Parameters
+    ----------
+    values : array, shape (…, n)
+        Finite.
+    confidence : float
+
+    Returns
+    -------
+    low, high : array, shape (…)
+        NaN for n < 2; both the mean where all values are equal.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    n = values.shape[-1]
+    if n < 2:
+        nothing = np.full(values.shape[:-1], np.nan)
+        return nothing, nothing.copy()
+    mean = values.mean(axis=-1)
+    away = values - mean[..., np.newaxis]
+    square = np.mean(away * away, axis=-1)
+    # Of equal values the spread is rounding, and its skewness anything.
+    spread = np.max(np.abs(away), axis=-1) > 1e-14 * np.abs(mean)
+    std = np.where(spread, np.sqrt(square * n / (n - 1)), 0.0)
+    t = float(stdtrit(n - 1, 0.5 + confidence / 2)) / np.sqrt(n)
+    low, high = mean - std * t, mean + std * t
+    if n < FEWEST_FOR_SKEWNESS:
+        return low, high
+    cube = np.mean(away * away * away, axis=-1)
+    skewness = np.where(spread, cube, 0.0) / np.where(spread, square, 1.0) ** 1.5
+    above, below = untransformed(t, skewness, n), untransformed(-t, skewness, n)
+    return np.minimum(low, mean - std * above), np.maximum(high, mean - std * below)
+
+
+def untransformed(x: float, skewness: Array, n: int) -> Array:
+    """Return (mean - true mean)/std where Hall's cubic of it is ``x``.
+
+    The cubic is w + g w²/3 + g² w³/27 + g/(6n), of skewness g: monotonic, and solved in closed form
+    (Hall 1992, eq. 2.2).
+    """
+    g = np.where(np.abs(skewness) < 1e-6, 1e-6, skewness)
+    solved: Array = 3 / g * (np.cbrt(1 + g * (x - g / (6 * n))) - 1)
+    return solved
