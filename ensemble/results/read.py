@@ -66,8 +66,8 @@ class Results:
 
     def _check_shapes(self) -> None:
         wanted = scales(self.campaign, self.part)
-        known_names = [known.name for known in (*wanted, *datasets(self.campaign))]
-        missing = [name for name in known_names if name not in self._file]
+        names = [scale.name for scale in wanted] + [d.name for d in datasets(self.campaign)]
+        missing = [name for name in names if name not in self._file]
         if missing:
             by = str(self.attributes.get("adhesis_version", "an unknown version"))
             commit = str(self.attributes.get("commit", "unknown"))
