@@ -6,6 +6,7 @@ import numpy as np
 
 from solver.compiled import compiled
 from solver.profile import Array
+from solver.sharp.along import first_fall, openings_along
 from solver.sharp.balance import (
     Law,
     at_least,
@@ -17,12 +18,17 @@ from solver.sharp.balance import (
 )
 from solver.sharp.box import off_saddle, running_step
 from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
-from solver.sharp.field import Kinds, Rules, choose_kinds, solve
+from solver.sharp.field import Kinds, Rules, Solution, choose_kinds, solve
 from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.linear import is_definite
 from solver.sharp.source import Panels
 
 _REUSES = 8  # running steps that share one tangent
+# Longer steps, in longest unchecked ones, are looked at for a minimum that they leap over.
+_UNCHECKED_ALONE = 2.0  # of an edge that runs alone
+_STRIDE = 3.0  # longest of all
+_STRIDE_ALONE = 6.0
+_RUNS = 0.25  # edges that move by this share of the longest motion run
 _NOISE = 1e-3  # a rise of the energy below this share of the work done both ways is rounding
 _TIE = 1e-3  # two ways off a saddle whose gains differ by less are equal
 _LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
@@ -92,6 +98,9 @@ def descend(
     values = np.zeros(edges)
     matrix = np.zeros((edges, edges))  # tangent, or eigenvectors of the Hessian
     kinds = least
+    stride = 0.0
+    checked = np.empty(0, dtype=np.int64)  # edges that ran far in the last step
+    departed = np.empty(0)  # how their forces changed at its start
     passed = np.empty((64, edges))
     passed[0] = gaps.ravel()
     count = 1
@@ -101,7 +110,7 @@ def descend(
         held = runners > 0 and reuses < _REUSES
         table = map_gaps(gaps)
         kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
-        of = solve(gaps, prescribed, law.hold, kinds, 1 if held else 2, rules, panels)
+        of = solve(gaps, prescribed, law.hold, kinds, 2, rules, panels)
         if not np.isfinite(of.pressure):
             return gaps, LOST, fields, tangents, kinds, passed[:count], astray
         residual, drift = imbalance(of, law, panels)
@@ -116,8 +125,27 @@ def descend(
             work = 0.5 * (force[e] + fresh[e]) * last[e]
             rise += work
             fall += abs(work)
+        if checked.shape[0] > 0:
+            arrived = _rates(of, residual, drift, last, checked, rules)
+            clear = 1.0
+            for i in range(checked.shape[0]):
+                e = checked[i]
+                onwards = -np.sign(last[e])
+                clear = min(
+                    clear,
+                    first_fall(onwards * force[e], departed[i], onwards * fresh[e], arrived[i]),
+                )
+            checked = np.empty(0, dtype=np.int64)
+            if clear < 1:
+                gaps = moved_gaps(before, clear * last)
+                passed[count - 1] = gaps.ravel()
+                stride = 0.0
+                runners = 0
+                last = np.zeros(edges)
+                continue
         if rise > _NOISE * fall and share > _LEAST_SHARE and fields > 1:
             gaps = before
+            count -= 1
             share *= 0.5
             runners = 0
             last = np.zeros(edges)
@@ -126,8 +154,12 @@ def descend(
             share = min(1.0, 2 * share)
         force = fresh
         longest = share * law.longest
-        alone = 2 * longest if runners == 1 else longest
-        limit = limits(table, alone)
+        unchecked = _UNCHECKED_ALONE * longest if runners == 1 else longest
+        reach = unchecked
+        if runners > 0:
+            stride = min(max(2 * stride, 1.0), _STRIDE_ALONE if runners == 1 else _STRIDE)
+            reach = max(reach, stride * longest)
+        limit = limits(table, reach)
         if track.shape[0] > 0 and fields % _LOOK_EVERY == 0:
             away = _distance(gaps.ravel(), track, law.longest)
             off = away > _MET * law.longest
@@ -154,7 +186,7 @@ def descend(
         if held:
             turns = False
             for e in range(edges):
-                if abs(step[e]) > 0.2 * longest and step[e] * last[e] <= 0:
+                if abs(step[e]) > 0.2 * reach and step[e] * last[e] <= 0:
                     turns = True
             if turns:
                 runners = 0
@@ -180,9 +212,15 @@ def descend(
         if not size < np.inf:
             return gaps, LOST, fields, tangents, kinds, passed[:count], astray
         runners = 0
-        for e in range(edges):
-            if abs(step[e]) > 0.5 * longest:
-                runners += 1
+        if size > 0.5 * longest:
+            running = np.flatnonzero(np.abs(step) > max(_RUNS * size, 0.5 * longest))
+            runners = running.shape[0]
+            if size > unchecked:
+                if np.any(force[running] * step[running] >= 0):  # pulled along by others
+                    step *= unchecked / size
+                else:
+                    checked = running
+                    departed = _rates(of, residual, drift, step, checked, rules)
         before = gaps
         gaps = moved_gaps(gaps, step)
         last = step
@@ -200,6 +238,20 @@ def descend(
 
 
 @compiled
+def _rates(
+    of: Solution, residual: Array, drift: Array, way: Array, edges: Kinds, rules: Rules
+) -> Array:
+    """How the force on each of ``edges``, along its own way, changes along the way of all."""
+    rates = openings_along(of, way, edges, rules)
+    for i in range(edges.shape[0]):
+        e = edges[i]
+        critical = of.opening[e] - residual[e]
+        rate = critical * drift[e] * (1 - 2 * (e % 2)) * way[e] - np.sign(of.opening[e]) * rates[i]
+        rates[i] = 2 * rate * np.sign(way[e])
+    return rates
+
+
+@compiled
 def _distance(at: Array, track: Array, longest: float) -> float:
     """Largest distance of an edge from the track, where that is nearest; inf if it is far."""
     least = np.inf
@@ -211,11 +263,11 @@ def _distance(at: Array, track: Array, longest: float) -> float:
             way = track[i + 1, e] - track[i, e]
             off = at[e] - track[i, e]
             widest = max(widest, abs(way), 0.25 * abs(off))
-            if widest > 2.5 * longest:  # far, or between the tracks of two descents
+            if widest > 1.2 * _STRIDE_ALONE * longest:  # far, or between the tracks of two descents
                 break
             along += way * off
             square += way * way
-        if widest > 2.5 * longest or square == 0:
+        if widest > 1.2 * _STRIDE_ALONE * longest or square == 0:
             continue
         share = min(max(along / square, 0.0), 1.0)
         worst = 0.0
