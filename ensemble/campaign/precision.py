@@ -34,6 +34,12 @@ def looks(first: int, batch: int, most: int) -> list[int]:
     return sorted({*range(first, most, batch), most})
 
 
+def fewest(at: Sequence[int]) -> int:
+    """Return the fewest realisations after which a cell can have enough, by its looks."""
+    first = next((place for place, count in enumerate(at) if count >= LEAST), len(at) - 1)
+    return at[min(first + LOOKS_IN_A_ROW, len(at)) - 1]
+
+
 def relative_error(losses: Array) -> float:
     """How far the interval of the mean reaches from it, over the mean; infinite below two losses.
 

@@ -6,16 +6,19 @@ import math
 import resource
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ensemble.campaign.compare import compare
+from ensemble.campaign.precision import fewest, looks
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
+from ensemble.errors import InputError
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, file_size
+from ensemble.results.schema import DONE, NOT_NEEDED, PENDING, file_size
 from ensemble.run.plan import group_of, prior
 from ensemble.run.progress import duration
 from ensemble.task.compute import Runner
@@ -26,6 +29,12 @@ PILOT_SECONDS = 60.0
 _MOST_CELLS_SHOWN = 60
 # Ranks are worth having as long as they are busy for this share of the time.
 _BUSY = 0.8
+# With [stop]: losses beyond the first of their cells before their spread says anything, and what
+# the rule takes more than one that knew the spread (docs/campaign-file.md).
+_FEWEST_FOR_SPREAD = 6
+_MORE_THAN_LEAST = 1.3
+
+Cell = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -57,16 +66,19 @@ class Price:
     Attributes
     ----------
     tasks, done : int
-        Tasks of the campaign or part, and those of them that are done.
+        Tasks of the campaign or part, and those of them that have a result.
     cells : tuple of CellPrice
     longest : float
-        Estimated CPU time of the longest task, in s.
+        Estimated CPU time of the longest task, or of the longest set of tasks that share a loading
+        branch, in s.
     file_bytes, rank_bytes : int
         Of the results file; of one rank's memory, as this process has had it.
     pilots : int
         Loops that were computed to find out.
     pilot_seconds : float
         Their CPU time.
+    stop : str
+        With ``[stop]``: for how many realisations a cell the price is, and why.
     """
 
     tasks: int
@@ -77,6 +89,12 @@ class Price:
     rank_bytes: int
     pilots: int
     pilot_seconds: float
+    stop: str = ""
+
+    @property
+    def left(self) -> int:
+        """Tasks still to do; with ``[stop]`` an estimate."""
+        return sum(cell.tasks for cell in self.cells)
 
     @property
     def seconds(self) -> float:
@@ -90,10 +108,32 @@ class Price:
     @property
     def most_workers(self) -> int:
         """Workers that are still busy for most of the time."""
-        left = sum(cell.tasks for cell in self.cells)
         if not self.longest:
-            return max(1, left)
-        return max(1, min(left, math.floor(self.seconds / (_BUSY * self.longest))))
+            return max(1, self.left)
+        return max(1, min(self.left, math.floor(self.seconds / (_BUSY * self.longest))))
+
+
+class _Known:
+    """Times and losses by cell, of loops that are done or were tried out."""
+
+    def __init__(self, tasks: list[Task]) -> None:
+        self.seconds: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
+        self.losses: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
+
+    def add(self, cell: Cell, seconds: float, loss: float) -> None:
+        """Take in a loop; a loss that is not known is NaN."""
+        self.seconds[cell].append(seconds)
+        if math.isfinite(loss):
+            self.losses[cell].append(loss)
+
+    def spread(self) -> tuple[float, int]:
+        """Standard deviation of a loss over the mean of its cell, and the losses that tell it."""
+        cells = [np.array(losses) for losses in self.losses.values() if len(losses) > 1]
+        freedom = sum(losses.size - 1 for losses in cells)
+        if freedom < _FEWEST_FOR_SPREAD:
+            return math.nan, 0
+        square = sum(float(np.sum((x / x.mean() - 1) ** 2)) for x in cells)
+        return math.sqrt(square / freedom), sum(losses.size for losses in cells)
 
 
 def price(
@@ -109,7 +149,8 @@ def price(
 
     Cells of which loops are done in the results file cost what those did. Of the others loops are
     tried out, the first realisation of each, then the second …, until the time is up; what was not
-    reached is scaled by how the tasks of such cells usually compare.
+    reached is scaled by how the tasks of such cells usually compare. Loops that share a loading
+    branch are tried out together.
 
     Parameters
     ----------
@@ -123,97 +164,161 @@ def price(
         Computes a task.
     on_pilot : callable
         Called after each loop that was tried out, with its CPU time in s.
+
+    Raises
+    ------
+    InputError
+        If the results file is damaged, or holds another campaign.
     """
     compute = compute or Runner()
     tasks = campaign.tasks(part)
-    times: dict[tuple[float, ...], list[float]] = {task.cell: [] for task in tasks}
-    done: set[Task] = set()
+    known = _Known(tasks)
+    left, done = tasks, 0
     if path is not None and path.exists():
-        with Results(path) as results:
-            known = zip(
-                *(results.tasks(), results.status(), results.column("cpu_time")), strict=True
-            )
-            for task, status, took in known:
-                if status == DONE and task.cell in times:
-                    times[task.cell].append(float(took))
-                    done.add(task)
-    left = [task for task in tasks if task not in done]
-    unknown = {task.cell for task in left if not times[task.cell]}
-    pilots, spent, end = 0, 0.0, time.monotonic() + seconds
-    # The cheapest first, so that as many cells as possible are met; realisation by realisation.
-    order = sorted(
-        (t for t in left if t.cell in unknown),
-        key=lambda t: (t.realisation, prior(t), group_of(campaign, t)),
-    )
-    for task in order:
+        left, done = _left(campaign, path, tasks, known)
+    pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
+    for unit in _units(campaign, [task for task in left if not known.seconds[task.cell]]):
         if time.monotonic() > end:
             break
-        took = float(compute(campaign, task)["cpu_time"])
-        times[task.cell].append(took)
-        pilots, spent = pilots + 1, spent + took
-        on_pilot(task, took)
-    return _sum_up(campaign, part, tasks, left, times, pilots, spent)
-
-
-def _sum_up(
-    campaign: Campaign,
-    part: Part,
-    tasks: list[Task],
-    left: list[Task],
-    times: dict[tuple[float, ...], list[float]],
-    pilots: int,
-    spent: float,
-) -> Price:
-    first = {task.cell: task for task in reversed(tasks)}
-    measured = {cell: float(np.mean(seconds)) for cell, seconds in times.items() if seconds}
-    scale = (
-        np.mean([seconds / prior(first[cell]) for cell, seconds in measured.items()])
-        if measured
-        else 0.0
+        together = 0.0
+        for task in unit:
+            row = compute(campaign, task)
+            took = float(row["cpu_time"])
+            known.add(task.cell, took, float(row.get("loss", math.nan)))
+            pilots, together = pilots + 1, together + took
+            on_pilot(task, took)
+        spent, longest = spent + together, max(longest, together)
+    cells, stop = _cells(campaign, tasks, left, known)
+    return Price(
+        tasks=len(tasks),
+        done=done,
+        cells=cells,
+        longest=max(longest, _longest(campaign, cells)) if left else 0.0,
+        file_bytes=file_size(campaign, part),
+        rank_bytes=_rank_bytes(),
+        pilots=pilots,
+        pilot_seconds=spent,
+        stop=stop,
     )
+
+
+def _left(
+    campaign: Campaign, path: Path, tasks: list[Task], known: _Known
+) -> tuple[list[Task], int]:
+    """Tasks that a run would compute, and the number of those with a result."""
+    mine = {campaign.identity(task): task for task in tasks}
+    with Results(path) as results:
+        difference = compare(results.campaign, campaign)
+        if difference.other:
+            raise InputError(
+                f"{path} holds another campaign: {'; '.join(difference.other)} "
+                "(here: this campaign, there: the file)"
+            )
+        rows = zip(
+            results.tasks(),
+            results.status().tolist(),
+            results.column("cpu_time").tolist(),
+            results.column("loss").tolist(),
+            strict=True,
+        )
+        done = 0
+        for theirs, status, took, loss in rows:
+            task = mine.get(results.campaign.identity(theirs))
+            if task is None:
+                continue
+            if status == DONE:
+                known.add(task.cell, took, loss)
+                done += 1
+            more = campaign.stop != results.campaign.stop and status == NOT_NEEDED
+            if status != PENDING and not more:
+                del mine[campaign.identity(task)]
+    return list(mine.values()), done
+
+
+def _units(campaign: Campaign, tasks: list[Task]) -> list[list[Task]]:
+    """Tasks that share a loading branch together; realisation by realisation, the cheapest first.
+
+    The cheapest first, so that as many cells as possible are met.
+    """
+    found: dict[Hashable, list[Task]] = {}
+    for task in tasks:
+        found.setdefault(campaign.branch_of(task) or task, []).append(task)
+    return sorted(
+        found.values(), key=lambda unit: (unit[0].realisation, sum(prior(task) for task in unit))
+    )
+
+
+def _cells(
+    campaign: Campaign, tasks: list[Task], left: list[Task], known: _Known
+) -> tuple[tuple[CellPrice, ...], str]:
+    first: dict[Cell, Task] = {}
+    for task in tasks:
+        first.setdefault(task.cell, task)
+    mean = {cell: float(np.mean(seconds)) for cell, seconds in known.seconds.items() if seconds}
+    scale = float(np.mean([t / prior(first[cell]) for cell, t in mean.items()])) if mean else 0.0
     count = dict.fromkeys(first, 0)
     for task in left:
         count[task.cell] += 1
-    cells = tuple(
-        CellPrice(
-            task,
-            count[cell],
-            measured.get(cell, float(scale * prior(task))),
-            len(times[cell]),
-        )
+    stop = ""
+    if campaign.stop.relative_error is not None:
+        wanted, stop = _realisations(campaign, known)
+        for cell in count:
+            have = campaign.realisations - count[cell]
+            count[cell] = min(count[cell], max(0, wanted - have))
+    return tuple(
+        CellPrice(task, count[cell], mean.get(cell, scale * prior(task)), len(known.seconds[cell]))
         for cell, task in first.items()
+    ), stop
+
+
+def _realisations(campaign: Campaign, known: _Known) -> tuple[int, str]:
+    """Realisations that a cell takes with ``[stop]``, and a sentence on it."""
+    at = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
+    few = fewest(at)
+    spread, losses = known.spread()
+    if not losses:
+        return at[-1], f"[stop]: {few} to {at[-1]} realisations a cell; the price is for {at[-1]}"
+    assert campaign.stop.relative_error is not None
+    needed = _MORE_THAN_LEAST * (1.96 * spread / campaign.stop.relative_error) ** 2
+    count = next((look for look in at if look >= max(needed, few)), at[-1])
+    return count, (
+        f"[stop]: about {count} realisations a cell, as {losses} losses scatter by "
+        f"{100 * spread:.2g} % so far; at least {few}, at most {at[-1]}"
     )
-    slowest = max([t for seconds in times.values() for t in seconds], default=0.0)
-    waiting = [cell.seconds for cell in cells if cell.tasks]
+
+
+def _longest(campaign: Campaign, cells: tuple[CellPrice, ...]) -> float:
+    """Mean time of the longest task, or set of tasks that share a loading branch."""
+    together: dict[Hashable, float] = {}
+    for cell in cells:
+        if cell.tasks:
+            key = group_of(campaign, cell.task)
+            together[key] = together.get(key, 0.0) + cell.seconds
+    return max(together.values(), default=0.0)
+
+
+def _rank_bytes() -> int:
     kibibytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return Price(
-        tasks=len(tasks),
-        done=len(tasks) - len(left),
-        cells=cells,
-        longest=max(slowest, *waiting) if waiting else 0.0,
-        file_bytes=file_size(campaign, part),
-        rank_bytes=kibibytes if sys.platform == "darwin" else 1024 * kibibytes,
-        pilots=pilots,
-        pilot_seconds=spent,
-    )
+    return kibibytes if sys.platform == "darwin" else 1024 * kibibytes
 
 
 def as_text(price: Price) -> str:
     """Return a price as lines for people."""
-    left = price.tasks - price.done
     tried = (
         f"{price.pilots} pilot loops of {duration(price.pilot_seconds)} in all"
         if price.pilots
         else "the loops that are done"
     )
     lines = [
-        f"{left} tasks to do in {len(price.cells)} cells, {price.done} done; nothing was written",
+        f"{price.left} tasks to do in {len(price.cells)} cells, {price.done} done; "
+        "nothing was written",
+        *([price.stop] if price.stop else []),
         f"{price.seconds / 3600:.3g} core hours, by {tried}; "
         f"the longest task takes about {duration(price.longest)}",
         f"results file {price.file_bytes / 1e6:.3g} MB, "
         f"about {price.rank_bytes / 1e6:.0f} MB of memory a rank",
     ]
-    if left:
+    if price.left:
         lines.append(f"one process takes {duration(price.makespan(1))}")
         for workers in sorted({2, 8, 32, 128, price.most_workers}):
             if 1 < workers <= price.most_workers:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tasks import Part
+from ensemble.errors import InputError
 from ensemble.results.layout import create
 from ensemble.results.write import Writer
 from ensemble.run.price import as_text, price
@@ -55,6 +57,57 @@ def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
     told = price(campaign, path, compute=compute)
     assert (told.done, told.pilots) == (6, 2)
     assert told.seconds == pytest.approx(cost(campaign.tasks()[6]) + cost(campaign.tasks()[7]))
+
+
+def test_a_results_file_of_another_campaign_is_refused(tmp_path):
+    path = tmp_path / "r.h5"
+    create(path, parse_campaign(campaign_text()))
+    other = parse_campaign(campaign_text(period="2e-3"))
+    with pytest.raises(InputError, match=r"r\.h5 holds another campaign: .*period"):
+        price(other, path, compute=compute)
+
+
+def test_loops_on_one_loading_branch_are_tried_together(monkeypatch):
+    """Time is up within the first three loops: they are gone through, and no others."""
+    clock = iter(range(100))
+    monkeypatch.setattr("ensemble.run.price.time.monotonic", lambda: float(next(clock)))
+    one = {"hurst": "[0.8]", "work_of_adhesion": "[0.04]", "max_penetration": "[0.3, 0.6, 0.9]"}
+    campaign = parse_campaign(campaign_text(**one))
+    took = {0.3: 2.0, 0.6: 3.0, 0.9: 4.0}
+
+    def compute(campaign, task):
+        return {"cpu_time": took[dict(task.others)["max_penetration"]]}
+
+    told = price(campaign, compute=compute, seconds=1.0)
+    assert told.pilots == 3
+    assert told.longest == pytest.approx(9.0)  # a rank gets all three
+    assert [cell.seconds for cell in told.cells] == [2.0, 3.0, 4.0]
+    assert [cell.measured for cell in told.cells] == [1, 1, 1]
+
+
+def test_with_a_stop_the_spread_of_the_losses_tells_how_many(tmp_path):
+    stop = "[stop]\nrelative_error = 0.1\nmost = 200\n"
+    campaign = parse_campaign(campaign_text(realisations="8") + stop)
+    rng = np.random.default_rng(1)
+
+    def compute(campaign, task):
+        return {"cpu_time": 1.0, "loss": 3.0 * (1 + 0.4 * rng.standard_normal())}
+
+    told = price(campaign, compute=compute)  # all 200 of each cell are tried: they take no time
+    assert told.left in (4 * 80, 4 * 88)  # whole batches
+    assert "as 800 losses scatter by 40 % so far; at least 56, at most 200" in as_text(told)
+    blind = price(campaign, compute=compute, seconds=-1.0)
+    assert "[stop]: 56 to 200 realisations a cell; the price is for 200" in as_text(blind)
+    # What the rule has left out is not priced.
+    path = tmp_path / "r.h5"
+    create(path, campaign)
+    with Writer(path) as writer:
+        for row, task in enumerate(campaign.tasks()[:72]):
+            writer.write_result(row, fake_result(campaign, task) | {"cpu_time": 7.0})
+        writer.mark(range(72, 200), needed=False)
+    told = price(campaign, path, compute=compute, seconds=-1.0)
+    assert told.done == 72
+    assert told.cells[0].tasks == 0
 
 
 def test_a_part_costs_its_share():
