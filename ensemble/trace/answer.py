@@ -266,11 +266,13 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     if last is not None and abs(last) > _NOT_CONVERGED:
         found.append(
             f"the short-wave end is not converged: the last halving of the shortest wave changes "
-            f"the loss by {-last / (1 + last):+.0%}; a finer step or a sharper tip would tell more"
+            f"the loss by {-100 * last / (1 + last):+.0f} %; a finer step or a sharper tip would "
+            "tell more"
         )
     if loss.relative > 0.5:
         found.append(
-            f"the loss is known to {loss.relative:.0%} only: measure a longer trace, or several"
+            f"the loss is known to {100 * loss.relative:.0f} % only: measure a longer trace, or "
+            "several"
         )
     races = answer.main["races"]
     if races:

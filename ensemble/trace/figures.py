@@ -227,6 +227,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
         ("contact_fraction", 1.0, "largest $A/A_0$", answer.contact_fraction),
     )
     for line, (key, by, label, quantity) in enumerate(rows):
+        top = 0.0
         for column, points in enumerate((sorted(gammas, key=_first), sorted(depths, key=_first))):
             axes: Axes = panels[line, column]
             x = [point[0] for point in points]
@@ -234,7 +235,9 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
             bars = quantity.relative * np.abs(y)
             above = np.minimum(bars, 1 - y) if key == "contact_fraction" else bars
             axes.errorbar(x, y, yerr=[bars, above], fmt="o-", color=_BLUE)
-            axes.set_ylim(0, 1.1 * (1 + quantity.relative) * float(y.max()))
+            top = max(top, 1.1 * (1 + quantity.relative) * float(y.max()))
+        for axes in panels[line]:
+            axes.set_ylim(0, top)
         panels[line, 0].set_ylabel(label)
     panels[2, 0].set_xlabel("work of adhesion γ (J/m²)")
     panels[2, 1].set_xlabel(r"turning point $\Delta/h_{\max}$")

@@ -36,10 +36,11 @@ def summary(answer: Answer) -> str:
         f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area')} at most",
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to Δ/h_max = "
         f"{answer.cycle.max_penetrations[0]:g} with h_max = {length_text(loop['h_max'], 4)}; "
-        f"{loop['waves']} waves, {loop['patches']} patches, {loop['jumps']} jumps, "
+        f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
+        f"most, {loop['jumps']} jumps, "
         f"audit {loop['audit_residual']:.0e}",
         "doubts      "
-        + ", ".join(f"{name} {share:.1%}" for name, share in answer.loss.doubts.items())
+        + ", ".join(f"{name} {_percent(share)}" for name, share in answer.loss.doubts.items())
         + f" of the loss (standard uncertainties; the interval is {COVERAGE:g} times their sum)",
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
@@ -58,13 +59,24 @@ def write_page(answer: Answer, folder: Path) -> None:
 
 
 def _value(quantity: Quantity, by: float, unit: str) -> str:
-    value, half = by * quantity.value, by * quantity.uncertainty
+    unit = f" {unit}" if unit else ""
+    known = _with_interval(by * quantity.value, by * quantity.uncertainty)
+    return f"{known}{unit} (± {_percent(quantity.relative, 0)})"
+
+
+def _with_interval(value: float, half: float) -> str:
+    """Digits down to the first one of the interval."""
     digits = 0
     while digits < 6 and half * 10**digits < 9.5:
         digits += 1
     digits = max(digits - 1, 0)
-    unit = f" {unit}" if unit else ""
-    return f"{value:.{digits}f} ± {half:.{digits}f}{unit} (± {quantity.relative:.0%})"
+    return f"{value:.{digits}f} ± {half:.{digits}f}"
+
+
+def _percent(share: float, digits: int = 1, sign: str = "") -> str:
+    """Per cent, and no sign of what rounds to nothing."""
+    rounded = round(100 * share, digits) or 0.0
+    return f"{rounded:{sign if rounded else ''}.{digits}f} %"
 
 
 def _blocks(answer: Answer) -> list[Block]:
@@ -128,8 +140,9 @@ def _blocks(answer: Answer) -> list[Block]:
         blocks.append(
             (
                 "p",
-                f"A mirror image instead changes the loss by {mirror:+.1%}. It is not counted: it "
-                "is a body of twice the period, and the loss grows with the period.",
+                f"A mirror image instead changes the loss by {_percent(mirror, sign='+')}. It is "
+                "not counted: it is a body of twice the period, and the loss grows with the "
+                "period.",
             )
         )
     tables = _sweep_table(answer)
@@ -158,9 +171,9 @@ def _doubt_table(answer: Answer) -> list[list[str]]:
         shares = [q.doubts.get(name) for q in quantities]
         if any(share is not None for share in shares):
             words = _DOUBTS.get(name, "of the loop itself")
-            cells = ["" if share is None else f"{share:.1%}" for share in shares]
+            cells = ["" if share is None else _percent(share) for share in shares]
             rows.append([f"{name}: {words}", *cells])
-    rows.append(["interval", *(f"± {q.relative:.1%}" for q in quantities)])
+    rows.append(["interval", *(f"± {_percent(q.relative)}" for q in quantities)])
     return rows
 
 
@@ -179,7 +192,7 @@ def _variant_table(answer: Answer) -> list[list[str]]:
             [
                 f"{run.name}: {run.said}{against}",
                 f"{1e3 * found['loss']:.4g}",
-                "" if change is None else f"{change:+.1%}",
+                "" if change is None else _percent(change, sign="+"),
                 f"{1e-3 * found['pull_off_stress']:.4g}",
                 f"{found['contact_fraction']:.3f}",
                 f"{found['waves']}",
@@ -202,9 +215,11 @@ def _sweep_table(answer: Answer) -> list[list[str]]:
             [
                 f"{g:g}",
                 f"{d:g}",
-                f"{1e3 * r['loss']:.4g} ± {1e3 * r['loss'] * answer.loss.relative:.2g}",
-                f"{1e-3 * r['pull_off_stress']:.4g} ± "
-                f"{1e-3 * r['pull_off_stress'] * answer.pull_off_stress.relative:.2g}",
+                _with_interval(1e3 * r["loss"], 1e3 * abs(r["loss"]) * answer.loss.relative),
+                _with_interval(
+                    1e-3 * r["pull_off_stress"],
+                    1e-3 * r["pull_off_stress"] * answer.pull_off_stress.relative,
+                ),
                 f"{r['contact_fraction']:.3f}",
                 f"{r['jumps']}",
             ]

@@ -265,7 +265,8 @@ def _filled(
     share = float(gaps.mean())
     if share > _MOST_MISSING:
         raise InputError(
-            f"{trace.path} lacks {share:.1%} of its heights: up to {_MOST_MISSING:.0%} may lack"
+            f"{trace.path} lacks {100 * share:.1f} % of its heights: up to "
+            f"{100 * _MOST_MISSING:.0f} % may lack"
         )
     place = np.arange(heights.size)
     filled = heights.copy()
@@ -337,9 +338,9 @@ def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> Non
     share = float(2 * power[:2].sum() * q[0] / (2 * np.pi) / rms**2)
     if share > _LONG_WAVES:
         warnings.append(
-            f"waves longer than a third of the trace hold {min(share, 1.0):.0%} of the mean square "
-            "height: they decide the loss, and one trace has only one or two of them; measure a "
-            "longer one, or several, or take the form off (--degree)"
+            f"waves longer than a third of the trace hold {100 * min(share, 1.0):.0f} % of the "
+            "mean square height: they decide the loss, and one trace has only one or two of them; "
+            "measure a longer one, or several, or take the form off (--degree)"
         )
 
 

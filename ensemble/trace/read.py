@@ -343,7 +343,8 @@ def _even(
         if np.all(apart == 1) and np.abs(steps / step - 1).max() <= _UNEVEN:
             even = np.linspace(x[0], x[-1], x.size)
             said.append(
-                f"unequal steps ({np.abs(steps / step - 1).max():.1%}) put on equal ones, linearly"
+                f"unequal steps ({100 * np.abs(steps / step - 1).max():.1f} %) put on equal "
+                "ones, linearly"
             )
             return np.interp(even, x, heights), step, said
         far = int(np.argmax(off))

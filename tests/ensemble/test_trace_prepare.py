@@ -70,7 +70,7 @@ def test_drop_outs_are_interpolated_up_to_a_length() -> None:
     assert prepared(heights, longest_gap=110e-6).gaps.sum() == 105
     heights = Z.copy()
     heights[1:-1:6] = np.nan
-    with pytest.raises(InputError, match=r"lacks 16\.\d% of its heights"):
+    with pytest.raises(InputError, match=r"lacks 16\.\d % of its heights"):
         prepared(heights)
 
 

@@ -64,6 +64,9 @@ NOT_RUN = {
     ),
     "python benchmarks/trace_coverage.py --cases 20 --json out/coverage.json": "takes minutes; "
     "test_trace_answer.py runs two cases",
+    "adhesis trace long.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out/long": (
+        "takes minutes on a busy machine; as the trace before"
+    ),
     "python benchmarks/precision_coverage.py --campaigns 4000": "takes minutes; "
     "test_precision.py asks four kinds of a thousand",
     'pip install "adhesis[instruments]"': "needs a network",
