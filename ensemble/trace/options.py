@@ -8,7 +8,7 @@ from pathlib import Path
 from ensemble.errors import InputError
 from ensemble.trace.prepare import Prepared, prepare_trace
 from ensemble.trace.read import Trace, read_trace
-from ensemble.trace.units import length_text, parse_length
+from ensemble.trace.units import counted, length_text, parse_length
 
 _NAMES = (
     *("unit", "step", "columns", "delimiter", "decimal", "row", "channel", "degree", "cut_off"),
@@ -91,7 +91,7 @@ def what_was_read(prepared: Prepared) -> str:
     lines = [
         f"read        {trace.path}: {trace.points} points, step {length_text(trace.step, 5)}, "
         f"length {length_text(trace.length, 5)}, range {length_text(trace.height_range, 4)}, "
-        f"{trace.drop_outs} drop-outs"
+        f"{counted(trace.drop_outs, 'drop-out')}"
     ]
     lines += [f"            {said}" for said in trace.said]
     lines += [f"{step.name:<11} {step.said}" for step in prepared.steps]

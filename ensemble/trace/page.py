@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ensemble.trace.answer import _DOUBTS, COVERAGE, Answer, Quantity
 from ensemble.trace.figures import Drawn, draw_all
-from ensemble.trace.units import length_text
+from ensemble.trace.units import counted, length_text
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em;
@@ -108,7 +108,7 @@ def _blocks(answer: Answer) -> list[Block]:
                     f"{trace.points} points, step {length_text(trace.step, 5)}, "
                     f"length {length_text(trace.length, 5)}, "
                     f"range of heights {length_text(trace.height_range, 4)}, "
-                    f"{trace.drop_outs} drop-outs"
+                    f"{counted(trace.drop_outs, 'drop-out')}"
                 ],
             ],
         ),

@@ -82,7 +82,8 @@ class Plan:
     def said(self) -> str:
         """The plan in two or three lines."""
         lines = [
-            f"plan        {self.waves} waves, about {self.patches} patches at a time: "
+            f"plan        {self.waves} waves, about {self.patches} "
+            f"patch{'es' if self.patches != 1 else ''} at a time: "
             f"{len(self.runs)} loops, about {clock(sum(self.seconds.values()))} of CPU time, "
             f"{clock(self.wall)} on {self.processes} core{'s' if self.processes > 1 else ''}"
         ]

@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ensemble.errors import InputError
 from ensemble.trace.read import Trace
-from ensemble.trace.units import length_text
+from ensemble.trace.units import counted, length_text
 from solver.profile import Array, Profile
 from solver.trace import (
     Continuation,
@@ -233,7 +233,8 @@ def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) ->
     steps.append(
         Step(
             "outliers",
-            f"{count} outliers of up to {length_text(highest)} taken out, as drop-outs are",
+            f"{counted(count, 'outlier')} of up to {length_text(highest)} taken out, as drop-outs "
+            "are",
             {"points": count, "highest": highest},
         )
     )
@@ -274,7 +275,8 @@ def _filled(
     steps.append(
         Step(
             "drop-outs",
-            f"{int(gaps.sum())} heights ({share:.2%}) in {starts.size} gaps interpolated by "
+            f"{counted(int(gaps.sum()), 'height')} ({100 * share:.2g} %) in "
+            f"{counted(starts.size, 'gap')} interpolated by "
             f"straight lines, the longest over {length_text(longest_here)}",
             {"points": int(gaps.sum()), "gaps": starts.size, "longest": longest_here},
         )

@@ -11,7 +11,14 @@ import numpy as np
 from ensemble.errors import InputError
 from ensemble.trace.instrument import available, read_scan
 from ensemble.trace.text import Table, read_table
-from ensemble.trace.units import METRES, parse_units, step_of_header, units_of_header
+from ensemble.trace.units import (
+    METRES,
+    counted,
+    length_text,
+    parse_units,
+    step_of_header,
+    units_of_header,
+)
 from solver.profile import Array
 
 FEWEST_POINTS = 32
@@ -220,7 +227,7 @@ def _from_table(
             raise InputError(
                 f"{path} has heights without positions, and its header tells no step: give --step"
             )
-        said.append(f"step {step:.6g} m (header)")
+        said.append(f"step {length_text(step, 6)} (header)")
     return _checked(Trace(path, heights, float(step), tuple(said)), told=source != "numbers")
 
 
@@ -299,7 +306,10 @@ def _without_sentinels(heights: Array) -> tuple[Array, str]:
         known = _is_sentinel(float(value))
         if away > (_BEYOND_KNOWN if known else _BEYOND) * width and (times >= 3 or known):
             found = np.where(heights == value, np.nan, heights)
-            return found, f"{times} heights of {value:g} taken as drop-outs: far out of the range"
+            return (
+                found,
+                f"{counted(times, 'height')} of {value:g} taken as drop-outs: far out of the range",
+            )
     return np.where(np.isfinite(heights), heights, np.nan), ""
 
 
@@ -355,7 +365,7 @@ def _even(
     if index[-1] + 1 > x.size:
         whole = np.full(index[-1] + 1, np.nan)
         whole[index] = heights
-        said.append(f"{whole.size - x.size} positions left out: taken as drop-outs")
+        said.append(f"{counted(whole.size - x.size, 'position')} left out: taken as drop-outs")
         heights = whole
     return heights, step, said
 

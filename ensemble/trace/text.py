@@ -20,10 +20,11 @@ _SAMPLE = 400  # lines that the form of a file is judged by
 DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
 _COMMENT = "#%!*"
 _MISSING = frozenset(
-    ("", "nan", "-nan", "nan(ind)", "-1.#ind", "1.#qnan", "inf", "-inf", "+inf", "-", "--", "---",
-     "----", "*", "**", "***", "bad", "n/a", "na", "#n/a", "null", "none", "nil", "invalid",
+    ("", "nan", "-nan", "nan(ind)", "-1.#ind", "1.#qnan", "inf", "-inf", "+inf",
+     "bad", "n/a", "na", "#n/a", "null", "none", "nil", "invalid",
      "missing", "nd", "overflow", "underflow", "x", "?")
 )  # fmt: skip
+_STARS = re.compile(r"[-*]+|#{2,}")  # as wide as the number that is missing
 _FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-]*")  # of a line: perhaps several, with commas
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 # A name and its unit, in brackets or behind a stroke or "in"; what follows is the next name.
@@ -228,10 +229,14 @@ def _split(line: str, delimiter: str, header: bool = False) -> list[str]:
 # ---------------------------------------------------------------------- numbers
 
 
+def _is_missing(field: str) -> bool:
+    return field.lower() in _MISSING or bool(_STARS.fullmatch(field))
+
+
 def _value(field: str, decimal: str) -> float | None:
     """Number of a field: NaN for a gap, None for a word."""
     plain = field.strip().strip('"').strip()
-    if plain.lower() in _MISSING:
+    if _is_missing(plain):
         return float("nan")
     if not _NUMBER.fullmatch(plain) or (decimal == "," and "." in plain):
         return None
@@ -265,7 +270,8 @@ def _rows(
     foreign: int | None = None
     for place in range(start, len(lines)):
         line = lines[place]
-        if line.strip() and line.strip()[0] in _COMMENT and line.strip().lower() not in _MISSING:
+        begin = line.strip()[:1]
+        if begin and begin in _COMMENT and (begin == "#" or not _is_missing(line.strip())):
             continue
         if not line.strip() and count > 1:
             continue  # of one column, an empty line is a gap: it has its place

@@ -122,7 +122,7 @@ def test_npy_of_one_column_and_of_two(tmp_path: Path) -> None:
     assert_right(read_trace(tmp_path / "b.npy", unit="um", step=STEP))
 
 
-@pytest.mark.parametrize("gap", ["", "NaN", "---", "BAD", "-9999", "1e38"])
+@pytest.mark.parametrize("gap", ["", "NaN", "---", "*****", "BAD", "-9999", "1e38"])
 def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -> None:
     lines = rows(";", ".")
     for k in (20, 21, 77):
