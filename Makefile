@@ -5,6 +5,8 @@ SHELL := /bin/bash
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
 ARGS :=
+# Processes that run tests; a module's tests stay together (tests/conftest.py).
+JOBS := 2
 CAMPAIGN := jobs/example.toml
 FOR := 600
 
@@ -29,7 +31,7 @@ lint: setup-test  ## ruff and mypy
 
 test: setup-slurm  ## the whole test suite, MPI and (where it can be installed) Slurm included
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \
-	    export MPIRUN && exec $(bin)/python -m pytest -rs $(ARGS)
+	    export MPIRUN && exec $(bin)/python -m pytest -rs -n $(JOBS) --dist loadscope --no-loadscope-reorder $(ARGS)
 
 test-kills: setup-test  ## 20 kills each of a worker, of rank 0 and of the whole job (about 4 minutes)
 	@. tools/mpi.sh && choose_mpirun . && if [ -n "$$MPIRUN" ]; then allow_ranks 2 1; fi && \

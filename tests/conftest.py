@@ -6,11 +6,13 @@ Values and helpers that several tests use are in :mod:`tests.support`.
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import pytest
 from hypothesis import settings
 
 from tests.support.launchers import without_mpi, without_slurm
+from tests.support.two_processes import rank_of, scheduler
 
 # The same examples every time. `make fuzz` draws anew, from a seed that it prints.
 settings.register_profile("same", derandomize=True, deadline=None)
@@ -23,8 +25,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run what is marked slow, too")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Hand out tests of several processes by groups (tests/support/two_processes.py)."""
+    return scheduler(config, log)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Skip, with the reason, what cannot run here; a test that is slow says why."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        items.sort(key=lambda item: rank_of(item.nodeid))
     reasons = {"mpi": without_mpi(), "slurm": without_slurm()}
     for item in items:
         for name, reason in reasons.items():

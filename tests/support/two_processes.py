@@ -1,0 +1,40 @@
+"""Which tests of `make test` run in one process, one after another, and which begin first.
+
+A module's tests stay together, in order: what they share is made once, and none of them can depend
+on what another process does. Modules that start ranks or jobs stay together, too, or these would
+crowd each other out. What takes longest begins first.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py", "test_warm.py")
+LONG = ("ranks", "test_every_claim", "test_sharp_path.py", "test_sharp.py", "test_docs.py")
+
+
+def group_of(nodeid: str) -> str:
+    """Return what a test is run together with."""
+    path, _, name = nodeid.partition("::")
+    module = path.rpartition("/")[2]
+    if module in RANKS:
+        return "ranks"
+    # each whole validation is as long as many a module
+    return name if name.startswith("test_every_claim") else path
+
+
+def rank_of(nodeid: str) -> int:
+    """Return when a test begins, its group before others."""
+    group = group_of(nodeid)
+    return next((i for i, name in enumerate(LONG) if name in group), len(LONG))
+
+
+def scheduler(config: Any, log: Any) -> Any:
+    """Return what hands the groups out."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Groups(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return group_of(nodeid)
+
+    return Groups(config, log)
