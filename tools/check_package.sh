@@ -5,7 +5,11 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python=$(realpath -s "${PYTHON:-.venv/bin/python}")
 place=$(mktemp -d)
-trap 'rm -rf "$place"' EXIT
+say() { echo "package: $*"; }
+log=.setup/check-package.log
+mkdir -p .setup
+. tools/parts.sh
+trap 'end_parts; rm -rf "$place"' EXIT
 export PIP_DISABLE_PIP_VERSION_CHECK=1
 unset PYTHONPATH PYTHONHOME HDF5_DIR MPIRUN
 
@@ -20,7 +24,9 @@ rm -rf "$place"/adhesis-*/
 
 echo "package: a bare environment"
 "$python" -m venv "$place/venv"
-"$place/venv/bin/python" -m pip --no-input install --quiet "$place"/adhesis-*.whl
+step package "installing the wheel and what it needs" \
+    "$place/venv/bin/python" -m pip --no-input install --quiet "$place"/adhesis-*.whl ||
+    { cat .setup/package.log >&2; exit 1; }
 # Nothing of this machine is in PATH: no mpirun, no compiler.
 adhesis() { (cd "$place" && env -i PATH="$place/venv/bin" HOME="$place" adhesis "$@"); }
 

@@ -6,15 +6,28 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-.venv/bin/python}
+say() { echo "docs: $*"; }
+log=.setup/docs.log
+mkdir -p .setup
+. tools/parts.sh
+trap end_parts EXIT
+must() { # NAME TEXT COMMAND…: a part whose log is shown where it fails
+    step "$@" || {
+        cat ".setup/$1.log" >&2
+        exit 1
+    }
+}
 tools=.setup/docs
 if ! cmp -s docs/requirements.lock "$tools/requirements.lock"; then
-    echo "docs: installing what the site is made with into $tools"
     rm -rf "$tools"
-    "$python" -m pip --no-input --disable-pip-version-check install --quiet --target "$tools" \
+    must docs-tools "installing what the site is made with into $tools" \
+        "$python" -m pip --no-input --disable-pip-version-check install --quiet --target "$tools" \
         -r docs/requirements.lock
     cp docs/requirements.lock "$tools/"
 fi
-echo "docs: running the examples, making the pages (a minute)"
-PYTHONPATH=$tools:. OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
-    "$python" -m sphinx --fail-on-warning --keep-going --quiet -b html docs docs/_build
+site() {
+    PYTHONPATH=$tools:. OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 \
+        "$python" -m sphinx --fail-on-warning --keep-going --quiet -b html docs docs/_build
+}
+must docs-site "running the examples, making the pages" site
 echo "docs: open docs/_build/index.html"
