@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from solver.method import Fields, Opening
 from solver.profile import Array
@@ -118,6 +117,9 @@ def _opening(
         [[ends[0]], t / np.sqrt((x - left) * (right - x)) * np.sqrt(width), [ends[1]]]
     )
     x = np.concatenate([[left], x, [right]])
+    # here: half of the time in which commands that compute nothing start
+    from scipy.interpolate import PchipInterpolator
+
     smooth = PchipInterpolator(x, shape)
     intervals = x.size - 1
     beside = np.minimum(np.arange(intervals), np.arange(intervals)[::-1]) < _NEAR

@@ -87,7 +87,7 @@ def test_more_ranks_than_tasks(tmp_path, whole):
 @pytest.mark.parametrize("victim", ["worker", "master", "all"])
 def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
     path, out, log = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "log"
-    process = start("run", path, "--out", out, ranks=3, fake="step=0.05")
+    process = start("run", path, "--out", out, ranks=3, fake="hold=2")
     wait_until(lambda: done_rows(out) >= 3)
     if victim == "all":
         kill_all(process)
@@ -124,7 +124,7 @@ def test_a_run_starts_its_own_ranks(tmp_path, whole):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, "--ranks", "3", fake="step=0.1")
+    process = start("run", path, "--out", out, "--ranks", "3", fake="hold=1")
     wait_until(lambda: done_rows(out) >= 1)
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)
@@ -134,7 +134,7 @@ def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number):
 
 def test_a_killed_rank_ends_with_what_to_do(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, "--ranks", "3", fake="step=0.1")
+    process = start("run", path, "--out", out, "--ranks", "3", fake="hold=1")
     wait_until(lambda: done_rows(out) >= 1)
     (launcher,) = ranks_of(process.pid)
     os.kill(ranks_of(launcher)[-1], signal.SIGKILL)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -94,7 +95,7 @@ def test_a_finished_campaign_computes_nothing_again(tmp_path):
 
 def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, fake="step=0.05")
+    process = start("run", path, "--out", out, fake="hold=2")
     wait_until(lambda: done_rows(out) >= 2)
     asked = time.monotonic()
     process.send_signal(signal.SIGUSR1)
@@ -114,7 +115,7 @@ def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path):
 
 def test_a_killed_run_resumes_with_the_same_bits(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, fake="step=0.05")
+    process = start("run", path, "--out", out, fake="hold=3")
     wait_until(lambda: done_rows(out) >= 3)
     process.kill()
     process.communicate()
@@ -321,16 +322,16 @@ def test_a_read_only_folder(tmp_path):
 
 def test_two_runs_on_one_file(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    first = start("run", path, "--out", out, fake="step=0.3")
+    first = start("run", path, "--out", out, fake="hold=1")
     wait_until(lambda: done_rows(out) >= 1)
     second = adhesis("run", path, "--out", out, "--patience", "0.1")
     assert second.returncode == 2
     assert len(second.stderr.splitlines()) == 1
     assert f"is being written by another run (host {os.uname().nodename}" in second.stderr
     status = json.loads(adhesis("status", out, "--json").stdout)
-    assert status["done"] + status["pending"] == 8
+    assert (status["done"], status["pending"]) == (1, 7)
     assert status["run"]["pid"] == first.pid
-    assert 0 <= time.time() - status["last_row"] < 10
+    assert 0 <= time.time() - status["last_row"] < 60
     assert f"a run is writing (host {os.uname().nodename}" in adhesis("status", out).stdout
     first.send_signal(signal.SIGTERM)
     first.communicate(timeout=20)
@@ -390,17 +391,18 @@ def test_status_of_a_large_file_takes_under_a_second_and_no_mpi(tmp_path):
         "import sys; from ensemble.command.main import main; main(['status', sys.argv[1]]); "
         "print([m for m in sys.modules if m.startswith('mpi4py')])"
     )
-    started = time.monotonic()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     process = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path / "r.h5")],
         capture_output=True,
         text=True,
         env=environment(),
     )
-    took = time.monotonic() - started
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    took = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     assert "100000 tasks, 100 done" in process.stdout
     assert process.stdout.endswith("[]\n")
-    assert took < 1.5  # under 1 s where nothing else runs
+    assert took < 1.5  # of the processor; under 1 s where nothing else runs
 
 
 @pytest.mark.parametrize(

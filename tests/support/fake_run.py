@@ -3,6 +3,7 @@
 BEHAVIOUR is a list of words, tasks given as H:γ:realisation with ``*`` for any:
 ``step=SECONDS`` time of a load step, ``fail=TASK`` raise, ``hang=TASK`` never reach the next load
 step, ``deaf=TASK`` take 0.3 s without looking up, ``doubt=TASK`` a loss whose audit is 19 % off,
+``hold=N`` after N tasks of a process stay in the next one, looking up, until stopped,
 ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's,
 ``serial=1`` as if HDF5 had no MPI, ``full=BYTES`` no file may be written beyond so many bytes.
 """
@@ -54,9 +55,11 @@ def fake_result(campaign: Campaign, task: Task) -> Row:
 def fake_engine(behaviour: str) -> Engine:
     settings = dict(word.split("=", 1) for word in behaviour.split())
     broken = False
+    begun = 0
 
     def run_task(campaign, task, progress=None):
-        nonlocal broken
+        nonlocal broken, begun
+        begun += 1
         if "log" in settings:
             with open(settings["log"], "a") as log:
                 log.write(f"{task.hurst}:{task.work_of_adhesion}:{task.realisation}\n")
@@ -66,6 +69,9 @@ def fake_engine(behaviour: str) -> Engine:
         if matches(settings.get("deaf"), task):
             time.sleep(0.3)
             return fake_result(campaign, task)
+        while begun > int(settings.get("hold", begun)) and progress is not None:
+            time.sleep(0.01)
+            progress("loading", 0.0, None)
         for _ in range(campaign.cycle.load_steps):
             time.sleep(float(settings.get("step", 0)))
             if progress is not None:
