@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtrit
 
 CONFIDENCE = 0.95
 FEWEST_FOR_SKEWNESS = 5
@@ -56,6 +55,8 @@ def interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[Array, 
     # Of equal values the spread is rounding, and its skewness anything.
     spread = np.max(np.abs(away), axis=-1) > 1e-14 * np.abs(mean)
     std = np.where(spread, np.sqrt(square * n / (n - 1)), 0.0)
+    from scipy.special import stdtrit  # here: most commands have no use for it, and it takes long
+
     t = float(stdtrit(n - 1, 0.5 + confidence / 2)) / np.sqrt(n)
     low, high = mean - std * t, mean + std * t
     if n < FEWEST_FOR_SKEWNESS:
