@@ -89,8 +89,6 @@ class Jump:
     ) -> Jump:
         """Jump from one contact state to another, what is prescribed being the same.
 
-        A drop that rounding and the field's error have made negative counts as zero.
-
         Parameters
         ----------
         before, after : ContactState
@@ -104,7 +102,7 @@ class Jump:
         return cls(
             branch=branch,
             separation=before.separation,
-            energy_drop=max(0.0, (before.potential - after.potential) / period),
+            energy_drop=(before.potential - after.potential) / period,
             kind=kind,
             patches_before=before.patches,
             patches_after=after.patches,

@@ -15,7 +15,7 @@ from solver.sharp.states import Memory, States, Trace
 from solver.sharp.touch import Located, Nucleation
 
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
-_FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than the mean gap
+_FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than gaps on average
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten the trapezoidal rule
 
 
@@ -141,6 +141,10 @@ class Follower:
                 if touched is not None:
                     return self._touch(trace, touched, target.branch)
                 at = target.at if step == target.at - point.at else point.at + step
+                touched = self._touch_before_fold(point, at)
+                if touched is not None:
+                    trace.states.append(self.states.of_point(point))
+                    return self._touch(trace, touched, target.branch)
                 after, better = self._fold(trace, point, at, target.branch, finest)
                 if better < finest:
                     wanted = finest = better
@@ -159,7 +163,9 @@ class Follower:
                     exact = target.prescribed
                 walk.pending.append(self.states.of_point(reached, exact))
                 shown = reached
-            if walk.closed >= walk.clearance or small is not None:
+            # Every state that is handed out is looked at; between states only if a gap may have
+            # closed.
+            if walk.pending or walk.closed >= walk.clearance or small is not None:
                 touched = self._look(trace, walk, target.branch)
                 if touched is not None:
                     return self._touch(trace, touched, target.branch)
@@ -191,7 +197,7 @@ class Follower:
         return touched
 
     def _closed(self, point: Point, reached: Point, branch: Branch) -> float:
-        """Bound on how far a gap has closed locally over a step."""
+        """Estimate, on the safe side, of how far a gap has closed locally over a step."""
         if branch == "loading":
             return abs(reached.at - point.at) * self._closing(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
@@ -199,13 +205,21 @@ class Follower:
         return float(self.edges.critical / np.sqrt(self.edges.wave) * moved)
 
     def _closing(self, point: Point) -> float:
-        """How fast a gap may close locally, in units of d."""
+        """How fast a gap may close locally along the branch, in units of d."""
+        closing = self._held_closing(point)
         if self.states.problem.control.is_fixed:
-            return _FASTEST_CLOSING
+            return closing
         # d(q0 s)/dd along the branch, from d = share q0 s - give p and dY/dd
         share, give = self.edges.law.hold
         mean = 1 + give * point.slope if share else point.slope
-        return _FASTEST_CLOSING * max(1.0, abs(mean))
+        return closing * max(1.0, abs(mean))
+
+    def _held_closing(self, point: Point) -> float:
+        """How fast a gap may close locally while edges are held, in units of q0 s.
+
+        The mean gap closes by the gaps alone, the faster the less of the period they take.
+        """
+        return float(_FASTEST_CLOSING * 2 * np.pi / np.diff(point.gaps, axis=1).sum())
 
     def _touch(self, trace: Trace, touched: Located, branch: Branch) -> tuple[float, Point | None]:
         """Jump from the point of a branch at which surfaces touch inside a gap."""
@@ -216,6 +230,19 @@ class Follower:
         after = self.jumps.run(trace, before, gaps, point.at, branch, touched.touches)
         trace.late += self._late(before, trace.states[-1], touched.late)
         return point.at, after
+
+    def _touch_before_fold(self, point: Point, at: float) -> Located | None:
+        """Where surfaces touch on the last step to a fold, its edges being held; None if nowhere.
+
+        The fold lies somewhere on that step, too: which of the two comes first is not resolved.
+        """
+        low = self.nucleation.least(point.field)[0]
+        way = abs(at - point.at)
+        if not self.states.problem.control.is_fixed:
+            way *= max(1.0, abs(point.field.separation_by_prescribed))
+        if low > self._held_closing(point) * way:
+            return None
+        return self.nucleation.located_held(point, low, at)
 
     def _fold(
         self, trace: Trace, point: Point, at: float, branch: Branch, finest: float

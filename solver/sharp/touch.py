@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.method import PathError
 from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
@@ -188,11 +189,35 @@ class Nucleation:
                 last, clear, clear_value = point, aim, value
             else:
                 hit, hit_minima, hit_value = point, minima, value
+        if hit_value < -self.overlap and self.edges.critical > 0:
+            raise PathError(f"surfaces overlap at q0 s = {hit.at:.9g}, where no touch is found")
         # the surfaces touched so much earlier as the overlap says
         late = abs(clear - hit.at)
         if clear_value > hit_value:
             late *= -hit_value / (clear_value - hit_value)
         return Located(hit, self.ready(hit_minima), late), 0.0
+
+    def located_held(self, point: Point, clearance: float, end: float) -> Located | None:
+        """Where surfaces touch between a point with this clearance and ``end``, edges held."""
+        clear, low, hit = point.at, clearance, end
+        field = self.edges.field(point.gaps, hit)
+        high, minima = self.least(field)
+        if high > -self.overlap:
+            return None
+        for _ in range(_MOST_AIMS):
+            if high >= -0.5 * self.overlap:
+                break
+            # Openings are linear in d: a secant to a fourth of the overlap that is allowed
+            share = min(max((low + 0.25 * self.overlap) / (low - high), 0.02), 0.98)
+            aim = clear + (hit - clear) * share
+            aimed = self.edges.field(point.gaps, aim)
+            value, there = self.least(aimed)
+            if value > 0:
+                clear, low = aim, value
+            else:
+                hit, high, field, minima = aim, value, aimed, there
+        held = Point(hit, field, point.rate, float("nan"))
+        return Located(held, self.ready(minima), abs(end - point.at))
 
     def seeded(self, gaps: Array, touches: list[Touch]) -> Array:
         """Edges with a seed at each touch."""

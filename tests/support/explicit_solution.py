@@ -10,6 +10,7 @@ in units of E*/2, lengths of 1/q0.
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import dct
 
 
 def explicit_solution(stress, gaps, separation, nodes):
@@ -17,6 +18,15 @@ def explicit_solution(stress, gaps, separation, nodes):
 
     ``stress`` is a function θ → 2σ_full/E*, ``gaps`` has shape (L, 2).
     """
+    c, _, slope = _solve(stress, gaps, separation, nodes)
+    # near an end t' = (dt/dθ half)/(half sqrt(1-x²)), t = C sqrt(r): |t'| = C/(2 sqrt(r))
+    half = np.diff(gaps, axis=1)[:, 0] / 2
+    factor = 2 * np.sqrt(half / 2) / half
+    return c, np.stack([slope[:, -1] * factor, -slope[:, 0] * factor], axis=1)
+
+
+def _solve(stress, gaps, separation, nodes):
+    """Constants, θ and dt/dx sqrt(1-x²) at Lobatto nodes x = cos(jπ/N), right ends first."""
     count = len(gaps)
     centre, half = gaps.mean(axis=1), np.diff(gaps, axis=1)[:, 0] / 2
     edges = gaps.ravel()
@@ -73,10 +83,32 @@ def explicit_solution(stress, gaps, separation, nodes):
     right[-1] += 2 * np.pi * separation
     c = np.linalg.solve(matrix, right)
     w = u + np.tensordot(c, basis, axes=1)
-    # near an end t' = -sign·w/(smooth·sqrt(1-x²)), t = C sqrt(r): |t'| = C/(2 sqrt(r))
-    opening = np.empty((count, 2))
-    for k in range(count):
-        factor = 2 * np.sqrt(half[k] / 2) / smooth[k]
-        opening[k, 0] = (-sign[k] * w[k, -1]) * factor[-1]
-        opening[k, 1] = (sign[k] * w[k, 0]) * factor[0]
-    return c, opening
+    return c, theta, -sign[:, None] * w / smooth * half[:, None]
+
+
+def explicit_openings(profile, gaps, separation, least_nodes=96):
+    """Return θ and the opening q0 t of every gap, each of shape (L, nodes + 1).
+
+    From the profile's own coefficients, for gaps and separation in units of 1/q0: nothing of the
+    method ``sharp`` takes part. The nodes are so dense that the shortest wave has 24 at least.
+    """
+    m = np.arange(profile.coefficients.size)
+    weight = 2 * m * profile.coefficients * profile.q0
+
+    def stress(theta):
+        phase = np.exp(1j * np.multiply.outer(np.asarray(theta), m[1:]))
+        return (phase @ weight[1:]).real
+
+    widest = float(np.diff(gaps, axis=1).max()) / 2
+    patch = np.append(gaps[1:, 0], gaps[0, 0] + 2 * np.pi) - gaps[:, 1]
+    # a narrow patch beside a wide gap asks for nodes as dense as it is, and 1/sqrt of it suffices
+    narrow = float(np.sqrt(widest / patch.min()))
+    nodes = int(np.ceil(max(least_nodes, 12 * widest * profile.highest_harmonic, 12 * narrow)))
+    _, theta, slope = _solve(stress, gaps, separation, nodes)
+    # x = cos φ: dt/dφ = -slope, with t = 0 at φ = 0; slope is a polynomial in x, a cosine series
+    series = dct(slope, type=1, axis=1) / nodes
+    series[:, [0, -1]] /= 2
+    n = np.arange(1, nodes)
+    phi = np.arange(nodes + 1) * np.pi / nodes
+    opening = -(series[:, 1:-1] / n) @ np.sin(np.multiply.outer(n, phi))
+    return theta[:, ::-1], opening[:, ::-1]

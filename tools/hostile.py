@@ -1,0 +1,193 @@
+"""Hostile scenes: how they are drawn, followed and judged; see tools/fuzz/loops.py."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from adhesis import (
+    HalfSpace,
+    LoopResult,
+    Method,
+    Problem,
+    make_method,
+    run_loop,
+    self_affine_profile,
+)
+from solver.method import ContactState, PathError
+from tests.support.explicit_solution import explicit_openings
+
+TIGHT = 4  # every so many scenes are followed again, a hundred times as accurately
+GRID = 20
+_LOOKED_AT = 10  # states, and those at jumps
+_MOST_NODES = 3000  # of the independent openings
+_OVERLAP = 1e-6
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One hostile loop; γ is ``g`` times E* h_rms² q0 n0."""
+
+    hurst: float
+    n0: int
+    ratio: int
+    seed: int
+    amplitudes: str
+    h_rms: float
+    g: float
+    max_penetration: float
+    load_steps: int
+    accuracy: float
+
+    def problem(self) -> Problem:
+        """Period 2 mm, E = 1 MPa, ν = 0.5."""
+        profile = self_affine_profile(
+            self.hurst, period=2e-3, n0=self.n0, ratio=self.ratio, seed=self.seed,
+            h_rms=self.h_rms, amplitudes=self.amplitudes,  # type: ignore[arg-type]
+        )  # fmt: skip
+        half_space = HalfSpace(1e6, 0.5)
+        gamma = self.g * half_space.modulus * self.h_rms**2 * profile.q0 * self.n0
+        return Problem(profile, half_space, gamma)
+
+
+def draw(seed: int, number: int) -> Scene:
+    """Draw the scene of a number: mostly few waves, one in thirty up to 250."""
+    rng = np.random.default_rng([seed, number])
+    kind = rng.integers(6)
+    depth = float(rng.uniform(0.05, 0.99))
+    if kind == 0:
+        depth = float(10 ** rng.uniform(-4, -1))
+    elif kind == 1:
+        depth = 1 - float(10 ** rng.uniform(-6, -1))
+    n0 = int(rng.integers(1, 9))
+    most = int(rng.choice([16, 48, 250], p=[0.75, 0.22, 0.03]))
+    ratio = int(min(np.ceil(10 ** rng.uniform(0, 1.8)), most // n0))
+    rough = (-5, -3.7) if kind == 2 else (-7, -5)
+    weak = (-5, -1.5) if kind == 3 else (-1.5, 0.8)
+    return Scene(
+        hurst=round(float(rng.uniform(0.2, 0.95)), 3),
+        n0=n0,
+        ratio=max(1, ratio),
+        seed=int(rng.integers(10**6)),
+        amplitudes=str(rng.choice(["deterministic", "rayleigh"])),
+        h_rms=float(10 ** rng.uniform(*rough)),
+        g=float(10 ** rng.uniform(*weak)),
+        max_penetration=depth,
+        load_steps=int(rng.integers(1, 40)),
+        accuracy=float(rng.choice([1e-2, 1e-3, 1e-4], p=[0.25, 0.6, 0.15])),
+    )
+
+
+def follow(scene: Scene, accuracy: float, name: str = "sharp") -> tuple[LoopResult, list[str]]:
+    """Loop of a scene, and what is wrong with it."""
+    problem = scene.problem()
+    method = make_method(name, problem, accuracy=accuracy)  # type: ignore[arg-type]
+    states: list[ContactState] = []
+    loop = run_loop(
+        method,
+        max_penetration=scene.max_penetration,
+        load_steps=scene.load_steps,
+        on_state=lambda _, state: states.append(state),
+    )
+    return loop, [*_of_loop(loop), *(_of_states(method, states) if name == "sharp" else [])]
+
+
+def _of_loop(loop: LoopResult) -> list[str]:
+    """What is wrong with the numbers of a loop."""
+    wrong = []
+    h_max = loop.problem.profile.h_max
+    for what in ("separation", "mean_stress", "energy", "contact_fraction"):
+        if not np.all(np.isfinite(getattr(loop, what))):
+            wrong.append(f"{what} is not finite")
+    least = min((j.energy_drop for j in loop.jumps), default=0.0)
+    if least < -loop.loss_error:
+        wrong.append(f"a drop of {least:.1e} J/m² is negative beyond {loop.loss_error:.1e}")
+    if loop.loss < -loop.loss_error:
+        wrong.append(f"the loss {loop.loss:.3e} is negative beyond its error {loop.loss_error:.1e}")
+    if not abs(loop.loss - loop.loss_from_drops) <= loop.loss_error:
+        wrong.append(f"audit {loop.audit_residual:.1e} beyond loss_error {loop.loss_error:.1e}")
+    for branch, sign in (("loading", -1), ("unloading", 1)):
+        s = loop.separation[loop.branch == branch]
+        back = float(np.max(-sign * np.diff(s), initial=0.0)) / h_max
+        if back > 1e-12:
+            wrong.append(f"{branch}: the path steps back by {back:.1e} h_max")
+    lost = loop.separation[(loop.patches == 0)]
+    if np.min(lost) < h_max * (1 - 1e-6):
+        wrong.append(f"contact is lost at s = {np.min(lost) / h_max:.6f} h_max")
+    return wrong
+
+
+def _of_states(method: Method, states: list[ContactState]) -> list[str]:
+    """What is wrong with the states: overlaps, by the method's fields and independently of it."""
+    profile = method.problem.profile
+    nodes = 1 << int(np.ceil(np.log2(24 * profile.highest_harmonic + 64)))
+    rng = np.random.default_rng(0)
+    at_jumps = [
+        k
+        for k in range(len(states) - 1)
+        if states[k].separation == states[k + 1].separation and states[k].patches
+    ]
+    chosen = set(rng.choice(len(states), min(_LOOKED_AT, len(states)), replace=False).tolist())
+    chosen |= set(rng.choice(at_jumps, min(_LOOKED_AT, len(at_jumps)), replace=False).tolist())
+    worst = 0.0
+    for k in sorted(chosen):
+        if states[k].patches:
+            found = method.fields(states[k], nodes).gap.min() / profile.h_max
+            worst = min(worst, float(found), independent_clearance(method, states[k]))
+    return [f"surfaces overlap by {-worst:.1e} h_max"] if worst < -_OVERLAP else []
+
+
+def independent_clearance(method: Method, state: ContactState) -> float:
+    """Least gap over h_max by the Riemann-Hilbert solution, with what the field's error allows.
+
+    0 where edges are too close to each other for that.
+    """
+    profile = method.problem.profile
+    edges = state.edges * profile.q0
+    left = edges[:, 1]
+    right = np.append(edges[1:, 0], edges[0, 0] + 2 * np.pi)
+    gaps = np.stack([left, right], axis=1)
+    narrowest = min(float(np.diff(gaps, axis=1).min()), float(np.diff(edges, axis=1).min()))
+    if len(gaps) * profile.highest_harmonic / np.sqrt(narrowest) > _MOST_NODES:
+        return 0.0
+    _, opening = explicit_openings(profile, gaps, state.separation * profile.q0)
+    room = 10 * getattr(method.report(), "field_tolerance", 0.0)
+    return float(opening.min() / (profile.h_max * profile.q0)) + room
+
+
+def judge(scene: Scene, number: int) -> dict[str, Any]:
+    """Follow a scene and say what came of it."""
+    started = time.process_time()
+    found: dict[str, Any] = {"wrong": [], "kind": "loop"}
+    try:
+        loop, found["wrong"] = follow(scene, scene.accuracy)
+        found |= {"loss": loop.loss, "loss_error": loop.loss_error, "races": loop.races}
+        found |= {"audit": loop.audit_residual, "drops": loop.loss_from_drops}
+        if number % TIGHT == 0:
+            found["kind"] = "tight"
+            _compare(found, loop, follow(scene, 1e-2 * scene.accuracy)[0])
+        elif number % GRID == 1 and scene.n0 * scene.ratio <= 40 and scene.g > 0.03:
+            found["kind"] = "grid"
+            _compare(found, loop, follow(scene, max(scene.accuracy, 1e-3), "grid")[0])
+    except PathError as error:
+        found["kind"] = f"PathError: {str(error).split(' at ')[0][:60]}"
+    except Exception as error:
+        found["wrong"] = [f"{type(error).__name__}: {error}"]
+    found["seconds"] = time.process_time() - started
+    return found
+
+
+def _compare(found: dict[str, Any], loop: LoopResult, other: LoopResult) -> None:
+    """Take down how far another loop of the scene is; beyond the errors of both it is wrong."""
+    off = abs(loop.loss - other.loss_from_drops)
+    found |= {"off": off, "other_error": other.loss_error}
+    found["raced"] = bool(loop.races or other.races)
+    if off > loop.loss_error + other.loss_error and not found["raced"]:
+        name = other.method.name
+        found["wrong"].append(
+            f"loss {loop.loss:.6e} is {off / abs(loop.loss):.1e} from {name}'s, told are "
+            f"{loop.loss_error / abs(loop.loss):.1e} and {other.loss_error / abs(loop.loss):.1e}"
+        )
