@@ -86,7 +86,7 @@ class CampaignResults:
     @property
     def axes(self) -> tuple[str, ...]:
         """What tells the loops apart: H, γ, what else is a list in the campaign, realisation."""
-        return tuple(_axes(self.campaign))
+        return (*(axis.name for axis in self.campaign.axes), "realisation")
 
     # ------------------------------------------------------------------ arrays
 
@@ -148,7 +148,7 @@ class CampaignResults:
             rows = np.flatnonzero(results.status() == DONE)
             used = results.column("jump_kind", rows) >= 0
             loop, _ = np.nonzero(used)
-            out = {name: values[rows][loop] for name, values in _axes(results.campaign).items()}
+            out = {name: values[rows][loop] for name, values in _axes(results).items()}
             for d in columns:
                 out[d.name.removeprefix("jump_")] = results.column(d.name, rows)[used]
         out["branch"] = np.array(BRANCHES)[out["branch"]]
@@ -165,10 +165,10 @@ class CampaignResults:
     def _arranged(self, datasets: Iterable[Dataset]) -> xr.Dataset:
         """Datasets with the task dimension spread over the axes of the campaign."""
         with Results(self.path) as results:
-            axes = list(_axes(results.campaign).values())
+            axes = list(_axes(results).values())
             rows = np.arange(len(results))
             kept = results.column(KEPT)
-            known = {scale.name: scale for scale in scales(results.campaign)}
+            known = {scale.name: scale for scale in scales(results.campaign, results.part)}
             coordinates: dict[str, Any] = {}
             variables: dict[str, Any] = {}
             for d in datasets:
@@ -194,14 +194,14 @@ class CampaignResults:
         return xr.Dataset(variables, coordinates, {"source": self.path.name})
 
 
-def _axes(campaign: Campaign) -> dict[str, NDArray[Any]]:
-    """Values of every task on each axis, in the order of the rows."""
-    tasks = campaign.tasks()
+def _axes(results: Results) -> dict[str, NDArray[Any]]:
+    """Values of every task on each axis, row by row; of a part, those of its rows."""
+    tasks = results.tasks()
     out = {
         "hurst": np.array([task.hurst for task in tasks]),
         "work_of_adhesion": np.array([task.work_of_adhesion for task in tasks]),
     }
-    for place, axis in enumerate(campaign.axes[2:]):
+    for place, axis in enumerate(results.campaign.axes[2:]):
         out[axis.name] = np.array([task.others[place][1] for task in tasks])
     return out | {"realisation": np.array([task.realisation for task in tasks])}
 

@@ -17,7 +17,8 @@ body { font: 15px/1.5 system-ui, sans-serif; max-width: 54em; margin: 2em auto; 
   color: #222; }
 h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; }
 table { border-collapse: collapse; margin: 1em 0; } th, td { padding: .2em .8em; text-align: right;
-  border-bottom: 1px solid #ddd; } th:first-child, td:first-child { text-align: left; }
+  border-bottom: 1px solid #ddd; } td + td { white-space: nowrap; }
+th:first-child, td:first-child { text-align: left; }
 img { max-width: 100%; } figure { margin: 1em 0; } figcaption { color: #555; font-size: .9em; }
 .warning { background: #fff3d6; border-left: 4px solid #E69F00; padding: .4em .8em; }
 code { background: #f3f3f3; padding: 0 .2em; }

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import adhesis
+from ensemble.campaign.tasks import Part
 from ensemble.errors import InputError
 from ensemble.report.figures.catalogue import (
     HEIGHTS,
@@ -21,6 +22,7 @@ from ensemble.report.figures.catalogue import (
 )
 from ensemble.report.plots import Plots
 from ensemble.report.tables.losses import losses
+from ensemble.results.layout import create
 from tests.support.synthetic_results import campaign, rows, write
 
 
@@ -53,6 +55,20 @@ def test_every_loop_is_found_under_its_labels(file, results):
             )
     assert int(np.isnan(data.loss).sum()) == 2
     assert repr(results).endswith("22 done, 1 failed, 1 pending>")
+
+
+def test_a_part_has_the_labels_of_its_own_rows(tmp_path):
+    plan, part = campaign(hurst=(0.7, 0.8), gamma=(0.01,), realisations=4), Part(2, 3)
+    path = tmp_path / "part.h5"
+    create(path, plan, part=part)
+    with h5py.File(path, "r+") as raw:
+        raw["loss"][:] = 10.0 * raw["hurst"][:] + raw["realisation"][:]
+        raw["status"][:] = 1
+        labels = set(zip(raw["hurst"][:].tolist(), raw["realisation"][:].tolist(), strict=True))
+    data = adhesis.open(path).dataset
+    known = data.loss.squeeze().to_series().dropna()
+    assert set(known.index) == labels
+    assert all(loss == 10.0 * hurst + number for (hurst, number), loss in known.items())
 
 
 def test_tables_are_those_of_the_report(results):
