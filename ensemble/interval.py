@@ -1,6 +1,6 @@
 """The 95 % interval of a mean: the one that tables print and that ``[stop]`` goes by.
 
-For five values or more it reaches as far on each side as the further of two intervals:
+For ten values or more it reaches as far on each side as the further of two intervals:
 
 - Student's, which is exact for values with a normal distribution, and too narrow on the side of
   the tail for skewed ones: it misses the mean of twenty exponential values in 8 % of all ensembles,
@@ -9,9 +9,11 @@ For five values or more it reaches as far on each side as the further of two int
   54, 221), with Student's quantiles for normal ones. It follows skewness, and where a tail is heavy
   but even it takes the accident of one sample for skewness.
 
-Neither is safe alone; docs/theory.md has the measured coverage of all three. Of fewer values no
-skewness can be told: those have Student's. Nothing is drawn at random, and nothing weighs: a run
-with ``[stop]`` looks at its intervals as it goes.
+Neither is safe alone; docs/theory.md has the measured coverage of all three. The skewness of fewer
+values is an accident, and would stretch the interval up to fourfold: those have Student's.
+
+Nothing is drawn at random, and nothing weighs: a run with ``[stop]`` looks at its intervals as it
+goes.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 CONFIDENCE = 0.95
-FEWEST_FOR_SKEWNESS = 5
+FEWEST_FOR_SKEWNESS = 10
 
 Array = NDArray[np.float64]
 

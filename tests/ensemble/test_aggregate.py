@@ -175,22 +175,22 @@ def test_a_fitted_slope_knows_its_error():
 
 
 @pytest.mark.parametrize(
-    ("draw", "least"),
+    ("draw", "few", "least"),
     [
-        (lambda rng, shape: rng.normal(1.0, 0.4, shape), 0.94),
-        (lambda rng, shape: rng.lognormal(-0.125, 0.5, shape), 0.93),
-        (lambda rng, shape: 1 + rng.standard_t(3, shape), 0.94),
-        (lambda rng, shape: rng.exponential(1.0, shape), 0.92),
+        (lambda rng, shape: rng.normal(1.0, 0.4, shape), 0.94, 0.94),
+        (lambda rng, shape: rng.lognormal(-0.125, 0.5, shape), 0.90, 0.94),
+        (lambda rng, shape: 1 + rng.standard_t(3, shape), 0.94, 0.94),
+        (lambda rng, shape: rng.exponential(1.0, shape), 0.87, 0.93),
     ],
     ids=["normal", "skewed", "heavy tail", "exponential"],
 )
-def test_intervals_cover_the_true_mean_as_often_as_they_say(draw, least):
+def test_intervals_cover_the_true_mean_as_often_as_they_say(draw, few, least):
     """Coverage over 4000 synthetic ensembles of known mean 1; binomial error 0.0035."""
     rng = np.random.default_rng(11)
-    for n in (5, 10, 30, 100):
+    for n, bound in ((5, few), (10, least), (30, least), (100, least)):
         low, high = interval(draw(rng, (4000, n)))
         covered = np.mean((low <= 1) & (high >= 1))
-        assert least <= covered <= 0.98, (n, covered)
+        assert bound <= covered <= 0.98, (n, covered)
 
 
 def test_the_interval_reaches_as_far_as_students_and_as_halls():
@@ -222,7 +222,7 @@ def test_the_standard_error_is_the_spread_of_the_mean():
 
 
 def test_intervals_of_few_and_of_equal_values():
-    assert [interval_method(n) for n in (0, 1, 2, 4, 5)] == [
+    assert [interval_method(n) for n in (0, 1, 2, 9, 10)] == [
         *("none", "none"),
         *("student", "student", "transformed"),
     ]

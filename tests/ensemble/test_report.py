@@ -661,7 +661,7 @@ def test_doubtful_losses_and_steep_profiles_are_said(tmp_path):
 def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, drawn):
     for n, named, other in (
         (3, "by Student's t", "Hall"),
-        (5, "Hall's transformation", "fewer than"),
+        (10, "Hall's transformation", "fewer than"),
     ):
         plan = campaign(hurst=(0.7,), gamma=(0.01,), realisations=n)
         path = write(tmp_path / f"{n}.h5", plan, rows(plan))
