@@ -445,15 +445,22 @@ def test_the_fake_tasks_depend_on_nothing_but_the_task(tmp_path):
 
 def test_watching_a_run_until_it_is_done(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    run_ = start("run", path, "--out", out, fake="step=0.05")
-    wait_until(lambda: done_rows(out) >= 1)
-    watch = adhesis("status", out, "--watch", "--interval", "0.2")
-    run_.communicate(timeout=20)
+    free = tmp_path / "free"
+    run_ = start("run", path, "--out", out, fake=f"step=0.2 hold=2 free={free}")
+    wait_until(lambda: done_rows(out) >= 2)
+    watch = start("status", out, "--watch", "--interval", "0.2", fake=None)
+    assert watch.stdout is not None
+    first = watch.stdout.readline()
+    free.touch()
+    rest, _ = watch.communicate(timeout=60)
+    run_.communicate(timeout=60)
     assert watch.returncode == 0
-    shown = [line for line in watch.stdout.splitlines() if " tasks, " in line]
-    assert "an hour, about" in shown[-2]
+    lines = [first.rstrip(), *rest.splitlines()]
+    shown = [line for line in lines if " tasks, " in line]
+    assert "8 tasks, 2 done" in shown[0]
+    assert any("an hour, about" in line for line in shown[1:-1])
     assert shown[-1].endswith("8 tasks, 8 done, 0 pending, 0 failed")
-    assert " ± " in watch.stdout.splitlines()[-1]  # the loss table has filled up
+    assert " ± " in lines[-1]  # the loss table has filled up
     assert adhesis("status", out, "--watch", "--interval", "x").returncode == 2
 
 

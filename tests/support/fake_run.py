@@ -3,7 +3,8 @@
 BEHAVIOUR is a list of words, tasks given as H:γ:realisation with ``*`` for any:
 ``step=SECONDS`` time of a load step, ``fail=TASK`` raise, ``hang=TASK`` never reach the next load
 step, ``deaf=TASK`` take 0.3 s without looking up, ``doubt=TASK`` a loss whose audit is 19 % off,
-``hold=N`` after N tasks of a process stay in the next one, looking up, until stopped,
+``hold=N`` after N tasks of a process stay in the next one, looking up, until stopped, or until
+there is the file of ``free=FILE``,
 ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's,
 ``serial=1`` as if HDF5 had no MPI, ``full=BYTES`` no file may be written beyond so many bytes.
 """
@@ -16,6 +17,7 @@ import signal
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -69,7 +71,8 @@ def fake_engine(behaviour: str) -> Engine:
         if matches(settings.get("deaf"), task):
             time.sleep(0.3)
             return fake_result(campaign, task)
-        while begun > int(settings.get("hold", begun)) and progress is not None:
+        free = Path(settings.get("free", "/dev/null/free"))
+        while begun > int(settings.get("hold", begun)) and progress and not free.exists():
             time.sleep(0.01)
             progress("loading", 0.0, None)
         for _ in range(campaign.cycle.load_steps):
