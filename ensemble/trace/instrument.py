@@ -1,6 +1,6 @@
 """Instrument formats, through SurfaceTopography: an optional extra.
 
-``pip install adhesis[instruments]`` brings it. It is under the MIT licence, reads line scans as
+The extra ``instruments`` brings it. It is under the MIT licence, reads line scans as
 such (Dektak, Mahr, Mitutoyo, Igor, netCDF) beside some forty formats of maps, and its conventions
 differ by format: a physical size is n steps where the file tells the distance of first and last
 point, n - 1 steps. Here the step is always taken from its positions.
@@ -20,7 +20,7 @@ from ensemble.errors import InputError
 from ensemble.trace.units import METRES, unit_named
 from solver.profile import Array
 
-HINT = "pip install 'adhesis[instruments]'"
+HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,9 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
 
 def _library() -> ModuleType:
     if not available():
-        raise InputError(f"an instrument's file needs the optional extra: {HINT}")
+        raise InputError(
+            f"an instrument's file needs the optional package SurfaceTopography: {HINT}"
+        )
     # Its NuMPI would start MPI as soon as it can import mpi4py; reading a file needs no ranks.
     hidden = "mpi4py" not in sys.modules
     if hidden:

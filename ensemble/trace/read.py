@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ensemble.errors import InputError
-from ensemble.trace.instrument import available, read_scan
+from ensemble.trace.instrument import HINT, available, read_scan
 from ensemble.trace.text import Table, read_table
 from ensemble.trace.units import (
     METRES,
@@ -136,8 +136,8 @@ def read_trace(
     if not available():
         # Say which of both is missing: the extra, or any sense in the file.
         raise InputError(
-            f"{path} is no text: an instrument's file needs the optional extra, "
-            "pip install 'adhesis[instruments]'"
+            f"{path} is no text: an instrument's file needs the optional package "
+            f"SurfaceTopography, {HINT}"
         )
     scan = read_scan(path, row, channel)
     heights, step, said = _even(path, scan.positions, scan.heights, None)

@@ -16,7 +16,7 @@ from ensemble.trace.read import read_trace
 from tests.support import instrument_files
 
 pytestmark = pytest.mark.skipif(
-    not instrument.available(), reason="the optional extra adhesis[instruments] is not installed"
+    not instrument.available(), reason="the optional package SurfaceTopography is not installed"
 )
 
 N, STEP = 150, 0.4e-6
@@ -83,7 +83,7 @@ def test_units_of_texts_do_not_belong_to_instruments(tmp_path: Path) -> None:
 def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
     monkeypatch.setattr(read, "available", lambda: False)
-    with pytest.raises(InputError, match=r"pip install 'adhesis\[instruments\]'"):
+    with pytest.raises(InputError, match=r"python.* -m pip install 'SurfaceTopography>=1.27'"):
         read_trace(tmp_path / "a.qep")
 
 
