@@ -45,8 +45,9 @@ class Jump:
         s at which stability is lost, in m.
     energy_drop : float
         U before minus U after (the potential W, where the separation is not fixed), per unit
-        nominal area, in J/m²; not negative, but for the loss of contact under a load, where it is
-        U before (:mod:`solver.control`).
+        nominal area, in J/m². Negative by no more than the energies' error, which then counts in
+        the error of the loss; but for the loss of contact under a load, where it is U before
+        (:mod:`solver.control`).
     kind : JumpKind
     patches_before, patches_after : int
     contact_before, contact_after : float

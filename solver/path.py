@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.jumps import Branch, Jump
-from solver.loop import Progress, check_cycle
+from solver.loop import Progress, check_cycle, estimated_error
 from solver.method import ContactState, Method, MethodReport, PathError
 from solver.problem import Problem
 from solver.profile import Array
@@ -359,7 +359,6 @@ class _Walk:
         drops = float(sum(jump.energy_drop for jump in record.jumps))
         states = record.states
         change = (states[-1].potential - states[0].potential) / problem.profile.period
-        own = record.error if np.isfinite(record.error) else 0.01 * abs(drops)
         separation = record.column("separation")
         return PathResult(
             problem=problem,
@@ -382,7 +381,7 @@ class _Walk:
             work=work,
             loss_from_drops=drops,
             energy_change=change,
-            loss_error=own + abs(work - change - drops),
+            loss_error=estimated_error(record, work - change - drops, problem),
             seconds=process_time() - started,
             method=self.method.report(),
         )

@@ -210,8 +210,9 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
             say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
         if summary.doubtful:
             say(
-                f"{summary.doubtful} losses are doubtful: their own checks are off by more than "
-                f"{100 * bound(campaign.solver.accuracy):g} % (adhesis status {path})"
+                f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
+                f"more than {100 * bound(campaign.solver.accuracy):g} %, the accuracy asked for "
+                f"(adhesis status {path})"
             )
         if summary.stopped:
             say(

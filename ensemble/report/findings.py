@@ -174,7 +174,8 @@ def quality(data: Aggregate) -> list[str]:
     if wrong:
         out.append(
             f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
-            f"their estimated error exceeds {100 * most:.2g} % of the loss: {_listed(wrong)}."
+            f"their estimated error exceeds the accuracy asked for, {100 * most:.2g} % of the "
+            f"loss: {_listed(wrong)}."
         )
     steep = [cell_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
     if steep:

@@ -219,7 +219,9 @@ def _precision(group: dict[str, Any]) -> str:
 
 
 def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
-    lines = [f"{len(doubts)} losses are doubtful: their own checks say that they are off"]
+    lines = [
+        f"{len(doubts)} losses are doubtful: by their own account less accurate than asked for"
+    ]
     for d in doubts[:_MOST_FAILURES_SHOWN]:
         lines.append(
             f"  row {d['row']}: H = {d['hurst']:g}, γ = {d['work_of_adhesion']:g} J/m², "

@@ -129,12 +129,12 @@ class GridMethod(Method):
         if state.patches == 0:
             if prescribed > control.prescribed(h_max, 0.0):
                 apart = state.separation if control.is_load else prescribed
-                return Path((self.detached(apart),), ())
+                return Path((self.detached(apart),), (), 0.0)
             contact = steps.first_touch(h_max)
         else:
             contact = self._contact(state)
         steps.run(contact, prescribed)
-        return Path(tuple(steps.states), tuple(steps.jumps))
+        return Path(tuple(steps.states), tuple(steps.jumps), steps.error)
 
     def fields(self, state: ContactState, n: int) -> Fields:
         """Stress, displacement and gap of ``state`` on every (nodes/n)-th node.

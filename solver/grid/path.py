@@ -6,13 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.grid.contact import Contact
+from solver.grid.contact import Contact, Mask
 from solver.grid.edges import patch_ranges
 from solver.grid.relax import Relaxation
 from solver.grid.states import state_of
 from solver.jumps import Branch, Jump
 from solver.method import ContactState, PathError
 from solver.problem import Problem
+
+# The relative error of a loss, times the nodes in the first equilibrium width on a crest of rms
+# curvature: above it lay one in a hundred of rough loops (docs/methods.md).
+_COARSE = 0.6
+_APART = 0.1  # shortest waves between edges of different minima
+_FEWEST_APART = 2  # nodes
 
 
 @dataclass
@@ -21,6 +27,15 @@ class Counters:
 
     substeps: int = 0
     bisections: int = 0
+
+
+def first_width(problem: Problem) -> float:
+    """Width in m at which a patch on a crest of rms curvature κ first comes to rest.
+
+    (16 Γ/(π κ²))^(1/3) in units of 1/q0, Γ = 2γq0/E* (docs/methods.md, "Resolution").
+    """
+    rigidity = problem.half_space.modulus * problem.profile.m4
+    return float(np.cbrt(32 * problem.work_of_adhesion / (np.pi * rigidity)))
 
 
 class Steps:
@@ -50,6 +65,7 @@ class Steps:
         self.count = count
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
+        self.error = 0.0
         self.reached = np.nan  # what was prescribed in the last state
         self.energy = self.lattice.energy
         self.period = problem.profile.period
@@ -60,6 +76,15 @@ class Steps:
         if not (control.is_fixed or control.is_load):
             self.scale = h_max + problem.stress_scale / control.stiffness
         self.adhesion_scale = problem.work_of_adhesion * self.period
+        # Relative error of a drop.
+        self.coarse = (
+            min(1.0, _COARSE * self.lattice.dx / first_width(problem))
+            if self.adhesion_scale
+            else 0.0
+        )
+        # Edges that went further, or end further apart, in nodes, ran, or belong to other minima.
+        wave = self.profile.shortest_wavelength / self.lattice.dx
+        self.apart = max(_FEWEST_APART, _APART * wave)
 
     def first_touch(self, separation: float) -> Contact:
         """Contact at the separation at which the highest crests touch."""
@@ -72,8 +97,8 @@ class Steps:
         if self.energy(contact) < 0:
             relaxed = self.relaxation.relax(contact)
             assert relaxed is not None
+            self._jump(before, contact, relaxed)
             contact = relaxed
-            self._jump(before, contact)
         else:
             contact = self.solver.empty(separation)
         return contact
@@ -156,7 +181,8 @@ class Steps:
                 return None, False
             before = state_of(self.lattice, frozen)
             self.states.append(before)
-            self._jump(before, relaxed)
+            self._jump(before, frozen, relaxed)
+            self.error += stride * abs(change)
             return relaxed, True
         smooth = 0.5 * work * (change if self.branch == "loading" else -change)
         # One node more or less at each edge is the grid's own unrest, not curvature.
@@ -168,18 +194,47 @@ class Steps:
             return None, False
         return relaxed, False
 
+    def _rival(self, start: Contact, after: Contact) -> Contact | None:
+        """The minimum that equal speeds lead to instead; None if it is the same one.
+
+        Only where several edges ran, or surfaces touched, can edges have raced.
+        """
+        if start.mask.any():
+            ran = patch_ranges(start.mask ^ after.mask)
+            touched = any(self._apart_from(start.mask, *run) for run in zip(*ran, strict=True))
+            if np.count_nonzero(ran[1] > self.apart) < 2 and not touched:
+                return None
+        other = self.relaxation.relax(start, equal_speeds=True)
+        assert other is not None
+        apart = patch_ranges(other.mask ^ after.mask)[1].max(initial=0)
+        return other if apart > self.apart else None
+
+    def _apart_from(self, mask: Mask, first: int, width: int) -> bool:
+        """Whether a run of nodes that joined lies apart from the patches of ``mask``."""
+        n = mask.size
+        return not (mask[first] or mask[first - 1] or mask[(first + width) % n])
+
     def _append(self, contact: Contact) -> ContactState:
         state = state_of(self.lattice, contact)
         self.states.append(state)
         self.reached = contact.prescribed
         return state
 
-    def _jump(self, before: ContactState, after: Contact) -> None:
+    def _jump(self, before: ContactState, start: Contact, after: Contact) -> None:
+        """Take down the jump to ``after``, the minimum that descent leads to from ``start``."""
+        other = self._rival(start, after)
         lost = self.lattice.control.is_load and not after.mask.any()
         if lost:
             after.separation = before.separation
-        jump = Jump.between(before, self._append(after), self.branch, self.period)
+        end = self._append(after)
+        at_stake = 0.0
+        if other is not None:
+            at_stake = abs(self.energy(other) - self.energy(after)) / self.period
+        jump = Jump.between(
+            before, end, self.branch, self.period, raced=other is not None, at_stake=at_stake
+        )
         if lost:
             # The load's own work is not counted (solver.control).
             jump = replace(jump, energy_drop=before.energy / self.period)
+        self.error += self.coarse * abs(jump.energy_drop)
         self.jumps.append(jump)

@@ -238,7 +238,9 @@ def test_a_doubtful_loss_is_said(tmp_path):
     assert process.returncode == 0
     told = "doubtful loss: H = 0.7, γ = 0.01 J/m², realisation 1: audit residual 19 %"
     assert told in process.stderr
-    assert "2 losses are doubtful: their own checks are off by more than 2 %" in process.stderr
+    assert "2 losses are doubtful: by their own account they may be off by more than 0.1 %" in (
+        process.stderr
+    )
     text = adhesis("status", out).stdout
     assert "2 losses are doubtful" in text
     assert "realisation 1" in text

@@ -9,6 +9,7 @@ from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tasks import Part
 from ensemble.task.compute import Runner, make_problem, run_task
 from ensemble.task.dataset import KEPT, row_shape, sizes_of
+from ensemble.task.doubt import doubtful
 from ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from solver.jumps import JUMP_KINDS, Jump
 from solver.loop import LoopResult
@@ -199,3 +200,9 @@ def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
     assert one["loss"] > 0
     split = one["loss_small_scale"] + one["loss_large_scale"]
     assert split == pytest.approx(one["loss_from_drops"])
+
+
+def test_a_loss_is_doubtful_where_it_misses_the_accuracy_asked_for():
+    """The estimated error is calibrated (docs/methods.md), so it is held against it as it is."""
+    told = doubtful(1e-3, -np.ones(4), [0, 0, 2e-3, -2e-3], [9e-4, 1.1e-3, 0, 0])
+    assert told.tolist() == [False, True, True, True]
