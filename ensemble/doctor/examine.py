@@ -80,7 +80,7 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     found = alone.reports[0] if alone.reports else {}
     texts = found.get("versions") or installed()
     checks.append(_libraries(alone, texts))
-    checks.append(_compiled())
+    checks.append(compiled_code())
 
     mpi_loads = bool(found.get("mpi_loads"))
     mpirun = launcher()
@@ -200,7 +200,7 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
     return Check("libraries", not broken, "; ".join(broken) or "HDF5 and FFTW load")
 
 
-def _compiled() -> Check:
+def compiled_code() -> Check:
     """Whether the compiler loads, and where its code lies."""
     try:
         from solver import warm

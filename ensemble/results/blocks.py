@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from ensemble.results.read import Results
 
 # Numbers read at once (8 bytes each): large enough for the disk, small enough for any machine.
-_READ_AT_ONCE = 2_000_000
+READ_AT_ONCE = 2_000_000
 # Numbers held at once while quantiles are taken (numpy copies them once more).
 HELD_AT_ONCE = 8_000_000
 
 
 def row_blocks(rows: int, width: int) -> Iterator[slice]:
     """Slices that cover ``rows`` rows of ``width`` numbers, a bounded number of bytes each."""
-    step = max(1, _READ_AT_ONCE // max(1, width))
+    step = max(1, READ_AT_ONCE // max(1, width))
     for start in range(0, rows, step):
         yield slice(start, min(rows, start + step))
 

@@ -47,7 +47,7 @@ class Writer:
         # HDF5's own lock would refuse readers; two writers are refused by ensemble.run.lock.
         options = {"locking": False} if comm is None else {"driver": "mpio", "comm": comm}
         self._file = h5py.File(self.path, "r+", **options)
-        self._datasets = {c.name: _RowWriter(self._file[c.name]) for c in DATASETS}
+        self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
         self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
 
     def __enter__(self) -> Self:
@@ -95,19 +95,19 @@ class Writer:
             with self._telling(row):
                 # First the status: a row that is being emptied must not be taken for a whole one.
                 self._datasets["status"].write(row, PENDING)
-                self._flush()
+                self.flush()
                 for dataset in cleared:
                     place = self._place(dataset.name, row)
                     if place is not None:
                         self._datasets[dataset.name].clear(place, dataset.fill)
-                self._flush()
+                self.flush()
 
     def mark(self, rows: Iterable[int], *, needed: bool) -> None:
         """Say of rows without a result that they are to be computed, or that they need not be."""
         for row in rows:
             with self._telling(row):
                 self._datasets["status"].write(row, PENDING if needed else NOT_NEEDED)
-        self._flush()
+        self.flush()
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
         with self._telling(row):
@@ -115,9 +115,9 @@ class Writer:
                 place = self._place(name, row)
                 if place is not None:
                     self._datasets[name].write(place, value)
-            self._flush()
+            self.flush()
             self._datasets["status"].write(row, status)
-            self._flush()
+            self.flush()
 
     def _place(self, name: str, row: int) -> int | None:
         """Where the row of a task stands in a dataset; None where it has none."""
@@ -132,13 +132,14 @@ class Writer:
                 f"row {row} of {self.path} could not be written: {reason(error)}"
             ) from error
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
+        """Hand what was written to the operating system."""
         # Parallel HDF5 keeps no data back; the serial driver does, in any order.
         if self._serial:
             self._file.flush()
 
 
-class _RowWriter:
+class DatasetRows:
     """Writes rows of one dataset through h5py's low level: faster than ``dataset[row] =``."""
 
     def __init__(self, dataset: h5py.Dataset) -> None:
@@ -150,9 +151,11 @@ class _RowWriter:
         self._rest = (0,) * len(self._shape)
 
     def clear(self, row: int, fill: Any) -> None:
+        """Fill a row with one value."""
         self.write(row, np.full(self._shape, fill, self._dtype))
 
     def write(self, row: int, value: Any) -> None:
+        """Write a row, of the dataset's own shape."""
         if np.shape(value) != self._shape:
             raise ValueError(
                 f"{self._id.name!r} has rows of shape {self._shape}, not {np.shape(value)}"

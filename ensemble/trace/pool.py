@@ -50,6 +50,11 @@ class Pool:
         self._workers: list[subprocess.Popen[bytes]] = []
         self._job_of: dict[int, Job] = {}
 
+    @property
+    def pids(self) -> list[int]:
+        """Ids of the processes, in the order in which they were started."""
+        return [process.pid for process in self._workers]
+
     def run(self, watch: Watch | None = None, every: float = 1.0) -> dict[str, Result | str]:
         """Run all jobs; ``watch`` is called every so many seconds, and when a loop is done."""
         if self.processes == 0:

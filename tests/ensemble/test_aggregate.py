@@ -101,7 +101,7 @@ def test_curves_are_the_means_of_the_raw_rows(file, hurst, gamma):
 def test_blocks_of_any_size_give_the_same_numbers(file, monkeypatch):
     whole = aggregate(file)
     monkeypatch.setattr("ensemble.results.blocks.HELD_AT_ONCE", 60)  # three columns of 19 rows
-    monkeypatch.setattr("ensemble.results.blocks._READ_AT_ONCE", 100)
+    monkeypatch.setattr("ensemble.results.blocks.READ_AT_ONCE", 100)
     pieces = aggregate(file)
     for one, two in zip(whole.cells, pieces.cells, strict=True):
         for name, curve in one.curves.items():
@@ -260,7 +260,7 @@ import resource, sys
 from ensemble.results import blocks
 from ensemble.aggregate.average import aggregate
 blocks.HELD_AT_ONCE //= 20
-blocks._READ_AT_ONCE //= 20
+blocks.READ_AT_ONCE //= 20
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 data = aggregate(sys.argv[1])
 after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -127,12 +127,12 @@ def test_doctor_tells_whether_code_is_compiled(
     files = CodeFiles("key")
     monkeypatch.setattr(warm, "code_files", lambda to_installation=False: files)
     monkeypatch.setattr(files, "_places", [tmp_path / "key"])
-    before = doctor._compiled()
+    before = doctor.compiled_code()
     assert (before.ok, before.needed) == (False, False)
     assert "sharp and grid not yet" in before.text
     (tmp_path / "key").mkdir()
     for method in warm.COMPILED_METHODS:
         (tmp_path / "key" / f"{method}.json").write_text("{}")
-    after = doctor._compiled()
+    after = doctor.compiled_code()
     assert after.ok
     assert str(tmp_path / "key") in after.text

@@ -22,7 +22,7 @@ from ensemble.results import schema
 from ensemble.results.layout import create
 from ensemble.results.read import Results
 from ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
-from ensemble.results.write import Writer, _RowWriter
+from ensemble.results.write import DatasetRows, Writer
 from ensemble.run.lock import RunLock, holder
 from ensemble.task.dataset import KEPT
 from ensemble.task.row import RESULT_DATASETS
@@ -236,8 +236,8 @@ def test_every_moment_of_writing_leaves_a_sound_file(tmp_path, monkeypatch):
 
         return wrapper
 
-    monkeypatch.setattr(_RowWriter, "write", recorded(_RowWriter.write))
-    monkeypatch.setattr(Writer, "_flush", recorded(Writer._flush))
+    monkeypatch.setattr(DatasetRows, "write", recorded(DatasetRows.write))
+    monkeypatch.setattr(Writer, "flush", recorded(Writer.flush))
     with Writer(path) as writer:
         writer.write_result(0, first)
         writer.write_failure(1, "ValueError: no", 2.5)

@@ -160,7 +160,7 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     def watch(pool: Pool) -> None:
         if not killed and pool.running:
             killed.extend(pool.running)
-            os.kill(pool._workers[-1].pid, signal.SIGKILL)
+            os.kill(pool.pids[-1], signal.SIGKILL)
 
     done = pool.run(watch, every=0.05)
     assert set(done) == {job.name for job in plan.jobs}
