@@ -118,7 +118,9 @@ def execute(
         print(f"adhesis run: {error}; what was done is kept", file=sys.stderr, flush=True)
         _end_job(comm, WRITE_FAILED)
         os._exit(WRITE_FAILED)  # at an orderly exit HDF5 would try to write again, and crash
-    except BaseException:
+    except BaseException as error:
+        if args.dry_run and isinstance(error, BrokenPipeError):
+            raise  # who reads has seen enough
         traceback.print_exc()
         _end_job(comm, OUR_ERROR)
         return OUR_ERROR

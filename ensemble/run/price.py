@@ -33,6 +33,9 @@ _BUSY = 0.8
 # the rule takes more than one that knew the spread (docs/campaign-file.md).
 _FEWEST_FOR_SPREAD = 6
 _MORE_THAN_LEAST = 1.3
+# Of the power law through the cells that were tried: fewest cells, least range of the logarithm of
+# their priors, and bounds of its power.
+_FEWEST_FOR_POWER, _NARROW, _POWERS = 3, 0.1, (0.5, 3.0)
 
 Cell = tuple[float, ...]
 
@@ -149,8 +152,8 @@ def price(
 
     Cells of which loops are done in the results file cost what those did. Of the others loops are
     tried out, the first realisation of each, then the second …, until the time is up; what was not
-    reached is scaled by how the tasks of such cells usually compare. Loops that share a loading
-    branch are tried out together.
+    reached is extrapolated by how the tasks of such cells usually compare. Loops that share a
+    loading branch are tried out together.
 
     Parameters
     ----------
@@ -255,7 +258,7 @@ def _cells(
     for task in tasks:
         first.setdefault(task.cell, task)
     mean = {cell: float(np.mean(seconds)) for cell, seconds in known.seconds.items() if seconds}
-    scale = float(np.mean([t / prior(first[cell]) for cell, t in mean.items()])) if mean else 0.0
+    of_prior = _law([prior(first[cell]) for cell in mean], list(mean.values()))
     count = dict.fromkeys(first, 0)
     for task in left:
         count[task.cell] += 1
@@ -266,9 +269,30 @@ def _cells(
             have = campaign.realisations - count[cell]
             count[cell] = min(count[cell], max(0, wanted - have))
     return tuple(
-        CellPrice(task, count[cell], mean.get(cell, scale * prior(task)), len(known.seconds[cell]))
+        CellPrice(
+            task,
+            count[cell],
+            mean[cell] if cell in mean else of_prior(prior(task)),
+            len(known.seconds[cell]),
+        )
         for cell, task in first.items()
     ), stop
+
+
+def _law(priors: list[float], seconds: list[float]) -> Callable[[float], float]:
+    """Time of a cell that was not reached, by its prior: a power law through those that were.
+
+    The cheapest are tried first, and the others take more than in proportion, by how much the
+    methods decide.
+    """
+    if not seconds:
+        return lambda prior: 0.0
+    x, y = np.log(priors), np.log(np.maximum(seconds, 1e-6))
+    away = x - x.mean()
+    power = 1.0
+    if x.size >= _FEWEST_FOR_POWER and np.ptp(x) > _NARROW:
+        power = float(np.clip(np.sum(away * y) / np.sum(away**2), *_POWERS))
+    return lambda prior: float(np.exp(y.mean() + power * (np.log(prior) - x.mean())))
 
 
 def _realisations(campaign: Campaign, known: _Known) -> tuple[int, str]:
@@ -332,5 +356,5 @@ def as_text(price: Price) -> str:
             name = str(cell.task).rpartition(", realisation")[0]
             lines.append(f"{mark}{cell.seconds:7.3g} {cell.tasks:6d} {hours:11.3g}  {name}")
         if not all(cell.measured for cell in price.cells):
-            lines.append("~ scaled from other cells")
+            lines.append("~ extrapolated from other cells")
     return "\n".join(lines)

@@ -10,6 +10,7 @@ from ensemble.campaign.tasks import Part
 from ensemble.errors import InputError
 from ensemble.results.layout import create
 from ensemble.results.write import Writer
+from ensemble.run.plan import prior
 from ensemble.run.price import as_text, price
 from tests.support.campaign_support import adhesis, campaign_text, write_campaign
 from tests.support.fake_run import fake_result
@@ -44,8 +45,23 @@ def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
     told = price(campaign, compute=compute, seconds=3.0)
     assert told.pilots == 3
     assert [bool(cell.measured) for cell in told.cells].count(False) == 1
-    assert "~ scaled from other cells" in as_text(told)
+    assert "~ extrapolated from other cells" in as_text(told)
     assert all(cell.seconds > 0 for cell in told.cells)
+
+
+def test_cells_that_take_more_than_in_proportion_are_followed(monkeypatch):
+    """The prior's square: what was not reached is found, as the fit of the others has the power."""
+    clock = iter(range(1000))
+    monkeypatch.setattr("ensemble.run.price.time.monotonic", lambda: float(next(clock)))
+    campaign = parse_campaign(campaign_text(hurst="[0.6, 0.8]", work_of_adhesion="[0.01, 0.05]"))
+
+    def compute(campaign, task):
+        return {"cpu_time": 0.1 * prior(task) ** 2}
+
+    told = price(campaign, compute=compute, seconds=3.0)
+    assert told.pilots == 3
+    true = sum(0.1 * prior(task) ** 2 for task in campaign.tasks())
+    assert told.seconds == pytest.approx(true, rel=1e-9)
 
 
 def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
