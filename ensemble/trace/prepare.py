@@ -382,6 +382,11 @@ def _cut_off(
         shortest, why = wanted, "as given"
     else:
         why = reasons[by]
+        if shortest > length / 4 and by != "noise":
+            raise InputError(
+                f"{trace.path} is {length_text(length)} long, and waves can be trusted from "
+                f"{length_text(shortest)} on ({why}): --cut-off goes on all the same"
+            )
         if shortest > length / 4 or rms < _ALL_NOISE * spectrum.noise:
             raise InputError(
                 f"{trace.path} holds no roughness above its noise: of {length_text(rms)} rms "

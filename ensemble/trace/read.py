@@ -125,9 +125,16 @@ def read_trace(
         raise InputError(f"{path} is a directory: a trace is a file")
     if not path.exists():
         raise InputError(f"cannot read {path}: there is no such file")
+    is_text = path.suffix.lower() == ".npy" or _is_text(path)
+    for name, number in (("--row", row), ("--channel", channel)):
+        if is_text and number is not None:
+            raise InputError(
+                f"{name} is {number}: {path} holds columns of numbers, no map and no channels "
+                "(--columns chooses columns)"
+            )
     if path.suffix.lower() == ".npy":
         return _from_array(path, unit, step)
-    if _is_text(path):
+    if is_text:
         table = read_table(path, delimiter, decimal)
         return _from_table(path, table, unit, step, columns)
     for name, value in (("--unit", unit), ("--step", step), ("--columns", columns)):

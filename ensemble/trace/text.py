@@ -15,6 +15,7 @@ from ensemble.errors import InputError
 from solver.profile import Array
 
 MOST_BYTES = 200_000_000
+_ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with
 _SAMPLE = 400  # lines that the form of a file is judged by
 
 DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
@@ -83,6 +84,8 @@ def read_table(path: Path, delimiter: str | None = None, decimal: str | None = N
     split = [_split(line, delimiter) if _looks_like_numbers(line) else None for line in lines]
     count = Counter(len(row) for row in split if row is not None).most_common(1)[0][0]
     start = _first_row(split, count, decimal)
+    if start is None and len(sample) < _ROWS_TO_BEGIN:
+        raise InputError(f"{path} holds {len(sample)} rows of numbers: too few for a trace")
     if start is None:
         raise InputError(f"{path} holds no rows of numbers of one length")
     header = [line.strip().lstrip(_COMMENT).strip() for line in lines[:start]]
@@ -255,7 +258,7 @@ def _first_row(split: Sequence[list[str] | None], count: int, decimal: str) -> i
         good = row is not None and len(row) == count
         if good and row is not None and all(_value(field, decimal) is not None for field in row):
             found.append(place)
-            if len(found) == 3:
+            if len(found) == _ROWS_TO_BEGIN:
                 return found[0]
         elif row is not None or found:
             found = []
