@@ -173,7 +173,7 @@ class StopTable:
 
     relative_error: float | None = _key(
         number_between(0, 1),
-        "wanted half-width of the 95 % interval of the loss, over the loss",
+        "how far the 95 % interval of the mean loss may reach from it, over it",
         None,
     )
     batch: int = _key(whole_number(1), "realisations that a cell gets at a time", 8)
