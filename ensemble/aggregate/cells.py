@@ -25,7 +25,7 @@ _PER_TASK = (
     *("h_max", "h_rms", "m0", "m2", "m4"),
     *("loss", "loss_dimensionless", "loss_from_drops", "loss_small_scale", "loss_large_scale"),
     *("audit_residual", "pull_off_penetration", "pull_off_stress"),
-    "largest_contact_fraction",
+    *("largest_contact_fraction", "work_gained", "work_spent", "full_contact_energy"),
     *("wall_time", "cpu_time", "states", "jump_count"),
     *("loss_error", "races", "energy_at_stake"),
 )
@@ -38,7 +38,16 @@ _WITH_INTERVAL = (
     "pull_off_stress",
     "pull_off_penetration",
     "largest_contact_fraction",
+    "loss_per_contact",
+    "effective_work_of_approach",
+    "effective_work_of_separation",
 )
+# Energies that are told per largest contact area too, in J/m² of contact.
+_PER_CONTACT = {
+    "loss_per_contact": "loss",
+    "effective_work_of_approach": "work_gained",
+    "effective_work_of_separation": "work_spent",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +74,9 @@ class Cell:
     values : dict of array, each of shape (done,)
         Per-task numbers under the names of the results file, and ``small_scale_share``
         (loss_small_scale / loss_from_drops); ``loss_error_dimensionless``,
-        ``energy_at_stake_dimensionless`` (in W~).
+        ``energy_at_stake_dimensionless`` (in W~); ``loss_per_contact``,
+        ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
+        spent per largest contact area, in J/m²).
     estimates : dict of Estimate
         The same, averaged. Only losses, pull-off and largest contact have an interval.
     curves : dict of Curve
@@ -123,6 +134,8 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         values["small_scale_share"] = np.divide(
             values["loss_small_scale"], drops, out=np.zeros_like(drops), where=drops > 0
         )
+        for name, energy in _PER_CONTACT.items():
+            values[name] = values[energy] / values["largest_contact_fraction"]
         scale = stress_scale(here, values["h_max"]) * values["h_max"]
         for name in ("loss_error", "energy_at_stake"):
             values[f"{name}_dimensionless"] = values[name] / scale

@@ -63,6 +63,8 @@ def average_curves(
             if not mine.size:
                 continue
             raw = table[np.searchsorted(done, mine)]
+            if name == "patches":  # none are told beyond the turning point of a load
+                raw[raw < 0] = np.nan
             for curve, factors in scales.items():
                 values = raw * factors[k][:, None]
                 average = out[curve][k]

@@ -69,7 +69,7 @@ def _extends(key: str, was: Any, now: Any) -> bool:
     if key not in ("sweep.hurst", "sweep.work_of_adhesion") and entry.metadata["axis"] is None:
         return False
     # All turning points of a profile belong together: they do not become more.
-    if key == "cycle.max_penetration":
+    if key in ("cycle.max_penetration", "cycle.max_stress"):
         return False
     return _values(was) < _values(now)
 

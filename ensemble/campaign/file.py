@@ -139,6 +139,7 @@ def _check_together(source: str, campaign: Campaign) -> None:
     """Check the rules that join several keys."""
     profile, cycle = campaign.profile, campaign.cycle
     given = list(profile.normalisation)
+    _check_turning_point(source, campaign)
     if len(given) != 1:
         raise InputError(
             f"{source}: [profile] gives {' and '.join(given) or 'none of h_rms, m2 and c0'}: "
@@ -173,16 +174,41 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [output] field_penetrations is given beside several max_penetration: it "
             "must be left out there (a third, two thirds and all of each are kept) or be empty"
         )
+    if campaign.output.field_penetrations and cycle.under_load:
+        raise InputError(
+            f"{source}: [output] field_penetrations is given under a load: it must be left out "
+            "there (a third, two thirds and all of max_stress are kept) or be empty"
+        )
     for value in campaign.output.field_penetrations or ():
-        if not cycle.unloading_until <= value <= cycle.max_penetration:
+        if not cycle.unloading_until <= value <= cycle.turning_point:
             raise InputError(
                 f"{source}: [output] field_penetrations holds {value}: it must lie between "
                 f"unloading_until ({cycle.unloading_until:g}) and max_penetration "
-                f"({cycle.max_penetration:g})"
+                f"({cycle.turning_point:g})"
             )
-    length = cycle.load_steps * (1 - cycle.unloading_until / cycle.max_penetration)
+    length = cycle.load_steps * (1 - cycle.unloading_until / cycle.deepest)
     if length > _LONGEST_AXIS:
         raise InputError(
             f"{source}: [cycle] unloading_until is {cycle.unloading_until}: with these load steps "
             f"the unloading curve has {length:.6g} values, and at most {_LONGEST_AXIS} are allowed"
         )
+
+
+def _check_turning_point(source: str, campaign: Campaign) -> None:
+    """Check that the path turns where its control lets it turn."""
+    cycle = campaign.cycle
+    wanted, other = "max_penetration", "max_stress"
+    if cycle.under_load:
+        wanted, other = other, wanted
+    if getattr(cycle, wanted) is None:
+        entry = next(f for f in fields(type(cycle)) if f.name == wanted)
+        raise InputError(
+            f"{source}: [cycle] {wanted} is missing ({entry.metadata['meaning']}): "
+            f"it must be {entry.metadata['rule'].text}"
+        )
+    for name in (other, *(["stiffness"] if cycle.under_load else [])):
+        if getattr(cycle, name) is not None:
+            raise InputError(
+                f'{source}: [cycle] {name} is given with control = "{cycle.control}": a path of '
+                f"the {cycle.control} turns at {wanted} and has no {name}"
+            )

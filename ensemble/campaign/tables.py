@@ -108,14 +108,27 @@ class SweepTable:
     )
 
 
-@dataclass(frozen=True)
+PathControl = Literal["separation", "load"]
+
+
+@dataclass(frozen=True, kw_only=True)
 class CycleTable:
     """``[cycle]``: the loading path."""
 
-    max_penetration: float = _key(
+    max_penetration: float | None = _key(
         number_between(0, 1),
         "Δ~max, the penetration in units of h_max at which unloading starts",
+        None,
         axis="1",
+    )
+    max_stress: float | None = _key(
+        positive_number("Pa"),
+        "under a load, instead: mean stress in Pa at which unloading starts",
+        None,
+        axis="Pa",
+    )
+    control: PathControl = _key(  # noqa: RUF009
+        choice(*get_args(PathControl)), "what is prescribed along the path", "separation"
     )
     load_steps: int = _key(whole_number(1, 100_000), "equal steps of the loading branch")
     stiffness: float | None = _key(
@@ -130,6 +143,23 @@ class CycleTable:
         "end of the stored unloading curve, in units of h_max (the loop itself ends at detachment)",
         -8.0,
     )
+
+    @property
+    def under_load(self) -> bool:
+        """Whether the path is one of the mean stress."""
+        return self.control == "load"
+
+    @property
+    def turning_point(self) -> float:
+        """Where unloading starts: Δ/h_max, u_tot/h_max of a stiffness, p̄ in Pa under a load."""
+        point = self.max_stress if self.under_load else self.max_penetration
+        assert point is not None  # the file is read so
+        return point
+
+    @property
+    def deepest(self) -> float:
+        """Δ/h_max that the loop does not exceed: its turning point; 1 under a load."""
+        return 1.0 if self.under_load else self.turning_point
 
 
 @dataclass(frozen=True)
@@ -285,7 +315,7 @@ class Campaign:
             if self.has_axis("max_penetration"):  # the stored curves have one number of steps
                 cycle: CycleTable = tables["cycle"]
                 last = self.cycle.load_steps + 1 - self.unloading_penetration.size
-                until = cycle.max_penetration * last / cycle.load_steps
+                until = cycle.turning_point * last / cycle.load_steps
                 tables["cycle"] = replace(cycle, unloading_until=until)
             finest = self.finest_harmonic
             self._at[task.others] = replace(self, sweep=sweep, lists=(), finest=finest, **tables)
@@ -295,7 +325,7 @@ class Campaign:
     def _turning(self) -> Axis | None:
         """The axis of turning points, unless other keys vary with it."""
         for group in self._groups:
-            if len(group) == 1 and group[0].name == "max_penetration":
+            if len(group) == 1 and group[0].name in ("max_penetration", "max_stress"):
                 return group[0]
         return None
 
@@ -370,7 +400,8 @@ class Campaign:
     def loading_penetration(self) -> Array:
         """Δ/h_max of the loading curve, ascending, shape (load_steps + 1,).
 
-        With several ``max_penetration`` the curves' axes are in units of it.
+        With several ``max_penetration`` the curves' axes are in units of it; under a load they
+        reach 1, whatever the turning point.
         """
         steps = self.cycle.load_steps
         return self._top * np.arange(steps + 1) / steps
@@ -381,18 +412,18 @@ class Campaign:
 
         With several ``max_penetration`` in units of it, and as long as the smallest one needs.
         """
-        steps, smallest = self.cycle.load_steps, self.cycle.max_penetration
+        steps, smallest = self.cycle.load_steps, self.cycle.deepest
         last = math.ceil(self.cycle.unloading_until / smallest * steps - 1e-9)
         return self._top * np.arange(steps, last - 1, -1) / steps
 
     @property
     def _top(self) -> float:
-        return 1.0 if self.has_axis("max_penetration") else self.cycle.max_penetration
+        return 1.0 if self.has_axis("max_penetration") else self.cycle.deepest
 
     def penetration_unit(self, task: Task) -> float:
         """What the penetration axes of the results file are to be multiplied by to be Δ/h_max."""
         several = self.has_axis("max_penetration")
-        return self.at(task).cycle.max_penetration if several else 1.0
+        return self.at(task).cycle.turning_point if several else 1.0
 
     def values(self) -> dict[str, Any]:
         """Every value by its key ("sweep.hurst"), defaults included, lists ascending."""

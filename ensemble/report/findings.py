@@ -29,9 +29,11 @@ def _outcome(data: Aggregate) -> str:
         (cell for cell in data.cells if cell.done),
         key=lambda cell: cell.estimates["loss_dimensionless"].mean,
     )
-    ends = sorted({cell.campaign.cycle.max_penetration for cell in cells})
+    ends = sorted({cell.campaign.cycle.turning_point for cell in cells})
     end = f"{ends[0]:g}" if len(ends) == 1 else f"{ends[0]:g} … {ends[-1]:g}"
-    top = f"A loop to Δ/h_max = {end} and back until detached loses"
+    load = data.campaign.cycle.under_load
+    to = f"a mean stress of {end} Pa" if load else f"Δ/h_max = {end}"
+    top = f"A loop to {to} and back until detached loses"
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}."
     low, high = cells[0], cells[-1]

@@ -14,6 +14,7 @@ from ensemble.report.figures.catalogue import Illustration
 from ensemble.report.figures.style import left_out
 from ensemble.report.tables import losses as loss_tables
 from ensemble.report.tables import mechanisms as mechanism_tables
+from ensemble.report.tables.works import works
 
 
 def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustration]]]) -> str:
@@ -89,6 +90,11 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
         "### Share of the drops by kind of the jump",
         mechanism_tables.shares_by_kind(data).markdown(),
         "Numbers of jumps: `jumps.csv`.",
+        "## Approach and separation",
+        works(data).markdown(),
+        "Works per nominal area, and the same over the largest contact area of the loop: effective "
+        "works of adhesion on approach and separation, and their difference. Full contact: its "
+        "elastic energy, to be set beside γ. With intervals: `works.csv`.",
         "## Profiles",
         loss_tables.profiles(data).markdown(),
         "## Accuracy and completeness",
@@ -105,17 +111,20 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
 
 def _summary(data: Aggregate) -> str:
     sweep, cycle = data.campaign.sweep, data.campaign.cycle
-    tops = {cell.campaign.cycle.max_penetration for cell in data.cells}
+    tops = {cell.campaign.cycle.turning_point for cell in data.cells}
+    top = f"Δ/h_max = {_list(tops)}"
+    if cycle.under_load:
+        top = f"a mean stress of {_list(tops)} Pa"
     further = "".join(
         f"{axis.name} = {_list(axis.values)}; "
         for axis in data.further
-        if axis.name != "max_penetration"
+        if axis.name not in ("max_penetration", "max_stress")
     )
     return (
         f"{data.done} loops of {data.done + data.failed + data.pending} tasks: "
         f"H = {_list(sweep.hurst)}; γ = {_list(sweep.work_of_adhesion)} J/m²; {further}"
-        f"{sweep.realisations} realisations. Each loop was loaded to Δ/h_max = "
-        f"{_list(tops)} in {cycle.load_steps} steps and unloaded until detached; "
+        f"{sweep.realisations} realisations. Each loop was loaded to {top} "
+        f"in {cycle.load_steps} steps and unloaded until detached; "
         f"method `{data.campaign.solver.method}`. Numbers: `losses.csv`; curves: `curves.nc`."
     )
 

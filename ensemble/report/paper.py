@@ -83,6 +83,7 @@ def _is_reading(campaign: Campaign, hursts: Sequence[float]) -> bool:
         and profile.amplitudes == "deterministic"
         and profile.rolloff == 1
         and cycle.stiffness is None
+        and cycle.max_penetration is not None
         and _is_spectrum(campaign, hursts)
         and _is(material.young, _YOUNG)
         and _is(material.poisson, _POISSON)

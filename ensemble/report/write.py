@@ -63,11 +63,12 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     from ensemble.report.figures.style import save, say_below, style
     from ensemble.report.html import html_page
     from ensemble.report.page import write_page
-    from ensemble.report.tables import losses, mechanisms
+    from ensemble.report.tables import losses, mechanisms, works
 
     losses.losses(data).write_csv(directory / "losses.csv")
     losses.paired(data).write_csv(directory / "growth.csv")
     mechanisms.jumps(data).write_csv(directory / "jumps.csv")
+    works.works(data).write_csv(directory / "works.csv")
     write_curves(data, directory / "curves.nc")
     if data.companions:
         losses.companions(data).write_csv(directory / "beside.csv")

@@ -10,7 +10,7 @@ from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import Task
 from ensemble.errors import InputError
 from ensemble.task.dataset import sizes_of
-from ensemble.task.fields import FieldRecorder, field_plan
+from ensemble.task.fields import FieldPlan, FieldRecorder, field_plan
 from ensemble.task.row import Row, row_of, row_scales
 from solver.control import Control
 from solver.loop import Progress, run_loop
@@ -44,7 +44,10 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
     )
     half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
     stiffness = campaign.cycle.stiffness
-    control = Control() if stiffness is None else Control(stiffness)
+    if campaign.cycle.under_load:
+        control = Control(0.0)
+    else:
+        control = Control() if stiffness is None else Control(stiffness)
     return Problem(profile, half_space, task.work_of_adhesion, control)
 
 
@@ -122,19 +125,27 @@ class Runner:
         plan = field_plan(campaign, task)
         keep = task.realisation < plan.realisations
         sizes = sizes_of(row_scales(campaign))
-        turn = here.cycle.max_penetration
+        turn = here.cycle.turning_point
+        load = here.cycle.under_load
+        unit = campaign.penetration_unit(task)
+        # where the load steps of the loop are not the axes of the curves
+        axes: dict[Branch, Array] = {
+            "loading": unit * campaign.loading_penetration,
+            "unloading": unit * campaign.unloading_penetration,
+        }
         key = campaign.branch_of(task)
         if key is None:
             method = _make_method(campaign, task)
             recorder = FieldRecorder(plan, method, keep=keep)
             loop = run_loop(
                 method,
-                max_penetration=turn,
+                max_penetration=None if load else turn,
+                max_stress=turn if load else None,
                 load_steps=campaign.cycle.load_steps,
                 progress=progress,
                 on_state=recorder.on_state,
             )
-            row = row_of(loop, sizes)
+            row = row_of(loop, sizes, axes if load else None)
         else:
             branch = self._branch(campaign, task, key, turn)
             self._shared = None  # what is interrupted is not gone on with
@@ -142,7 +153,7 @@ class Runner:
             try:
                 loop = branch.loop(
                     turn,
-                    marks=plan.penetration.tolist(),
+                    marks=_marks(plan),
                     progress=progress,
                     on_state=recorder.on_state,
                 )
@@ -150,10 +161,6 @@ class Runner:
                 self._shared = _Shared(campaign, key, turn, branch)
                 raise
             self._shared = _Shared(campaign, key, turn, branch)
-            axes: dict[Branch, Array] = {
-                "loading": turn * campaign.loading_penetration,
-                "unloading": turn * campaign.unloading_penetration,
-            }
             row = row_of(loop, sizes, axes)
         row |= recorder.row()
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -167,7 +174,13 @@ class Runner:
         others = campaign.sharing(task)
         return LoadingBranch(
             _make_method(campaign, task),
-            [campaign.at(other).cycle.max_penetration for other in others],
+            [campaign.at(other).cycle.turning_point for other in others],
             load_steps=campaign.cycle.load_steps,
-            marks=[mark for o in others for mark in field_plan(campaign, o).penetration.tolist()],
+            marks=[mark for o in others for mark in _marks(field_plan(campaign, o))],
         )
+
+
+def _marks(plan: FieldPlan) -> list[float]:
+    """Where a loop passes through the states whose fields are kept."""
+    places: list[float] = (plan.penetration * (plan.max_stress or 1.0)).tolist()
+    return places

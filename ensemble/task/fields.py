@@ -49,6 +49,9 @@ class FieldPlan:
     finest_harmonic : int
         Highest harmonic of all profiles of the campaign.
     max_penetration : float
+        Δ/h_max; under a load 1, and then all penetrations here are mean stresses over max_stress.
+    max_stress : float or None
+        In Pa, under a load.
     load_steps : int
     wanted : tuple of float
         Penetrations Δ/h_max as the campaign gives them.
@@ -67,6 +70,7 @@ class FieldPlan:
     wanted: tuple[float, ...]
     most_nodes: int
     realisations: int
+    max_stress: float | None = None
 
     @cached_property
     def penetration(self) -> Array:
@@ -137,7 +141,9 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
     else:
         waves = Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin")
         places = Scale("field_position", plan.position, "m", "position of a node of a kept field")
-    depth = "max_penetration" if "max_penetration" in several else "h_max"
+    depth = f"penetration/{'max_penetration' if 'max_penetration' in several else 'h_max'}"
+    if plan.max_stress is not None:
+        depth = "mean stress/max_stress"
     return (
         waves,
         Scale(
@@ -153,7 +159,7 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
             "height/h_rms, middle of its bin",
         ),
         Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
-        Scale("field_penetration", plan.penetration, "1", f"penetration/{depth} of a field"),
+        Scale("field_penetration", plan.penetration, "1", f"{depth} of a field"),
         places,
     )
 
@@ -198,7 +204,7 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
     """
     here = campaign if task is None else campaign.at(task)
     profile, cycle, output = here.profile, here.cycle, here.output
-    top, period = cycle.max_penetration, profile.period
+    top, period = 1.0 if cycle.under_load else cycle.turning_point, profile.period
     if task is None and campaign.has_axis("max_penetration"):
         top = 1.0
     if task is None and campaign.has_axis("period"):
@@ -214,6 +220,7 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
         wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,
         most_nodes=output.field_nodes,
         realisations=min(output.field_realisations, campaign.realisations),
+        max_stress=cycle.turning_point if cycle.under_load else None,
     )
 
 
@@ -252,7 +259,10 @@ class FieldRecorder:
             return
         problem = self._method.problem
         # of the path: of the far side, where a stiffness holds the half-space
-        penetration = problem.penetration(problem.prescribed_in(state))
+        if self._plan.max_stress is None:
+            penetration = problem.penetration(problem.prescribed_in(state))
+        else:
+            penetration = state.mean_stress / self._plan.max_stress
         distance = np.abs(self._plan.penetration - penetration)
         nearest = int(np.argmin(distance))
         # States between load steps lie beside the axis by far more than rounding.

@@ -15,6 +15,7 @@ from ensemble.campaign.file import load_campaign, parse_campaign
 from ensemble.campaign.tables import TABLES
 from ensemble.errors import InputError
 from ensemble.task.compute import make_problem
+from ensemble.task.fields import field_plan
 from tests.support.campaign_support import ROOT, campaign_text
 
 
@@ -317,3 +318,49 @@ def test_rules_hold_in_every_cell():
     assert "rolloff is 8" in refused(campaign_text(ratio="[4, 16]\nrolloff = [2, 8]"))
     text = campaign_text(max_penetration="[0.6, 0.3]", jumps="8\nfield_penetrations = [0.1]")
     assert "field_penetrations is given beside several max_penetration" in refused(text)
+
+
+def under(cycle):
+    return campaign_text().replace("max_penetration = 0.6", cycle)
+
+
+def test_a_path_turns_where_its_control_lets_it_turn():
+    load = parse_campaign(under('control = "load"\nmax_stress = [300, 100]'))
+    assert load.cycle.under_load
+    assert load.cycle.turning_point == 100
+    assert load.branch_loops == 2
+    first = load.tasks()[0]
+    assert [load.at(task).cycle.turning_point for task in load.sharing(first)] == [100, 300]
+    assert load.unloading_penetration[0] == 1.0
+    assert load.penetration_unit(first) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("cycle", "sentence"),
+    [
+        ("", "max_penetration is missing (Δ~max"),
+        ('control = "load"', "max_stress is missing (under a load"),
+        ('control = "load"\nmax_stress = -5', "max_stress is -5: it must be a positive"),
+        (
+            'control = "force"\nmax_stress = 5',
+            "control is 'force': it must be one of \"separation\"",
+        ),
+        ("max_penetration = 0.5\nmax_stress = 5", "max_stress is given with control"),
+        (
+            'control = "load"\nmax_stress = 5\nmax_penetration = 0.5',
+            "max_penetration is given with",
+        ),
+        ('control = "load"\nmax_stress = 5\nstiffness = 1e9', "stiffness is given with control"),
+    ],
+)
+def test_turning_points_that_do_not_belong_to_the_control_are_refused(cycle, sentence):
+    assert sentence in refused(under(cycle))
+
+
+def test_fields_under_a_load_are_kept_at_parts_of_it():
+    text = under('control = "load"\nmax_stress = 300')
+    plan = field_plan(parse_campaign(text))
+    np.testing.assert_allclose(plan.penetration, [0.25, 0.75, 1.0])  # of 4 load steps
+    assert plan.max_stress == 300
+    told = refused(text.replace("jumps = 8", "jumps = 8\nfield_penetrations = [0.1]"))
+    assert "field_penetrations is given under a load" in told

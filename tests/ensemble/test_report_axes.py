@@ -15,6 +15,7 @@ from ensemble.campaign.file import parse_campaign
 from ensemble.report import paper
 from ensemble.report.figures.catalogue import along_axes
 from ensemble.report.figures.style import style
+from ensemble.report.tables.works import works
 from ensemble.report.write import write_report
 from tests.support.synthetic_results import campaign, rows, write
 
@@ -150,10 +151,10 @@ def test_figures_along_an_axis_hold_the_means_there(data):
         lines,
         np.repeat(
             ["loss_dimensionless", "pull_off_stress", "pull_off_penetration",
-             "largest_contact_fraction"], 2
+             "largest_contact_fraction", "loss_per_contact"], 2
         ),
-        np.repeat([1, 1e3, 1, 1], 2),
-        [0.7, 0.8] * 4,
+        np.repeat([1, 1e3, 1, 1, 1e-3], 2),
+        [0.7, 0.8] * 5,
         strict=True,
     ):  # fmt: skip
         cells = [
@@ -185,3 +186,19 @@ def test_opened_tables_and_figures_have_every_axis(file):
     assert len(results.plot.loss_along("ratio")) == 2
     with pytest.raises(ValueError, match="there are ratio, max_penetration"):
         results.plot.loss_along("young")
+
+
+def test_works_are_told_per_nominal_and_per_contact_area(data):
+    table = works(data)
+    names = [column.name for column in table.columns]
+    for row, cell in zip(table.rows, data.cells, strict=True):
+        told = dict(zip(names, row, strict=True))
+        gained, spent = cell.values["work_gained"], cell.values["work_spent"]
+        contact = cell.values["largest_contact_fraction"]
+        assert told["work_gained_mean [J/m^2]"] == gained.mean()
+        separation = told["effective_work_of_separation_mean [J/m^2]"]
+        assert separation == pytest.approx((spent / contact).mean())
+        approach = told["effective_work_of_approach_mean [J/m^2]"]
+        assert approach == pytest.approx((gained / contact).mean())
+        low = told["loss_per_contact_ci_low [J/m^2]"]
+        assert low <= (cell.values["loss"] / contact).mean()

@@ -12,8 +12,9 @@ from ensemble.task.dataset import KEPT, row_shape, sizes_of
 from ensemble.task.doubt import doubtful
 from ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from solver.jumps import JUMP_KINDS, Jump
-from solver.loop import LoopResult
-from solver.method import MethodReport
+from solver.loop import LoopResult, run_loop
+from solver.method import MethodReport, PathError
+from solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 
 
@@ -156,6 +157,46 @@ def test_loops_that_share_a_loading_branch_are_those_of_campaigns_of_their_own()
         np.testing.assert_allclose(
             one["field_displacement"], two["field_displacement"], atol=2e-9, equal_nan=True
         )
+
+
+def under_load(stress, **changes):
+    text = campaign_text(work_of_adhesion="[0.002]", load_steps="8", **changes)
+    text = text.replace("nodes_per_wave = 16\n", "").replace('"grid"', '"sharp"')
+    return text.replace("max_penetration = 0.6", f'control = "load"\nmax_stress = {stress}')
+
+
+def test_a_loop_under_a_load_is_that_of_the_library_on_axes_of_penetration():
+    """A jump is a line at its load; nothing is told beyond the turning point."""
+    campaign = parse_campaign(under_load("300"))
+    task = campaign.tasks()[0]
+    row = run_task(campaign, task)
+    problem = make_problem(campaign, task)
+    assert problem.control.is_load
+    loop = run_loop(make_method("sharp", problem), max_stress=300.0, load_steps=8)
+    assert row["loss"] == loop.loss
+    sizes = sizes_of(row_scales(campaign))
+    assert all(np.shape(row[d.name]) == row_shape(d, sizes) for d in RESULT_DATASETS)
+    assert campaign.loading_penetration[-1] == 1.0
+    stress = row["loading_mean_stress"]
+    beyond = campaign.loading_penetration > loop.max_penetration
+    assert beyond.any()
+    assert not beyond.all()
+    np.testing.assert_array_equal(np.isnan(stress), beyond)
+    assert (row["loading_patches"][beyond] == -1).all()
+    assert np.nanmax(stress) <= 300.0
+    assert np.all(np.diff(stress[~beyond]) >= -1e-6)  # the load does not fall on the way in
+    assert np.nanmin(row["unloading_mean_stress"]) >= -loop.pull_off_stress
+    assert not np.isnan(row["psd_displacement"][:, -1]).any()  # the state at max_stress is kept
+
+
+def test_loads_share_a_loading_branch_and_what_runs_away_is_told():
+    campaign = parse_campaign(under_load("[100, 300, 1e6]"))
+    first, second, third = campaign.sharing(campaign.tasks()[0])
+    runner = Runner()
+    together = [bits(runner(campaign, task)) for task in (first, second)]
+    assert together == [bits(run_task(campaign, task)) for task in (first, second)]
+    with pytest.raises(PathError, match=r"full contact before a mean stress of .* Pa"):
+        runner(campaign, third)
 
 
 def test_the_time_of_a_shared_loading_branch_counts_once(monkeypatch):

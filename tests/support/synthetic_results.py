@@ -99,6 +99,8 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "energy_at_stake": np.where(np.arange(n) % 7 == 3, 0.02 * loss, 0.0),
         "pull_off_penetration": pull_off[:, 0],
         "pull_off_stress": -unloading.min(axis=1) * scale,
+        "work_gained": 0.3 * loss,
+        "work_spent": 1.3 * loss,
         "largest_contact_fraction": np.clip(0.4 * size[:, 0], 0, 1),
         "states": np.full(n, 90, dtype=np.int32),
         "loading_mean_stress": loading * scale[:, None],

@@ -27,6 +27,7 @@ from ensemble.report.figures.style import (
     spread_out,
 )
 
+TURNING_POINTS = ("max_penetration", "max_stress")
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
 _LOSS = ("loss_dimensionless", r"loss $\tilde W$", 1.0)
@@ -34,6 +35,7 @@ _OF_TURNING_POINT = (
     ("pull_off_stress", "pull-off stress (kPa)", 1e3),
     ("pull_off_penetration", r"pull-off at $\Delta/h_\mathrm{max}$", 1.0),
     ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0),
+    ("loss_per_contact", "loss per contact (mJ/m²)", 1e-3),
 )
 
 
@@ -60,7 +62,7 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
     fixed, lines = _lines(data, axis)
     hursts = spread_out(data.hursts, MOST_PANELS)
     gammas = shown_gammas(data)
-    rows = [_LOSS, *(_OF_TURNING_POINT if axis.name == "max_penetration" else ())]
+    rows = [_LOSS, *(_OF_TURNING_POINT if axis.name in TURNING_POINTS else ())]
     width = ONE_COLUMN if len(hursts) == 1 else TWO_COLUMNS
     height = (22 + 40 * len(rows)) * MM
     figure = new_figure(len(rows), len(hursts), width, height, sharex=True, sharey="row")
@@ -78,7 +80,7 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 found = [cell.estimates[name] for cell in line]
                 errorbar(axes, x, found, k, gamma_label(gamma), unit=unit)
-                if name == "largest_contact_fraction":
+                if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
         if name != "pull_off_penetration":

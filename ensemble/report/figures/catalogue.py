@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ensemble.aggregate.average import Aggregate
 from ensemble.report.axes import together
 from ensemble.report.figures import fields, loops, losses
-from ensemble.report.figures.along import along, with_figure
+from ensemble.report.figures.along import TURNING_POINTS, along, with_figure
 
 
 @dataclass(frozen=True)
@@ -165,8 +165,9 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
             "Means with 95 % intervals, the same phases everywhere; the curves are moved apart a "
             "little."
             + (
-                " Contact: the largest of the loop; crosses: mean at the turning point."
-                if axis.name == "max_penetration"
+                " Contact: the largest of the loop; crosses: mean at the turning point. Loss per "
+                "contact: over that largest contact area."
+                if axis.name in TURNING_POINTS
                 else ""
             )
             + (

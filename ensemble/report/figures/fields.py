@@ -264,8 +264,10 @@ def _penetration_handles(
     data: Aggregate, chosen: list[int], *, with_branches: bool
 ) -> list[Line2D]:
     # Where the largest penetration varies with H or γ, only its share is the same for all.
-    tops = {cell.campaign.cycle.max_penetration for cell in data.cells}
-    unit = "h" if len(tops) == 1 else r"\Delta"
+    tops = {cell.campaign.cycle.turning_point for cell in data.cells}
+    unit = r"\Delta/h" if len(tops) == 1 else r"\Delta/\Delta"
+    if data.campaign.cycle.under_load:
+        unit = r"\bar p/\bar p"
     penetration = data.cells[0].plan.penetration if len(tops) == 1 else data.fields.penetration
     handles = [
         Line2D(
@@ -274,7 +276,7 @@ def _penetration_handles(
             color=look(place).colour,
             linestyle="-" if with_branches else LINES[place],
             marker="" if with_branches else look(place).marker,
-            label=rf"$\Delta/{unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
+            label=rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
         )
         for place, k in enumerate(chosen)
     ]

@@ -155,9 +155,9 @@ def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, 
     here = data.cell(hurst, gamma)
     if here is None:
         return {}
-    cells: dict[float, Cell | None] = {here.campaign.cycle.max_penetration: here}
+    cells: dict[float, Cell | None] = {here.campaign.cycle.turning_point: here}
     for companion in of_penetration(data):
-        cells[companion.campaign.cycle.max_penetration] = companion.like(here)
+        cells[companion.campaign.cycle.turning_point] = companion.like(here)
     there = {top: cell for top, cell in sorted(cells.items()) if cell is not None and cell.done}
     if not there:
         return {}

@@ -1,0 +1,140 @@
+"""Results files of the study's campaigns, reduced to two small tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ensemble.results.read import Results
+from ensemble.results.schema import DONE, FAILED, axis_datasets
+from solver.jumps import BRANCHES, JUMP_KINDS
+
+AXES = ("max_penetration", "max_stress", "ratio", "stiffness")
+NUMBERS = (
+    *("h_max", "h_rms", "m2", "loss", "loss_dimensionless", "loss_error", "audit_residual"),
+    *("loss_small_scale", "loss_large_scale", "work_gained", "work_spent"),
+    *("largest_contact_fraction", "pull_off_stress", "pull_off_penetration"),
+    *("energy_at_stake", "cpu_time"),
+)
+COLUMNS = (
+    *("campaign", "hurst", "work_of_adhesion", "realisation", *AXES, "status", *NUMBERS),
+    *("jump_count", "stress_at_turn", "contact_at_turn", "loss_curve", "loss_curve_above"),
+)
+JUMP_COLUMNS = ("hurst", "realisation", "branch", "kind", "energy_drop", "area")
+# Of the jumps only those of one campaign, γ and turning point are kept.
+JUMPS_OF = ("turns", 0.04, 0.9)
+
+
+def collect_all(folder: Path, study: Path) -> None:
+    """Write loops.csv and jumps.csv from the results files ``NAME.h5`` of the campaigns."""
+    loops: list[list[str]] = []
+    jumps: list[list[str]] = []
+    for campaign in sorted((study / "campaigns").glob("*.toml")):
+        path = folder / f"{campaign.stem}.h5"
+        if not path.exists():
+            print(f"{path} is not there: left out")
+            continue
+        with Results(path) as results:
+            loops += _loops(campaign.stem, results)
+            if campaign.stem == JUMPS_OF[0]:
+                jumps += _jumps(results)
+    _write(study / "loops.csv", COLUMNS, loops)
+    _write(study / "jumps.csv", JUMP_COLUMNS, jumps)
+
+
+def _loops(name: str, results: Results) -> list[list[str]]:
+    status = results.status()
+    column = {n: results.column(n) for n in (*NUMBERS, "jump_count", "hurst", "realisation")}
+    column["work_of_adhesion"] = results.column("work_of_adhesion")
+    for dataset in axis_datasets(results.campaign):
+        column[dataset.name] = results.column(dataset.name)
+    tasks = results.tasks()
+    curves = {
+        key: results.column(key)
+        for branch in BRANCHES
+        for key in (f"{branch}_mean_stress", f"{branch}_contact_fraction")
+    }
+    rows = []
+    for row in np.flatnonzero((status == DONE) | (status == FAILED)).tolist():
+        here = results.campaign.at(tasks[row])
+        asked = {
+            "max_penetration": here.cycle.max_penetration,
+            "max_stress": here.cycle.max_stress,
+            "ratio": here.profile.ratio,
+            "stiffness": here.cycle.stiffness,
+        }
+        values: list[Any] = [name]
+        values += [column[n][row] for n in ("hurst", "work_of_adhesion", "realisation")]
+        values += [asked[n] for n in AXES]
+        if status[row] == FAILED:
+            values += ["failed", *[None] * (len(COLUMNS) - len(values) - 1)]
+        else:
+            values += ["done", *(column[n][row] for n in (*NUMBERS, "jump_count"))]
+            values += _turn(
+                results, tasks[row], {k: v[row] for k, v in curves.items()}, column, row
+            )
+        rows.append([_text(value) for value in values])
+    return rows
+
+
+def _turn(
+    results: Results, task: Any, curve: dict[str, Any], column: dict[str, Any], row: int
+) -> list[Any]:
+    """State at the turning point, and W~ by the stored curves: all of it, and where Δ ≥ 0."""
+    campaign = results.campaign
+    if campaign.at(task).cycle.under_load:
+        return [campaign.at(task).cycle.max_stress, None, None, None]
+    unit = campaign.penetration_unit(task)
+    down = unit * campaign.unloading_penetration
+    load, unload = curve["loading_mean_stress"], curve["unloading_mean_stress"]
+    h_max = column["h_max"][row]
+    here = campaign.at(task)
+    modulus = here.material.young / (1 - here.material.poisson**2)
+    scale = 0.5 * modulus * (2 * np.pi / here.profile.period) * h_max  # σ~ = p̄/scale
+    gained = np.trapezoid(load, unit * campaign.loading_penetration) / scale
+    whole = gained - np.trapezoid(unload[::-1], down[::-1]) / scale
+    # down to Δ = 0, where the axis need not have a place
+    last = int(np.argmax(down <= 0))
+    x = np.append(0.0, down[:last][::-1])
+    y = np.append(np.interp(0.0, down[::-1], unload[::-1]), unload[:last][::-1])
+    above = gained - np.trapezoid(y, x) / scale
+    return [load[-1], curve["loading_contact_fraction"][-1], whole, above]
+
+
+def _jumps(results: Results) -> list[list[str]]:
+    _, gamma, turn = JUMPS_OF
+    chosen = np.flatnonzero(
+        (results.status() == DONE)
+        & (results.column("work_of_adhesion") == gamma)
+        & (results.column("max_penetration") == turn)
+    )
+    names = ("branch", "kind", "energy_drop", "contact_before", "contact_after")
+    column = {n: results.column(f"jump_{n}") for n in names}
+    hurst, realisation = results.column("hurst"), results.column("realisation")
+    rows = []
+    for row in chosen.tolist():
+        for k in np.flatnonzero(column["kind"][row] >= 0).tolist():
+            area = column["contact_after"][row, k] - column["contact_before"][row, k]
+            values = [
+                *(hurst[row], realisation[row], BRANCHES[column["branch"][row, k]]),
+                JUMP_KINDS[column["kind"][row, k]],
+                *(column["energy_drop"][row, k], area),
+            ]
+            rows.append([_text(value) for value in values])
+    return rows
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return value
+    return f"{float(value):.6g}"
+
+
+def _write(path: Path, columns: tuple[str, ...], rows: list[list[str]]) -> None:
+    lines = [",".join(columns), *(",".join(row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print(f"{path}: {len(rows)} rows, {path.stat().st_size / 1e3:.0f} kB")

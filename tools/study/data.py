@@ -1,0 +1,96 @@
+"""The small tables of the study, read back."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TEXTS = ("campaign", "status", "branch", "kind")
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Columns of a table, by name, all of one length."""
+
+    columns: dict[str, NDArray[Any]]
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """One column."""
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.columns.values())))
+
+    def where(self, **values: Any) -> Rows:
+        """Rows with these values; numbers within rounding of the table."""
+        keep = np.ones(len(self), bool)
+        for name, value in values.items():
+            column = self[name]
+            same = column == value if name in TEXTS else np.isclose(column, value, rtol=1e-5)
+            keep &= same
+        return Rows({name: column[keep] for name, column in self.columns.items()})
+
+    def values(self, name: str) -> list[float]:
+        """Different values of a column, ascending."""
+        return sorted(set(self[name].tolist()))
+
+
+def read(path: Path) -> Rows:
+    """Read a table; empty places are NaN."""
+    with path.open(encoding="utf-8") as stream:
+        header, *rows = list(csv.reader(stream))
+    columns = {
+        name: np.array([row[i] for row in rows])
+        if name in TEXTS
+        else np.array([float(row[i]) if row[i] else np.nan for row in rows])
+        for i, name in enumerate(header)
+    }
+    return Rows(columns)
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """The study's tables.
+
+    Attributes
+    ----------
+    loops : Rows
+        Done ones.
+    failed : Rows
+    jumps : Rows
+    """
+
+    loops: Rows
+    failed: Rows
+    jumps: Rows
+
+    @classmethod
+    def at(cls, folder: Path) -> Study:
+        """Read them from the study's folder."""
+        loops = read(folder / "loops.csv")
+        return cls(
+            loops.where(status="done"), loops.where(status="failed"), read(folder / "jumps.csv")
+        )
+
+    def by_realisation(self, name: str, **values: Any) -> dict[int, float]:
+        """One column of the loops with these values, by realisation."""
+        rows = self.loops.where(**values)
+        found = dict(
+            zip(rows["realisation"].astype(int).tolist(), rows[name].tolist(), strict=True)
+        )
+        assert len(found) == len(rows), f"{values} name more than one cell"
+        return found
+
+
+def aligned(*series: dict[int, float]) -> Array:
+    """Values of the realisations that all series have, shape (series, realisations)."""
+    shared = sorted(set.intersection(*(set(one) for one in series)))
+    return np.array([[one[r] for r in shared] for one in series])

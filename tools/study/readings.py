@@ -1,0 +1,304 @@
+"""Readings of the paper's Table 1, each held against its eight values; docs/study/README.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.stats import multivariate_normal
+
+from ensemble.report.paper import M2, TABLE_1
+from tools.study.data import Array, Study
+
+TURNS = (0.6, 0.7, 0.8, 0.9)
+C0 = 1e-13
+DRAWS, SEED, OFF_DIAGONAL, OF_PAPER = 200_000, 2016, 0.8, 10
+COMPATIBLE, EXCLUDED = 0.05, 0.001
+Cell = tuple[float, float]
+Series = dict[int, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One reading, held against the paper.
+
+    Attributes
+    ----------
+    name : str
+    cells : tuple of (H, γ)
+        Of the paper's, those that were computed.
+    losses : array, shape (cells, realisations)
+        W~.
+    """
+
+    name: str
+    cells: tuple[Cell, ...]
+    losses: Array
+
+    @property
+    def realisations(self) -> int:
+        """Number of profiles."""
+        return int(self.losses.shape[1])
+
+    @cached_property
+    def means(self) -> Array:
+        """Mean W~ of each cell."""
+        return np.asarray(self.losses.mean(axis=1))
+
+    @cached_property
+    def deviation(self) -> Array:
+        """ln(paper/mean) of each cell."""
+        paper = np.array([TABLE_1[cell] for cell in self.cells])
+        return np.asarray(np.log(paper / self.means))
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the deviation, were the reading right."""
+        relative = np.cov(self.losses / self.means[:, None])
+        shrunk = OFF_DIAGONAL * relative + (1 - OFF_DIAGONAL) * np.diag(np.diag(relative))
+        return np.asarray(shrunk * (1 / OF_PAPER + 1 / self.realisations))
+
+    @cached_property
+    def z(self) -> Array:
+        """Deviation over its standard deviation."""
+        return np.asarray(self.deviation / np.sqrt(np.diag(self.covariance)))
+
+    @cached_property
+    def p(self) -> float:
+        """Probability of a largest |z| as large, were the reading right."""
+        spread = np.sqrt(np.diag(self.covariance))
+        rng = np.random.default_rng(SEED)
+        factor = np.linalg.cholesky(self.covariance / np.outer(spread, spread))
+        drawn = factor @ rng.standard_normal((len(self.cells), DRAWS))
+        return float(np.mean(np.abs(drawn).max(axis=0) >= np.abs(self.z).max()))
+
+    @cached_property
+    def log_likelihood(self) -> float:
+        """Of the paper's values."""
+        law = multivariate_normal(np.zeros(len(self.cells)), self.covariance)
+        return float(law.logpdf(self.deviation))
+
+    @property
+    def worst(self) -> Cell:
+        """Cell of the largest |z|."""
+        return self.cells[int(np.argmax(np.abs(self.z)))]
+
+    @property
+    def verdict(self) -> str:
+        """compatible, doubtful or excluded."""
+        if self.p >= COMPATIBLE:
+            return "compatible"
+        return "excluded" if self.p < EXCLUDED else "doubtful"
+
+
+class Losses:
+    """W~ of the paper's profiles at any γ and height, from the works of adhesion computed."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+
+    def direct(self, name: str, hurst: float, gamma: float, turn: float, ratio: int) -> Series:
+        """A column at what was computed; empty if nothing was."""
+        campaign = "waves" if ratio == 200 else {0.01: "weak", 0.025: "between"}.get(gamma, "turns")
+        return self._study.by_realisation(
+            name, campaign=campaign, hurst=hurst, work_of_adhesion=gamma, max_penetration=turn
+        )
+
+    def scaled(
+        self, name: str, hurst: float, gamma: float, turn: float, ratio: int, square: float
+    ) -> Series:
+        """The same for profiles √square times as high: straight in ln W~ against ln γ.
+
+        A profile c times as high has at γ the W~ of the profile at γ/c².
+        """
+        known = [0.04, 0.07] if ratio == 200 else [0.01, 0.025, 0.04, 0.07]
+        series = {g: self.direct(name, hurst, g, turn, ratio) for g in known}
+        series = {g: one for g, one in series.items() if one}
+        wanted = gamma / square
+        gammas = sorted(series)
+        high = int(np.clip(np.searchsorted(gammas, wanted), 1, len(gammas) - 1))
+        low, top = gammas[high - 1], gammas[high]
+        share = np.log(wanted / low) / np.log(top / low)
+        shared = set(series[low]) & set(series[top])
+        return {
+            r: float(np.exp((1 - share) * np.log(series[low][r]) + share * np.log(series[top][r])))
+            for r in shared
+            if series[low][r] > 0 and series[top][r] > 0
+        }
+
+    def along(self, hurst: float, gamma: float) -> dict[float, Series]:
+        """W~ by turning point."""
+        return self.column_along("loss_dimensionless", hurst, gamma)
+
+    def column_along(self, name: str, hurst: float, gamma: float) -> dict[float, Series]:
+        """A column by turning point, h_rms = 1 µm and q_max/q_min = 100."""
+        rows = self._study.loops.where(
+            campaign="weak" if gamma == 0.01 else "turns", hurst=hurst, work_of_adhesion=gamma
+        )
+        turns = rows.values("max_penetration")
+        return {turn: self.direct(name, hurst, gamma, turn, 100) for turn in turns}
+
+
+def _reading(name: str, of_cell: Callable[[float, float], Series]) -> Reading | None:
+    """Join the cells of a reading over the realisations that all of them have."""
+    found = {cell: of_cell(*cell) for cell in TABLE_1}
+    found = {cell: series for cell, series in found.items() if len(series) >= 3}
+    if len(found) < 4:
+        return None
+    shared = sorted(set.intersection(*(set(series) for series in found.values())))
+    if len(shared) < 3:
+        return None
+    losses = np.array([[series[r] for r in shared] for series in found.values()])
+    return Reading(name, tuple(found), losses)
+
+
+def _square(study: Study, normalisation: str, hurst: float, ratio: int) -> float:
+    """Squared factor of the heights against h_rms = 1 µm."""
+    if normalisation == "h_rms":
+        return 1.0
+    if normalisation == "m2":
+        campaign = "waves" if ratio == 200 else "turns"
+        return M2[hurst] / float(study.loops.where(campaign=campaign, hurst=hurst)["m2"][0])
+    powers = np.sum((np.arange(10, 10 * ratio + 1) / 10.0) ** -(2 * hurst + 1))
+    return float(2 * C0 * powers / 1e-12)
+
+
+def _height_factor(study: Study, heights: str, hurst: float, ratio: int) -> Series:
+    """What W~ with own h_max is to be multiplied by, for each realisation."""
+    campaign = "waves" if ratio == 200 else "turns"
+    h_max = study.by_realisation(
+        "h_max", campaign=campaign, hurst=hurst, work_of_adhesion=0.04, max_penetration=0.9
+    )
+    values = np.sort(np.array(list(h_max.values())))
+    if heights == "own":
+        return dict.fromkeys(h_max, 1.0)
+    if heights == "mean":
+        common = values.mean()
+    else:  # mean of the largest of ten drawn
+        share = (np.arange(len(values) + 1) / len(values)) ** OF_PAPER
+        common = float(np.sum(values * np.diff(share)))
+    return {r: float((h / common) ** 2) for r, h in h_max.items()}
+
+
+NORMALISATIONS = (("h_rms", 100), ("m2", 100), ("C0", 100), ("h_rms", 200), ("m2", 200))
+
+
+def readings(study: Study) -> Iterator[Reading]:
+    """Every reading of the page, in its order."""
+    losses = Losses(study)
+    for normalisation, ratio in NORMALISATIONS:
+        turns = (
+            (0.5, 0.6, 0.65, 0.7, 0.8, 0.9) if (normalisation, ratio) == ("h_rms", 100) else TURNS
+        )
+        for turn in turns:
+            for part, column in (("", "loss_dimensionless"), (", Δ~ ≥ 0", "loss_curve_above")):
+                for heights in ("own", "mean", "largest"):
+                    name = f"{normalisation}, N = {ratio}, Δ~max = {turn:g}{part}"
+                    name += "" if heights == "own" else f", {heights} h_max"
+
+                    def of_cell(
+                        hurst: float,
+                        gamma: float,
+                        normalisation: str = normalisation,
+                        ratio: int = ratio,
+                        turn: float = turn,
+                        column: str = column,
+                        heights: str = heights,
+                    ) -> Series:
+                        if ratio == 200 and gamma == 0.01:
+                            return {}
+                        factor = _height_factor(study, heights, hurst, ratio)
+                        if normalisation == "h_rms" and not (turn == 0.65 and gamma != 0.01):
+                            found = losses.direct(column, hurst, gamma, turn, ratio)
+                        elif normalisation == "h_rms":
+                            found = _between(losses.column_along(column, hurst, gamma), turn)
+                        else:
+                            square = _square(study, normalisation, hurst, ratio)
+                            found = losses.scaled(column, hurst, gamma, turn, ratio, square)
+                        return {r: w * factor[r] for r, w in found.items() if r in factor}
+
+                    reading = _reading(name, of_cell)
+                    if reading is not None:
+                        yield reading
+    yield from _other_turning_points(study, losses)
+    yield from _others(study)
+
+
+def _between(along: dict[float, Series], turn: float) -> Series:
+    """A series at a turning point between those computed, straight lines between them."""
+    return _at_turns(along, lambda r: turn)
+
+
+def _at_turns(along: dict[float, Series], turn_of: Callable[[int], float]) -> Series:
+    """W~ of each realisation at a turning point of its own; none further than 0.05 outside."""
+    turns = sorted(along)
+    if len(turns) < 2:
+        return {}
+    found: Series = {}
+    for r in set.intersection(*(set(one) for one in along.values())):
+        turn = turn_of(r)
+        if not turns[0] - 0.05 <= turn <= turns[-1] + 0.05:
+            continue
+        k = int(np.clip(np.searchsorted(turns, turn), 1, len(turns) - 1))
+        share = (turn - turns[k - 1]) / (turns[k] - turns[k - 1])
+        low, high = along[turns[k - 1]][r], along[turns[k]][r]
+        found[r] = float((1 - share) * low + share * high)
+    return found
+
+
+def _other_turning_points(study: Study, losses: Losses) -> Iterator[Reading]:
+    for s in (0.2e-6, 0.4e-6, 0.6e-6, 0.8e-6, 1.0e-6):
+
+        def at_separation(hurst: float, gamma: float, s: float = s) -> Series:
+            h_max = study.by_realisation(
+                "h_max", campaign="turns", hurst=hurst, work_of_adhesion=0.04, max_penetration=0.9
+            )
+            return _at_turns(losses.along(hurst, gamma), lambda r: 1 - s / h_max.get(r, np.nan))
+
+        reading = _reading(f"common separation {1e6 * s:.1f} µm", at_separation)
+        if reading is not None:
+            yield reading
+    for turn in TURNS:
+        at = losses.direct("contact_at_turn", 0.8, 0.04, turn, 100)
+        contact = float(np.mean(list(at.values()))) if at else np.nan
+
+        def at_contact(hurst: float, gamma: float, contact: float = contact) -> Series:
+            contacts = losses.column_along("contact_at_turn", hurst, gamma)
+            turns = np.array(sorted(contacts))
+
+            def turn_of(r: int) -> float:
+                values = np.array([contacts[t].get(r, np.nan) for t in turns])
+                inside = values[0] <= contact <= values[-1]
+                return float(np.interp(contact, values, turns)) if inside else np.nan
+
+            return _at_turns(losses.along(hurst, gamma), turn_of)
+
+        reading = _reading(f"common contact fraction {contact:.2f}", at_contact)
+        if reading is not None:
+            yield reading
+
+
+def _others(study: Study) -> Iterator[Reading]:
+    for turn in TURNS:
+
+        def rayleigh(hurst: float, gamma: float, turn: float = turn) -> Series:
+            return study.by_realisation(
+                "loss_dimensionless",
+                **{"campaign": "rayleigh", "hurst": hurst, "work_of_adhesion": gamma},
+                max_penetration=turn,
+            )
+
+        reading = _reading(f"Rayleigh amplitudes, Δ~max = {turn:g}", rayleigh)
+        if reading is not None:
+            yield reading
+
+    def deepest(hurst: float, gamma: float) -> Series:
+        if gamma == 0.01:
+            return {}
+        return Losses(study).direct("loss_dimensionless", hurst, gamma, 0.95, 100)
+
+    reading = _reading("unloading from the deepest state, Δ~ = 0.95", deepest)
+    if reading is not None:
+        yield reading
