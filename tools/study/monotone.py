@@ -1,0 +1,134 @@
+"""Is the loss monotone in the mean square slope? Neighbouring H on the same phases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import stdtr
+
+from ensemble.interval import interval
+from tools.study.data import Array, Study, aligned
+
+LEVEL = 0.05
+# (γ, turning point, quantity)
+ROWS = (
+    *((0.04, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
+    *((0.07, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
+    *((0.025, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
+    *((0.01, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """From one H to the next lower one, so from one m2 to the next higher one.
+
+    Attributes
+    ----------
+    hursts : (float, float)
+        The higher H first: m2 ascends.
+    slopes : (float, float)
+        m2.
+    difference, low, high : float
+        Mean of the paired differences over the mean of both, and its 95 % interval.
+    p_rise, p_fall : float
+        One-sided error probabilities of saying that it rises or falls, Holm's correction in.
+    n : int
+    """
+
+    hursts: tuple[float, float]
+    slopes: tuple[float, float]
+    difference: float
+    low: float
+    high: float
+    p_rise: float
+    p_fall: float
+    n: int
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """Losses over m2 at one γ and turning point."""
+
+    gamma: float
+    turn: float
+    quantity: str
+    steps: tuple[Step, ...]
+
+    @property
+    def verdict(self) -> str:
+        """Rises, falls, is not monotone, or is open; as decided beforehand."""
+        rises = [step.p_rise < LEVEL for step in self.steps]
+        falls = [step.p_fall < LEVEL for step in self.steps]
+        if any(rises) and any(falls):
+            return "not monotone"
+        if all(rises):
+            return "rises"
+        if all(falls):
+            return "falls"
+        return "open"
+
+
+def series(study: Study, gamma: float, turn: float, name: str) -> dict[float, dict[int, float]]:
+    """A column by H, each by realisation."""
+    found: dict[float, dict[int, float]] = {}
+    for campaign in ("turns", "slope", "between", "weak"):
+        rows = study.loops.where(campaign=campaign, work_of_adhesion=gamma, max_penetration=turn)
+        for hurst in rows.values("hurst"):
+            one = rows.where(hurst=hurst)
+            found[hurst] = dict(
+                zip(one["realisation"].astype(int).tolist(), one[name].tolist(), strict=True)
+            )
+    return found
+
+
+def rows(study: Study) -> Iterator[Row]:
+    """Every row that has been computed."""
+    for gamma, turn, name in ROWS:
+        losses = series(study, gamma, turn, name)
+        if len(losses) < 2:
+            continue
+        slopes = series(study, gamma, turn, "m2")
+        hursts = sorted(losses, reverse=True)
+        pairs = [(a, b, aligned(losses[a], losses[b])) for a, b in pairwise(hursts)]
+        raw = [_one_sided(both[1] - both[0]) for _, _, both in pairs]
+        rise = _holm([p for p, _ in raw])
+        fall = _holm([p for _, p in raw])
+        steps = []
+        for (a, b, both), up, down in zip(pairs, rise, fall, strict=True):
+            scale = both.mean()
+            relative = (both[1] - both[0]) / scale
+            low, high = interval(relative)
+            steps.append(
+                Step(
+                    hursts=(a, b),
+                    slopes=(next(iter(slopes[a].values())), next(iter(slopes[b].values()))),
+                    difference=float(relative.mean()),
+                    low=float(low),
+                    high=float(high),
+                    p_rise=up,
+                    p_fall=down,
+                    n=both.shape[1],
+                )
+            )
+        yield Row(gamma, turn, name, tuple(steps))
+
+
+def _one_sided(differences: Array) -> tuple[float, float]:
+    """Error probabilities of a rise and of a fall, by Student's t."""
+    n = differences.size
+    t = differences.mean() / (differences.std(ddof=1) / np.sqrt(n))
+    return float(stdtr(n - 1, -t)), float(stdtr(n - 1, t))
+
+
+def _holm(probabilities: list[float]) -> list[float]:
+    """Holm's correction for several probabilities."""
+    order = np.argsort(probabilities)
+    found, largest = [0.0] * len(probabilities), 0.0
+    for place, k in enumerate(order.tolist()):
+        largest = max(largest, min(1.0, (len(probabilities) - place) * probabilities[k]))
+        found[k] = largest
+    return found
