@@ -15,6 +15,7 @@ from tools.study.data import Array, Study
 TURNS = (0.6, 0.7, 0.8, 0.9)
 C0 = 1e-13
 DRAWS, SEED, OFF_DIAGONAL, OF_PAPER = 200_000, 2016, 0.8, 10
+BEYOND = 1.5  # works of adhesion are extrapolated by no larger factor
 COMPATIBLE, EXCLUDED = 0.05, 0.001
 Cell = tuple[float, float]
 Series = dict[int, float]
@@ -118,6 +119,8 @@ class Losses:
         series = {g: one for g, one in series.items() if one}
         wanted = gamma / square
         gammas = sorted(series)
+        if len(gammas) < 2 or not gammas[0] / BEYOND <= wanted <= gammas[-1] * BEYOND:
+            return {}
         high = int(np.clip(np.searchsorted(gammas, wanted), 1, len(gammas) - 1))
         low, top = gammas[high - 1], gammas[high]
         share = np.log(wanted / low) / np.log(top / low)
@@ -189,6 +192,8 @@ def readings(study: Study) -> Iterator[Reading]:
     """Every reading of the page, in its order."""
     losses = Losses(study)
     for normalisation, ratio in NORMALISATIONS:
+        if ratio == 200 and not len(study.loops.where(campaign="waves")):
+            continue
         turns = (
             (0.5, 0.6, 0.65, 0.7, 0.8, 0.9) if (normalisation, ratio) == ("h_rms", 100) else TURNS
         )

@@ -1,0 +1,372 @@
+"""The numbers of the page, as tables: header and rows of texts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ensemble.interval import interval
+from ensemble.report.paper import TABLE_1
+from tools.study import jumps, monotone
+from tools.study.data import Array, Study, aligned
+from tools.study.readings import Reading, readings
+
+Table = tuple[list[str], list[list[str]]]
+
+
+def _mean(values: Array, unit: float = 1.0) -> str:
+    """Mean and half of its 95 % interval."""
+    values = np.asarray(values) / unit
+    low, high = (float(end) for end in interval(values))
+    return f"{values.mean():.3g} ± {(high - low) / 2:.2g}"
+
+
+def _ratio(above: Array, below: Array) -> str:
+    """Ratio of two means of paired values, with Fieller's spirit: relative differences."""
+    scale = below.mean()
+    low, high = (float(end) for end in interval((above - below) / scale))
+    return f"{100 * (above.mean() / scale - 1):+.0f} % ({100 * low:+.0f} … {100 * high:+.0f})"
+
+
+def campaigns(study: Study) -> Table:
+    """What was computed."""
+    rows = []
+    for name in sorted(set(study.loops["campaign"].tolist())):
+        done = study.loops.where(campaign=name)
+        failed = study.failed.where(campaign=name)
+        audit = np.abs(done["audit_residual"]).max()
+        error = (done["loss_error"] / done["loss"]).max()
+        rows.append(
+            [
+                name,
+                f"{len(done)}",
+                f"{len(failed)}",
+                f"{int(done['realisation'].max()) + 1}",
+                f"{done['cpu_time'].sum() / 60:.1f}",
+                f"{audit:.1e}",
+                f"{error:.1e}",
+                f"{(done['energy_at_stake'] / done['loss']).max():.1e}",
+            ]
+        )
+    header = [
+        *("campaign", "loops", "failed", "realisations", "CPU min"),
+        *("largest audit residual", "largest estimated error", "largest share at stake in races"),
+    ]
+    return header, rows
+
+
+def _reading_row(reading: Reading) -> list[str]:
+    means = dict(zip(reading.cells, reading.means, strict=True))
+    told = [f"{means[cell]:.3g}" if cell in means else "" for cell in TABLE_1]
+    p = "< 1e-5" if reading.p < 1e-5 else f"{reading.p:.2g}"
+    hurst, gamma = reading.worst
+    return [
+        *(reading.name, f"{reading.realisations}", *told),
+        *(f"{np.abs(reading.z).max():.1f} at {hurst:g}, {gamma:g}", p),
+        *(f"{reading.log_likelihood:.0f}", reading.verdict),
+    ]
+
+
+READING_HEADER = [
+    *("reading", "n", *(f"{h:g}, {g:g}" for h, g in TABLE_1)),
+    *("largest \\|z\\|", "p", "ln L", "verdict"),
+]
+
+
+def all_readings(study: Study) -> Table:
+    """Every reading."""
+    rows = [_reading_row(reading) for reading in readings(study)]
+    paper = ["paper", "10", *(f"{value:g}" for value in TABLE_1.values()), "", "", "", ""]
+    return READING_HEADER, [paper, *rows]
+
+
+def main_readings(study: Study) -> Table:
+    """Those of the whole loop with own h_max."""
+    header, rows = all_readings(study)
+    return header, [row for row in rows if "≥" not in row[0] and " h_max" not in row[0]]
+
+
+def without(study: Study) -> Table:
+    """Compatible readings when single values of the paper are left out (seen afterwards)."""
+    every = list(readings(study))
+    complete = max(len(reading.cells) for reading in every)
+    every = [reading for reading in every if len(reading.cells) == complete]
+    rows = []
+    left_out: list[tuple[tuple[float, float], ...]] = [(), *((cell,) for cell in TABLE_1)]
+    left_out.append(((0.8, 0.07), (0.7, 0.07)))
+    for cells in left_out:
+        kept = [c for c in every[0].cells if c not in cells]
+        if len(kept) == len(every[0].cells) and cells:
+            continue
+        places = [every[0].cells.index(c) for c in kept]
+        cut = [Reading(r.name, tuple(kept), r.losses[places]) for r in every]
+        best = max(cut, key=lambda r: r.p)
+        count = sum(r.verdict == "compatible" for r in cut)
+        rows.append(
+            [
+                " and ".join(f"{TABLE_1[c]:g} (H = {c[0]:g}, γ = {c[1]:g})" for c in cells)
+                or "none",
+                f"{count} of {len(cut)}",
+                best.name,
+                "< 1e-5" if best.p < 1e-5 else f"{best.p:.2g}",
+                f"{np.abs(best.z).max():.1f}",
+            ]
+        )
+    return ["left out", "compatible", "best", "its p", "its largest \\|z\\|"], rows
+
+
+def monotony(study: Study) -> Table:
+    """Paired differences between neighbouring H."""
+    rows = []
+    for row in monotone.rows(study):
+        steps = [
+            f"{step.hursts[0]:g} → {step.hursts[1]:g}: {100 * step.difference:+.0f} % "
+            f"({100 * step.low:+.0f} … {100 * step.high:+.0f})"
+            + (f", p = {min(step.p_rise, step.p_fall):.2g}" if True else "")
+            for step in row.steps
+        ]
+        name = "W~" if row.quantity == "loss_dimensionless" else "J/m²"
+        n = min(step.n for step in row.steps)
+        rows.append(
+            [f"{row.gamma:g}", f"{row.turn:g}", name, f"{n}", "; ".join(steps), row.verdict]
+        )
+    return [
+        "γ (J/m²)",
+        "Δ~max",
+        "loss",
+        "n",
+        "change from one H to the next lower",
+        "verdict",
+    ], rows
+
+
+def mechanisms(study: Study) -> Table:
+    """Loss and its small-scale share against H."""
+    rows = []
+    for gamma in (0.01, 0.025, 0.04, 0.07):
+        losses = monotone.series(study, gamma, 0.8, "loss_dimensionless")
+        small = monotone.series(study, gamma, 0.8, "loss_small_scale")
+        whole = monotone.series(study, gamma, 0.8, "loss")
+        slopes = monotone.series(study, gamma, 0.8, "m2")
+        for hurst in sorted(losses, reverse=True):
+            share = aligned(small[hurst], whole[hurst])
+            rows.append(
+                [
+                    f"{gamma:g}",
+                    f"{hurst:g}",
+                    f"{next(iter(slopes[hurst].values())):.3g}",
+                    f"{len(losses[hurst])}",
+                    _mean(np.array(list(losses[hurst].values()))),
+                    _mean(np.array(list(whole[hurst].values())), 1e-3),
+                    _mean(share[0] / share[1], 0.01),
+                ]
+            )
+    return ["γ (J/m²)", "H", "m2", "n", "W~", "loss (mJ/m²)", "small scale (%)"], rows
+
+
+def _cells(study: Study) -> list[tuple[str, float, float]]:
+    return [
+        *(("turns", h, g) for g in (0.04, 0.07) for h in (0.7, 0.8, 0.9)),
+        *(("weak", h, 0.01) for h in (0.8, 0.9)),
+    ]
+
+
+def turning_point(study: Study) -> Table:
+    """What changes between Δ~max = 0.6 and 0.9."""
+    quantities: tuple[tuple[str, Callable[[str, float, float, float], dict[int, float]]], ...]
+
+    def column(name: str) -> Callable[[str, float, float, float], dict[int, float]]:
+        def of(campaign: str, hurst: float, gamma: float, turn: float) -> dict[int, float]:
+            return study.by_realisation(
+                name,
+                **{"campaign": campaign, "hurst": hurst, "work_of_adhesion": gamma},
+                max_penetration=turn,
+            )
+
+        return of
+
+    def per_contact(campaign: str, hurst: float, gamma: float, turn: float) -> dict[int, float]:
+        loss = column("loss")(campaign, hurst, gamma, turn)
+        area = column("largest_contact_fraction")(campaign, hurst, gamma, turn)
+        return {r: loss[r] / area[r] for r in loss}
+
+    quantities = (
+        ("loss", column("loss")),
+        ("pull-off stress", column("pull_off_stress")),
+        ("largest contact", column("largest_contact_fraction")),
+        ("loss per contact", per_contact),
+    )
+    rows = []
+    for campaign, hurst, gamma in _cells(study):
+        told = []
+        for _, of in quantities:
+            below, above = of(campaign, hurst, gamma, 0.6), of(campaign, hurst, gamma, 0.9)
+            if not below or not above:
+                break
+            low, high = aligned(below, above)
+            told.append(_ratio(high, low))
+        else:
+            rows.append([f"{gamma:g}", f"{hurst:g}", f"{low.size}", *told])
+    return ["γ (J/m²)", "H", "n", *(name for name, _ in quantities)], rows
+
+
+def power_laws(study: Study) -> Table:
+    """Fits to the jumps."""
+    rows = []
+    for branch in ("loading", "unloading"):
+        for name, title, unit in (
+            ("energy_drop", "energy (J/m²)", ""),
+            ("area", "area (A/A0)", ""),
+        ):
+            law = jumps.power_law(study.jumps.where(branch=branch), name)
+            rows.append(
+                [
+                    branch,
+                    title,
+                    f"{law.exponent:.2f} ({law.low:.2f} … {law.high:.2f})",
+                    f"{law.smallest:.2g} … {law.largest:.2g}{unit}",
+                    f"{law.decades:.1f}",
+                    f"{law.n} of {law.of}",
+                    f"{law.p:.2g}",
+                    f"{law.against_lognormal:.1f}",
+                ]
+            )
+    header = ["branch", "size", "exponent", "range", "decades", "jumps", "p", "against lognormal"]
+    return header, rows
+
+
+def kinds(study: Study) -> Table:
+    """Jumps by branch and kind."""
+    rows = []
+    loops = len({*zip(study.jumps["hurst"], study.jumps["realisation"], strict=True)})
+    for branch in ("loading", "unloading"):
+        here = study.jumps.where(branch=branch)
+        for kind in sorted(set(here["kind"].tolist())):
+            some = here.where(kind=kind)
+            energy, area = some["energy_drop"], np.abs(some["area"])
+            rows.append(
+                [
+                    branch,
+                    kind,
+                    f"{len(some) / loops:.1f}",
+                    f"{100 * energy.sum() / study.jumps['energy_drop'].sum():.1f}",
+                    f"{np.median(energy):.1e}",
+                    f"{energy.max():.1e}",
+                    f"{np.median(area):.1e}",
+                    f"{area.max():.1e}",
+                ]
+            )
+    header = ["branch", "kind", "a loop", "share of the energy (%)"]
+    header += ["median energy (J/m²)", "largest", "median area (A/A0)", "largest"]
+    return header, rows
+
+
+def cutoff(study: Study) -> Table:
+    """Loss against the short-wave cut-off."""
+    rows = []
+    for hurst in (0.4, 0.8):
+        before: dict[int, float] = {}
+        for ratio in (10, 30, 100, 300):
+            name = "cutoff300" if ratio == 300 else "cutoff"
+            place = {"campaign": name, "hurst": hurst, "ratio": ratio}
+            loss = study.by_realisation("loss_dimensionless", **place)
+            if not loss:
+                continue
+            share = aligned(study.by_realisation("loss_small_scale", **place),
+                            study.by_realisation("loss", **place))  # fmt: skip
+            change = ""
+            if before and len(shared := aligned(before, loss)[0]) > 1:
+                change = _ratio(*aligned(before, loss)[::-1])
+                assert shared.size
+            slope = next(iter(study.by_realisation("m2", **place).values()))
+            pull = np.array(list(study.by_realisation("pull_off_stress", **place).values()))
+            rows.append(
+                [
+                    *(f"{hurst:g}", f"{ratio}", f"{slope:.2g}", f"{len(loss)}"),
+                    _mean(np.array(list(loss.values()))),
+                    change,
+                    _mean(pull, 1e3),
+                    f"{100 * (share[0] / share[1]).mean():.1f}",
+                ]
+            )
+            before = loss
+    header = ["H", "q_max/q_min", "m2", "n", "W~", "change from the row above"]
+    return [*header, "pull-off (kPa)", "small scale (%)"], rows
+
+
+def machine(study: Study) -> Table:
+    """Loss against the stiffness of the machine."""
+    rows = []
+    for turn in (0.6, 0.8):
+        place = {"hurst": 0.8, "work_of_adhesion": 0.04, "max_penetration": turn}
+        fixed = study.by_realisation("loss_dimensionless", campaign="turns", **place)
+        for stiffness in (np.inf, 1e10, 3e9, 1e9):
+            if np.isinf(stiffness):
+                loss = fixed
+                failed = 0
+            else:
+                of = {"campaign": "machine", "stiffness": stiffness, **place}
+                loss = study.by_realisation("loss_dimensionless", **of)
+                failed = len(study.failed.where(**of))
+            if not loss:
+                rows.append([f"{turn:g}", f"{stiffness:.0e}", "0", f"{failed}", "", ""])
+                continue
+            both = aligned(fixed, loss)
+            change = "" if np.isinf(stiffness) else _ratio(both[1], both[0])
+            rows.append(
+                [
+                    f"{turn:g}",
+                    "fixed" if np.isinf(stiffness) else f"{stiffness:.0e}",
+                    *(f"{len(loss)}", f"{failed}", _mean(np.array(list(loss.values()))), change),
+                ]
+            )
+    return ["u_tot/h_max", "k (Pa/m)", "n", "ran away", "W~", "against fixed separation"], rows
+
+
+def errors(study: Study) -> Table:
+    """Numerical errors of means against their statistical intervals."""
+    rows = []
+    for turn in (0.6, 0.8):
+        place = {"hurst": 0.8, "work_of_adhesion": 0.04, "max_penetration": turn}
+        coarse = study.by_realisation("loss", campaign="turns", **place)
+        fine = study.by_realisation("loss", campaign="steps", **place)
+        if fine:
+            both = aligned(coarse, fine)
+            told = f"{abs(both[1].mean() / both[0].mean() - 1):.1e}"
+            each = f"{np.abs(both[1] / both[0] - 1).max():.1e}"
+            rows.append([f"load steps and accuracy, Δ~max = {turn:g}", told, each])
+    worst = 0.0
+    for name in set(study.loops["campaign"].tolist()):
+        here = study.loops.where(campaign=name)
+        keys = {
+            *zip(*(here[k].tolist() for k in ("hurst", "work_of_adhesion", "max_penetration")),
+                 strict=True)
+        }  # fmt: skip
+        for hurst, gamma, turn in keys:
+            if np.isnan(turn):
+                continue
+            cell = here.where(hurst=hurst, work_of_adhesion=gamma, max_penetration=turn)
+            for ratio in cell.values("ratio"):
+                one = cell.where(ratio=ratio)
+                if len(one) >= 5 and np.isnan(one["stiffness"]).all():
+                    low, high = interval(one["loss"])
+                    worst = max(worst, float(one["loss_error"].mean() / ((high - low) / 2)))
+    rows.append(["mean estimated error over half the interval, largest of all cells",
+                 f"{worst:.1e}", ""])  # fmt: skip
+    return ["", "of the mean", "of the worst loop"], rows
+
+
+TABLES: dict[str, Callable[[Study], Table]] = {
+    "campaigns": campaigns,
+    "readings": main_readings,
+    "without": without,
+    "monotony": monotony,
+    "mechanisms": mechanisms,
+    "turning_point": turning_point,
+    "power_laws": power_laws,
+    "kinds": kinds,
+    "cutoff": cutoff,
+    "machine": machine,
+    "errors": errors,
+}
