@@ -16,7 +16,7 @@ from tools.study.data import Array, Rows
 
 FEWEST = 50  # jumps above x_min
 CANDIDATES = 60
-RESAMPLES, SEED = 200, 7
+RESAMPLES, SEED = 100, 7
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,89 @@ def power_law(rows: Rows, name: str) -> PowerLaw:
         distance=distance,
         p=worse / RESAMPLES,
         against_lognormal=_against_lognormal(tail, exponent),
+    )
+
+
+@dataclass(frozen=True)
+class CutPowerLaw:
+    """p(x) ∝ x^-exponent exp(-x/cut) above ``smallest``, by maximum likelihood.
+
+    Attributes
+    ----------
+    exponent, low, high : float
+        With the 95 % interval by resampling of realisations.
+    cut : float
+    smallest : float
+    n, of : int
+        Jumps above ``smallest``, and all.
+    distance : float
+        Of Kolmogorov and Smirnov.
+    """
+
+    exponent: float
+    low: float
+    high: float
+    cut: float
+    smallest: float
+    n: int
+    of: int
+    distance: float
+
+
+_NODES = 400
+
+
+def _grid(smallest: float, cut: float) -> tuple[Array, Array]:
+    """Places from ``smallest`` to far beyond the cut, and weights of ∫ dx over them."""
+    logs = np.linspace(np.log(smallest), np.log(60 * cut + smallest), _NODES)
+    x = np.exp(logs)
+    weights = np.full(_NODES, logs[1] - logs[0])
+    weights[[0, -1]] *= 0.5
+    return x, weights * x
+
+
+def fit_cut(tail: Array, smallest: float) -> tuple[float, float]:
+    """Return exponent and cut of the values above ``smallest``."""
+    sum_logs, total = float(np.sum(np.log(tail))), float(np.sum(tail))
+
+    def negative(parameters: Array) -> float:
+        exponent, cut = float(parameters[0]), float(np.exp(parameters[1]))
+        x, weights = _grid(smallest, cut)
+        whole = np.log(np.sum(weights * x**-exponent * np.exp(-x / cut)))
+        return float(exponent * sum_logs + total / cut + tail.size * whole)
+
+    best = minimize(negative, np.array([1.2, np.log(tail.max() / 3)]), method="Nelder-Mead")
+    return float(best.x[0]), float(np.exp(best.x[1]))
+
+
+def cut_power_law(rows: Rows, name: str, decades: float) -> CutPowerLaw:
+    """Fit a column of jumps over so many decades below the largest one."""
+    values = np.sort(np.abs(rows[name]))
+    smallest = float(values[-1] / 10**decades)
+    tail = values[values >= smallest]
+    exponent, cut = fit_cut(tail, smallest)
+    groups = [
+        np.abs(rows.where(hurst=h, realisation=r)[name])
+        for h in rows.values("hurst")
+        for r in rows.where(hurst=h).values("realisation")
+    ]
+    groups = [group[group >= smallest] for group in groups]
+    rng = np.random.default_rng(SEED)
+    drawn = [
+        fit_cut(
+            np.concatenate([groups[k] for k in rng.integers(len(groups), size=len(groups))]),
+            smallest,
+        )[0]
+        for _ in range(RESAMPLES)
+    ]
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    x, weights = _grid(smallest, cut)
+    density = weights * x**-exponent * np.exp(-x / cut)
+    law = np.interp(tail, x, (np.cumsum(density) - 0.5 * density) / density.sum())
+    n = tail.size
+    distance = max((np.arange(1, n + 1) / n - law).max(), (law - np.arange(n) / n).max())
+    return CutPowerLaw(
+        exponent, float(low), float(high), cut, smallest, n, values.size, float(distance)
     )
 
 

@@ -15,6 +15,7 @@ from tools.study.data import Array, Study
 TURNS = (0.6, 0.7, 0.8, 0.9)
 C0 = 1e-13
 DRAWS, SEED, OFF_DIAGONAL, OF_PAPER = 200_000, 2016, 0.8, 10
+FAR = 6.0
 BEYOND = 1.5  # works of adhesion are extrapolated by no larger factor
 COMPATIBLE, EXCLUDED = 0.05, 0.001
 Cell = tuple[float, float]
@@ -69,6 +70,8 @@ class Reading:
     @cached_property
     def p(self) -> float:
         """Probability of a largest |z| as large, were the reading right."""
+        if np.abs(self.z).max() > FAR:
+            return 0.0  # below one over the number of draws in any case
         spread = np.sqrt(np.diag(self.covariance))
         rng = np.random.default_rng(SEED)
         factor = np.linalg.cholesky(self.covariance / np.outer(spread, spread))

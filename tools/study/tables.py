@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -74,9 +75,15 @@ READING_HEADER = [
 ]
 
 
+@cache
+def every_reading(study: Study) -> tuple[Reading, ...]:
+    """All readings, worked out once."""
+    return tuple(readings(study))
+
+
 def all_readings(study: Study) -> Table:
     """Every reading."""
-    rows = [_reading_row(reading) for reading in readings(study)]
+    rows = [_reading_row(reading) for reading in every_reading(study)]
     paper = ["paper", "10", *(f"{value:g}" for value in TABLE_1.values()), "", "", "", ""]
     return READING_HEADER, [paper, *rows]
 
@@ -89,7 +96,7 @@ def main_readings(study: Study) -> Table:
 
 def without(study: Study) -> Table:
     """Compatible readings when single values of the paper are left out (seen afterwards)."""
-    every = list(readings(study))
+    every = list(every_reading(study))
     complete = max(len(reading.cells) for reading in every)
     every = [reading for reading in every if len(reading.cells) == complete]
     rows = []
@@ -123,7 +130,7 @@ def monotony(study: Study) -> Table:
         steps = [
             f"{step.hursts[0]:g} → {step.hursts[1]:g}: {100 * step.difference:+.0f} % "
             f"({100 * step.low:+.0f} … {100 * step.high:+.0f})"
-            + (f", p = {min(step.p_rise, step.p_fall):.2g}" if True else "")
+            f", p = {min(step.p_rise, step.p_fall):.2g}"
             for step in row.steps
         ]
         name = "W~" if row.quantity == "loss_dimensionless" else "J/m²"
@@ -233,6 +240,23 @@ def power_laws(study: Study) -> Table:
                 ]
             )
     header = ["branch", "size", "exponent", "range", "decades", "jumps", "p", "against lognormal"]
+    return header, rows
+
+
+def cut_power_laws(study: Study) -> Table:
+    """Fits with an exponential cut-off (seen afterwards)."""
+    rows = []
+    for branch in ("loading", "unloading"):
+        for name, title, decades in (("energy_drop", "energy (J/m²)", 4.0), ("area", "area", 2.5)):
+            law = jumps.cut_power_law(study.jumps.where(branch=branch), name, decades)
+            rows.append(
+                [
+                    *(branch, title, f"{law.exponent:.2f} ({law.low:.2f} … {law.high:.2f})"),
+                    *(f"{law.cut:.2g}", f"{law.smallest:.2g}", f"{law.n} of {law.of}"),
+                    f"{law.distance:.3f}",
+                ]
+            )
+    header = ["branch", "size", "exponent", "cut-off", "fitted above", "jumps", "distance"]
     return header, rows
 
 
@@ -365,6 +389,7 @@ TABLES: dict[str, Callable[[Study], Table]] = {
     "mechanisms": mechanisms,
     "turning_point": turning_point,
     "power_laws": power_laws,
+    "cut_power_laws": cut_power_laws,
     "kinds": kinds,
     "cutoff": cutoff,
     "machine": machine,
