@@ -258,10 +258,10 @@ SOLVER='numba|llvmlite|scipy|pyFFTW|threadpoolctl'
 TOOLS='setuptools|Cython|numpy|pkgconfig|packaging'
 
 build_h5py() {
-    # Two compile jobs and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
+    # A compile job for each core and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
     # Without isolation, or the build would first compile an old mpi4py from source.
     local config=$root/.setup/build.cfg
-    printf '[build_ext]\nparallel = 2\n' >"$config"
+    printf '[build_ext]\nparallel = %s\n' "$(nproc 2>/dev/null || echo 2)" >"$config"
     install $(locked mpi4py) &&
         DIST_EXTRA_CONFIG=$config CC=$compiler HDF5_MPI=ON HDF5_DIR=$hdf5 CFLAGS='-O1 -g0 -w' \
             pip wheel --no-cache-dir --no-build-isolation --no-deps \

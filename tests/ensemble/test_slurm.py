@@ -162,7 +162,7 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
             daemon.terminate()
         for daemon in reversed(daemons):
             try:
-                daemon.wait(timeout=20)
+                daemon.wait(timeout=5)  # nothing that it could still save is needed
             except subprocess.TimeoutExpired:
                 daemon.kill()
                 daemon.wait()

@@ -10,7 +10,10 @@ from __future__ import annotations
 from typing import Any
 
 RANKS = ("test_mpi.py", "test_two_nodes.py", "test_slurm.py", "test_doctor.py", "test_warm.py")
-LONG = ("ranks", "test_every_claim", "test_sharp_path.py", "test_sharp.py", "test_docs.py")
+LONG = (
+    *("ranks", "test_every_claim", "test_report.py", "test_run.py", "test_sharp_path.py"),
+    *("test_trace_answer.py", "test_docs.py", "test_sharp.py"),
+)
 
 
 def group_of(nodeid: str) -> str:
