@@ -17,6 +17,8 @@ from solver.problem import Problem
 # The relative error of a loss, times the nodes in the first equilibrium width on a crest of rms
 # curvature: above it lay one in a hundred of rough loops (docs/methods.md).
 _COARSE = 0.6
+_OVERLAP = 1e-6  # of h_max: surfaces that overlap by less touch
+_NEAREST = 1e-8  # of the range: a touch is located no more finely
 _APART = 0.1  # shortest waves between edges of different minima
 _FEWEST_APART = 2  # nodes
 
@@ -66,6 +68,7 @@ class Steps:
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
         self.error = 0.0
+        self.share = 0.5  # of a step that must be shortened
         self.reached = np.nan  # what was prescribed in the last state
         self.energy = self.lattice.energy
         self.period = problem.profile.period
@@ -126,7 +129,7 @@ class Steps:
             after, located = self._substep(contact, target, abs(step) > self.least)
             if after is None:
                 self.count.bisections += 1
-                step /= 2
+                step *= self.share
                 continue
             self.count.substeps += 1
             if not located:
@@ -148,6 +151,7 @@ class Steps:
         No contact: the step must be halved. A jump's two states are appended here.
         """
         accuracy, relaxation = self.accuracy, self.relaxation
+        self.share = 0.5
         stride = abs(target - contact.prescribed)
         frozen = contact.at(target, self.lattice.control)
         if self.adhesion_scale == 0:
@@ -179,6 +183,12 @@ class Steps:
                 wanted = allowed / (self.period * abs(change)) if allowed else least
                 self.least = min(0.5 * stride, wanted)
                 return None, False
+            touched = self._touched(contact, frozen)
+            if touched < 1 and stride > _NEAREST * self.scale:
+                # No state is handed out in which surfaces overlap.
+                self.share = touched
+                self.least = 2 * touched * stride
+                return None, False
             before = state_of(self.lattice, frozen)
             self.states.append(before)
             self._jump(before, frozen, relaxed)
@@ -194,6 +204,19 @@ class Steps:
             return None, False
         return relaxed, False
 
+    def _touched(self, contact: Contact, frozen: Contact) -> float:
+        """At what share of the step to ``frozen`` nodes overlap as far as is allowed; at most 1.
+
+        Gaps are linear in what is prescribed while the edges are held.
+        """
+        most = _OVERLAP * self.profile.h_max
+        start, end = self.lattice.gap(contact), self.lattice.gap(frozen)
+        over = np.flatnonzero(~frozen.mask & (end < -most))
+        if over.size == 0:
+            return 1.0
+        share = (start[over] + 0.5 * most) / (start[over] - end[over])
+        return float(np.clip(share.min(), 0.01, 0.95))
+
     def _rival(self, start: Contact, after: Contact) -> Contact | None:
         """The minimum that equal speeds lead to instead; None if it is the same one.
 
@@ -204,12 +227,17 @@ class Steps:
             touched = any(self._apart_from(start.mask, *run) for run in zip(*ran, strict=True))
             if np.count_nonzero(ran[1] > self.apart) < 2 and not touched:
                 return None
-        other = self.relaxation.relax(start, equal_speeds=True)
-        assert other is not None
-        apart = patch_ranges(other.mask ^ after.mask)[1].max(initial=0)
-        return other if apart > self.apart else None
+        other = self.relaxation.relax(
+            start, lambda _, running: self._near(running, after), equal_speeds=True
+        )
+        return None if other is None or self._near(other, after) else other
 
-    def _apart_from(self, mask: Mask, first: int, width: int) -> bool:
+    def _near(self, one: Contact, other: Contact) -> bool:
+        """Whether no edge is far from where it is in the other contact set."""
+        return bool(patch_ranges(one.mask ^ other.mask)[1].max(initial=0) <= self.apart)
+
+    @staticmethod
+    def _apart_from(mask: Mask, first: int, width: int) -> bool:
         """Whether a run of nodes that joined lies apart from the patches of ``mask``."""
         n = mask.size
         return not (mask[first] or mask[first - 1] or mask[(first + width) % n])

@@ -197,6 +197,21 @@ def test_gap_is_open_outside_and_nothing_overlaps():
         method.fields(state, 300)
 
 
+def test_no_state_overlaps_not_even_before_a_touch_is_followed():
+    """A step to a touch is shortened until nodes overlap by 1e-6 h_max at most; once 7e-4."""
+    profile = self_affine_profile(
+        0.7, period=2e-3, n0=3, ratio=5, seed=12, h_rms=1e-6, amplitudes="rayleigh"
+    )
+    method = GridMethod(Problem(profile, HALF_SPACE, 5e-3), nodes=512)
+    states = []
+    loop = run_loop(
+        method, max_penetration=0.9, load_steps=5, on_state=lambda _, state: states.append(state)
+    )
+    assert sum(jump.kind == "snap-in" for jump in loop.jumps) >= 3
+    least = min(method.fields(state, 512).gap.min() for state in states)
+    assert least > -1.1e-6 * profile.h_max
+
+
 # ------------------------------------------------------------------ hard cases
 
 

@@ -174,6 +174,15 @@ def test_grid_runs_the_same_race():
     result = run_loop(GridMethod(race(), nodes_per_wave=64), max_penetration=0.8, load_steps=20)
     assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=2e-3)
     assert result.loss_dimensionless == pytest.approx(5.178224, rel=5e-3)
+    assert result.jumps[0].raced
+    assert 0.01 * result.loss < result.jumps[0].at_stake < result.loss
+
+
+def test_grid_sees_no_race_where_the_rules_agree():
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=5, ratio=3, seed=3, h_rms=1e-6)
+    result = run_loop(GridMethod(Problem(profile, SOLID, 0.02)), max_penetration=0.9, load_steps=9)
+    assert len(result.jumps) > 5
+    assert (result.races, result.energy_at_stake) == (0, 0)
 
 
 # ------------------------------------------------------------------ symmetry
