@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.jumps import Branch
 from solver.method import ContactState
+from solver.sharp.course import Course
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.jump import Jumps
 from solver.sharp.local import advance
@@ -128,13 +129,16 @@ class Follower:
         """
         wanted = np.inf
         finest = self.resolution.jump
+        lost = np.inf  # distance of the nearest d at which no equilibrium was found
+        course = Course(None, point)
         walk = _Walk(point)
         shown = point
         while point.at != target.at:
-            step = self._next_step(point, target.at, wanted, finest)
-            reached = self._advance(point, step, target.at)
+            step = self._next_step(course, target.at, wanted, finest, lost)
+            reached = self._advance(course, step, target.at)
             if reached is None:
                 if abs(step) > finest:
+                    lost = abs(step)
                     wanted = max(0.25 * abs(step), 0.999 * finest)
                     continue
                 touched = self._look(trace, walk, target.branch)
@@ -175,7 +179,10 @@ class Follower:
                 last = trace.states[-1]
                 after = self.jumps.run(trace, last, small, reached.at, target.branch)
                 return reached.at, after
+            course = Course(point, reached)
             point, wanted = reached, 2 * abs(step)
+            # only before a fold is a failure more than that of a prediction
+            lost = lost - abs(step) if np.isfinite(course.ahead) else np.inf
         trace.states += walk.pending
         # What has not closed since the last look need not be looked at again.
         point = point.cleared(max(walk.clearance - walk.closed, 0.0))
@@ -201,7 +208,7 @@ class Follower:
         if branch == "loading":
             return abs(reached.at - point.at) * self._closing(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
-        moved = float(np.abs(point.rate * (reached.at - point.at)).sum())
+        moved = float(np.abs(reached.gaps - point.gaps).sum())
         return float(self.edges.critical / np.sqrt(self.edges.wave) * moved)
 
     def _closing(self, point: Point) -> float:
@@ -271,19 +278,31 @@ class Follower:
         """Work in J/m² that a jump found ``late`` (in d) adds to the loss, at most."""
         return self.states.work(before, after, late)
 
-    def _next_step(self, point: Point, target: float, wanted: float, finest: float) -> float:
-        """Next step in q0 s: no edge moves too far by prediction, the target is not passed."""
-        fastest = float(np.abs(point.rate).max())
-        size = min(wanted, _PREDICTED * self.edges.wave / max(fastest, 1e-300))
+    def _next_step(
+        self, course: Course, target: float, wanted: float, finest: float, lost: float
+    ) -> float:
+        """Next step in q0 s: no edge moves too far by prediction, the target is not passed.
+
+        Nor is a place where no equilibrium was found, ``lost`` ahead.
+        """
+        size = min(wanted, course.reach(_PREDICTED * self.edges.wave, finest))
+        if 0 < lost <= size:
+            size = 0.5 * lost
         size = max(size, 0.999 * finest)
-        left = target - point.at
+        left = target - course.point.at
         return left if size >= abs(left) else float(np.copysign(size, left))
 
-    def _advance(self, point: Point, step: float, target: float) -> Point | None:
+    def _advance(self, course: Course, step: float, target: float) -> Point | None:
         """Predict and correct; None if no stable equilibrium is within reach."""
-        if np.abs(point.rate * step).max() > 2 * _PREDICTED * self.edges.wave:
+        point = course.point
+        if np.isinf(course.ahead) and (
+            course.fastest * abs(step) > 2 * _PREDICTED * self.edges.wave
+        ):
             return None
         at = target if step == target - point.at else point.at + step
+        if len(point.gaps) < self.edges.many:
+            reach = CORRECTED * self.edges.wave
+            return self.edges.equilibrium(course.gaps(at), at, reach)
         return advance(self.edges, point, at, sure=abs(step) <= self.resolution.jump)
 
     def _trapezoid_error(self, shown: Point, point: Point) -> float:
