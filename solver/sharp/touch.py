@@ -17,6 +17,7 @@ import numpy as np
 from solver.method import PathError
 from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
+from solver.sharp.clearance import Clearances
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
 from solver.sharp.field import GapField
 from solver.sharp.opening import fine_opening, sum_modes
@@ -45,6 +46,16 @@ class Minima:
     theta: Array
     opening: Array
     curvature: Array
+
+    @classmethod
+    def of(cls, parts: list[Minima]) -> Minima:
+        """All minima of several gaps."""
+        parts = parts or [cls(np.empty(0), np.empty(0), np.empty(0))]
+        return cls(
+            np.concatenate([part.theta for part in parts]),
+            np.concatenate([part.opening for part in parts]),
+            np.concatenate([part.curvature for part in parts]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +92,7 @@ class Nucleation:
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
+        self._clearances = Clearances(edges.wave, edges.critical)
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
         self.overlap = _OVERLAP * problem.profile.h_max * problem.profile.q0
 
@@ -97,26 +109,22 @@ class Nucleation:
         overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
         return profile.h_max * profile.q0 - overlap, highest
 
-    def minima(self, field: GapField) -> Minima:
-        """Local minima of the opening inside the gaps."""
+    def minima(self, field: GapField, k: int) -> Minima:
+        """Local minima of the opening inside gap ``k``."""
         self.edges.count.openings += 1
-        found: list[tuple[Array, Array, Array]] = []
-        for k in range(len(field.gaps)):
-            shape = fine_opening(field, k)
-            x, y = shape.theta, shape.opening
-            i = np.flatnonzero((y[1:-1] <= y[:-2]) & (y[1:-1] < y[2:])) + 1
-            # parabola through three nodes, Newton's form
-            first = (y[i] - y[i - 1]) / (x[i] - x[i - 1])
-            second = (y[i + 1] - y[i]) / (x[i + 1] - x[i])
-            half = (second - first) / (x[i + 1] - x[i - 1])
-            slope = first + half * (x[i] - x[i - 1])
-            at, low = x[i] - slope / (2 * half), y[i] - slope**2 / (4 * half)
-            width = x[i + 1] - x[i - 1]
-            for j in np.flatnonzero(low < _CLOSE * half * width**2):
-                at[j], low[j], half[j] = _bottom(field, k, shape.modes, at[j], 0.5 * width[j])
-            found.append((at, low, 2 * half))
-        theta, opening, curvature = (np.concatenate(part) for part in zip(*found, strict=True))
-        return Minima(theta, opening, curvature)
+        shape = fine_opening(field, k)
+        x, y = shape.theta, shape.opening
+        i = np.flatnonzero((y[1:-1] <= y[:-2]) & (y[1:-1] < y[2:])) + 1
+        # parabola through three nodes, Newton's form
+        first = (y[i] - y[i - 1]) / (x[i] - x[i - 1])
+        second = (y[i + 1] - y[i]) / (x[i + 1] - x[i])
+        half = (second - first) / (x[i + 1] - x[i - 1])
+        slope = first + half * (x[i] - x[i - 1])
+        at, low = x[i] - slope / (2 * half), y[i] - slope**2 / (4 * half)
+        width = x[i + 1] - x[i - 1]
+        for j in np.flatnonzero(low < _CLOSE * half * width**2):
+            at[j], low[j], half[j] = _bottom(field, k, shape.modes, at[j], 0.5 * width[j])
+        return Minima(at, low, 2 * half)
 
     def clearance(self, opening: Array, curvature: Array) -> Array:
         """Opening left at minima before a patch is put there; not positive when it is time."""
@@ -140,10 +148,19 @@ class Nucleation:
         ]
 
     def least(self, field: GapField) -> tuple[float, Minima]:
-        """Least clearance of a field, and all its minima."""
-        minima = self.minima(field)
-        over = self.clearance(minima.opening, minima.curvature)
-        return float(over.min(initial=np.inf)), minima
+        """Least clearance of a field, and the minima of the gaps that may be used up.
+
+        Only those are looked at; see :mod:`solver.sharp.clearance`.
+        """
+        left, place = self._clearances.left(field)
+        found = []
+        for k in np.flatnonzero(place < 0):
+            minima = self.minima(field, int(k))
+            over = self.clearance(minima.opening, minima.curvature)
+            left[k] = over.min(initial=np.inf)
+            found.append(minima)
+        self._clearances.note(field, place, left)
+        return float(left.min()), Minima.of(found)
 
     def located(self, trail: list[Point], resolution: float) -> tuple[Located | None, float]:
         """First point of a trail at which surfaces touch inside a gap, with the touches.
