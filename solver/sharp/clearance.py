@@ -3,9 +3,9 @@
 The fine opening of a gap (:mod:`solver.sharp.opening`) costs as much as many fields, and most gaps
 are far from touching. Inside a gap the surface is free: between two states with nearly the same
 edges its opening changes smoothly, so the nodes of the field tell by how much it has closed. Only
-beside an edge that moves there is more, an opening C sqrt(r) less one sqrt(r + δ), which is C δ over
-twice sqrt(r) and bounded by that of the shortest wave. A gap is looked at again when a good part of
-its clearance can be gone, or where nothing of this can be said.
+beside an edge that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)), for which that a
+fourth of the shortest wave away is taken. A gap is looked at again when a good part of its
+clearance can be gone, or where nothing of this can be said.
 """
 
 from __future__ import annotations

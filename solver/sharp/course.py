@@ -72,11 +72,11 @@ class Course:
 
         Towards a fold it leads near to it, and from next to it (``finest``) across.
         """
-        straight = most / max(self.fastest, 1e-300)
+        straight: float = most / max(self.fastest, 1e-300)
         if np.isinf(self.ahead):
             return straight
         if self.ahead < 0.8 * finest:
             return finest
         root = np.sqrt(self.ahead)
         left = max(root - most / (2 * self.fastest * root), 0.0) ** 2
-        return self.ahead - max(left, 0.1 * self.ahead, 0.4 * finest)
+        return float(self.ahead - max(left, 0.1 * self.ahead, 0.4 * finest))
