@@ -133,8 +133,8 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     if len(after) == 0:
         longest = float((before[:, 1] - before[:, 0]).max()) if len(before) else 0.0
         return "pull-off", longest
-    touches = [_overlapping(patch, after, period) for patch in before]
-    touched = [_overlapping(patch, before, period) for patch in after]
+    touches = _overlapping(before, after, period)
+    touched = _overlapping(after, before, period)
     moved = [
         b - a
         for mine, other, hits in ((before, after, touches), (after, before, touched))
@@ -154,14 +154,19 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     return ("spreading" if grown >= 0 else "receding"), length
 
 
-def _overlapping(patch: Array, others: Array, period: float) -> list[int]:
-    """Indices of ``others`` that share a point with ``patch`` on the circle."""
-    a, b = patch
-    c, d = others[:, 0], others[:, 1]
-    hits = np.zeros(len(others), dtype=bool)
-    for shift in (-period, 0.0, period):
-        hits |= (a < d + shift) & (c + shift < b)
-    return [int(k) for k in np.flatnonzero(hits)]
+def _overlapping(patches: Array, others: Array, period: float) -> list[list[int]]:
+    """For each patch the indices of ``others`` that share a point with it on the circle.
+
+    Patches of one state do not overlap, so their left and their right edges come in one order.
+    """
+    order = np.argsort(others[:, 0])
+    turns = period * np.arange(-1, 2)
+    left = np.add.outer(turns, others[order, 0]).ravel()
+    right = np.add.outer(turns, others[order, 1]).ravel()
+    first = np.searchsorted(right, patches[:, 0], side="right")
+    stop = np.searchsorted(left, patches[:, 1], side="left")
+    hits = (np.arange(i, j) % len(others) for i, j in zip(first, stop, strict=True))
+    return [sorted({int(order[k]) for k in hit}) for hit in hits]
 
 
 def _same(one: tuple[float, float], two: Array, period: float) -> bool:

@@ -26,8 +26,9 @@ from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution, choose_ki
 from solver.sharp.many import equilibrium_many
 from solver.sharp.source import StressSource
 from solver.sharp.window import descend_many
+from solver.sharp.yielding import between_edges
 
-MANY = 100  # from so many gaps on, windows and the tree of gaps replace dense matrices
+MANY = 40  # from so many gaps on, windows and the tree of gaps replace dense matrices
 CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min
 _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
 _DESCENT_LIMIT = 100_000
@@ -191,6 +192,22 @@ class EdgeMechanics:
                 )
             )  # fmt: skip
         return GapField(self.source, gaps, prescribed, self.tolerance, self.law.hold, solution)
+
+    def stiffness(self, point: Point, edges: NDArray[np.int64]) -> Array:
+        """∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
+
+        The diagonal is not given for many gaps.
+        """
+        gaps = point.gaps
+        if len(gaps) < self.many:
+            by_edge = point.field.derivatives[0][np.ix_(edges, edges)]
+        else:
+            of = point.field.solution
+            by_edge = between_edges(
+                gaps, point.at, self.law.hold, of.kinds, self.law.digits, edges, RULES,
+                self.source.panels,
+            )  # fmt: skip
+        return np.asarray(by_edge * outward(gaps)[edges])
 
     def widths(self, gaps: Array) -> tuple[Array, Array]:
         """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""

@@ -11,7 +11,7 @@ from solver.method import ContactState
 from solver.sharp.course import Course
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.jump import Jumps
-from solver.sharp.local import advance
+from solver.sharp.local import Astray, LocalPoint, advance, confirmed
 from solver.sharp.states import Memory, States, Trace
 from solver.sharp.touch import Located, Nucleation
 
@@ -71,25 +71,45 @@ class _Walk:
         Bound on how far a gap may have closed since.
     pending : list of ContactState
         States that wait for the next look: they may lie beyond a touch.
+    known : tuple
+        How many points of the trail there were up to the last one that is an equilibrium of all
+        edges, and ``closed`` there.
     """
 
     trail: list[Point]
     clearance: float
     closed: float
     pending: list[ContactState]
+    known: tuple[int, float]
 
     def __init__(self, point: Point) -> None:
         self.trail, self.closed, self.pending = [point], 0.0, []
         self.clearance = point.clearance
+        self.known = (1, 0.0)
 
     def add(self, point: Point, closed: float) -> None:
         """Go on to a point; a gap has closed by ``closed`` at most."""
         self.trail.append(point)
         self.closed += closed
+        if not isinstance(point, LocalPoint):
+            self.known = (len(self.trail), self.closed)
+
+    def confirm(self) -> Point:
+        """Make sure that the last point is an equilibrium of all edges."""
+        self.trail[-1] = confirmed(self.trail[-1])
+        self.known = (len(self.trail), self.closed)
+        return self.trail[-1]
+
+    def back(self) -> Point:
+        """Go back to the last point that is one."""
+        count, self.closed = self.known
+        del self.trail[count:]
+        return self.trail[-1]
 
     def restart(self, clearance: float) -> None:
-        """Begin anew after a look."""
+        """Begin anew after a look, at a point that is one."""
         self.trail, self.clearance, self.closed = [self.trail[-1]], clearance, 0.0
+        self.known = (1, 0.0)
 
 
 class Follower:
@@ -133,9 +153,32 @@ class Follower:
         course = Course(None, point)
         walk = _Walk(point)
         shown = point
+        windows = len(point.gaps) >= self.edges.many
         while point.at != target.at:
             step = self._next_step(course, target.at, wanted, finest, lost)
-            reached = self._advance(course, step, target.at)
+            reached = None
+            try:
+                reached = self._advance(course, step, target.at, windows)
+                if reached is None and abs(step) <= finest and windows:
+                    # a window's verdict that this is a fold is not taken for that of all edges
+                    point, windows = walk.confirm(), False
+                    course = Course(None, point)
+                    continue
+                if reached is not None:
+                    error = self._trapezoid_error(shown, reached)
+                    closed = self._closed(point, reached, target.branch)
+                    there = reached.at == target.at
+                    small = self.edges.without_small(reached.gaps)
+                    looks = walk.closed + closed >= walk.clearance or small is not None
+                    coarse = error > 4 and abs(step) > finest
+                    if not coarse and (error > 1 or there or looks):
+                        reached = confirmed(reached)
+            except Astray:
+                far = point.at if reached is None else reached.at
+                point, windows, lost = walk.back(), False, np.inf
+                course = Course(None, point)
+                wanted = 0.5 * abs(far - point.at)
+                continue
             if reached is None:
                 if abs(step) > finest:
                     lost = abs(step)
@@ -154,13 +197,10 @@ class Follower:
                     wanted = finest = better
                     continue
                 return at, after
-            error = self._trapezoid_error(shown, reached)
-            if error > 4 and abs(step) > finest:
+            if coarse:
                 wanted = 0.5 * abs(step)
                 continue
-            walk.add(reached, self._closed(point, reached, target.branch))
-            small = self.edges.without_small(reached.gaps)
-            there = reached.at == target.at
+            walk.add(reached, closed)
             if error > 1 or there:
                 exact = None
                 if there and self.states.problem.control.is_fixed:
@@ -169,7 +209,7 @@ class Follower:
                 shown = reached
             # Every state that is handed out is looked at; between states only if a gap may have
             # closed.
-            if walk.pending or walk.closed >= walk.clearance or small is not None:
+            if looks or walk.pending:
                 touched = self._look(trace, walk, target.branch)
                 if touched is not None:
                     return self._touch(trace, touched, target.branch)
@@ -183,6 +223,7 @@ class Follower:
             point, wanted = reached, 2 * abs(step)
             # only before a fold is a failure more than that of a prediction
             lost = lost - abs(step) if np.isfinite(course.ahead) else np.inf
+            windows = len(point.gaps) >= self.edges.many
         trace.states += walk.pending
         # What has not closed since the last look need not be looked at again.
         point = point.cleared(max(walk.clearance - walk.closed, 0.0))
@@ -292,7 +333,7 @@ class Follower:
         left = target - course.point.at
         return left if size >= abs(left) else float(np.copysign(size, left))
 
-    def _advance(self, course: Course, step: float, target: float) -> Point | None:
+    def _advance(self, course: Course, step: float, target: float, windows: bool) -> Point | None:
         """Predict and correct; None if no stable equilibrium is within reach."""
         point = course.point
         if np.isinf(course.ahead) and (
@@ -300,10 +341,7 @@ class Follower:
         ):
             return None
         at = target if step == target - point.at else point.at + step
-        if len(point.gaps) < self.edges.many:
-            reach = CORRECTED * self.edges.wave
-            return self.edges.equilibrium(course.gaps(at), at, reach)
-        return advance(self.edges, point, at, sure=abs(step) <= self.resolution.jump)
+        return advance(self.edges, course, at, windows)
 
     def _trapezoid_error(self, shown: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last state shown, in units of what is allowed."""

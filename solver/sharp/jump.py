@@ -178,9 +178,10 @@ class Jumps:
         runners = np.flatnonzero(np.abs(way) > _RAN * self.edges.wave)
         if len(runners) < 2:
             return False
-        opening = end.field.solution.opening
-        stiffness = opening[:, None] * end.field.derivatives[0] * side
+        opening = end.field.solution.opening[runners]
+        way = way[runners]
+        stiffness = opening[:, None] * self.edges.stiffness(end, runners)
         taken = (stiffness + stiffness.T) * np.sign(way)[:, None] * way
         np.fill_diagonal(taken, 0.0)
-        held_back = np.maximum(taken[np.ix_(runners, runners)], 0.0).sum(axis=1)
+        held_back = np.maximum(taken, 0.0).sum(axis=1)
         return bool(held_back.max() > _HELD_BACK * self.edges.critical**2)

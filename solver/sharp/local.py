@@ -2,8 +2,10 @@
 
 Towards a fold the edges around one place move ever faster while all others hardly do. They are
 followed in a window (:mod:`solver.sharp.outside`), at the cost of a field of a few gaps, as long as
-the others stay near the state about which they are linear. A point found so is corrected, that is
-solved with all gaps, before anything but its place, its slope and its mean stress is asked of it.
+the others stay near the state about which they are linear. A point found so is confirmed, that is
+solved with all gaps, before a state, a touch or a jump is told from it: an edge elsewhere may have
+passed a fold of its own, which no linear response shows. Then there is no such equilibrium, and the
+way from the last confirmed point on is gone once more, with all gaps.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 
 from solver.profile import Array
 from solver.sharp.coordinate import map_gaps
+from solver.sharp.course import Course
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.equilibrium import equilibrium
 from solver.sharp.field import RULES, GapField, Solution, choose_kinds
@@ -23,6 +26,11 @@ from solver.sharp.window import surroundings
 
 _HALF_WIDTH = 3  # gaps of a window on each side of the fastest edge
 _STILL = 0.05  # so far, in λ_min, edges outside move while they are taken as linear
+_AWAY = 0.02  # further from where it was expected, in λ_min, no edge outside is found
+
+
+class Astray(Exception):
+    """No equilibrium of all edges is where a window led to."""
 
 
 class Stretch:
@@ -42,9 +50,14 @@ class Stretch:
         half = min(_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
         self.first = (int(np.argmax(rates)) - half) % count
         self.inside = (self.first + np.arange(2 * half + 1)) % count
-        others = rates.copy()
-        others[self.inside] = 0.0
-        self.still = float(others.max())
+        self.others = np.setdiff1d(np.arange(count), self.inside)
+        self.still = float(rates[self.others].max())
+
+    def goes_on(self, point: Point) -> None:
+        """Go on from another point that is solved with all gaps."""
+        rates = np.abs(point.rate).reshape(-1, 2).max(axis=1)
+        self.still = max(self.still, float(rates[self.others].max()))
+        point.__dict__["stretch"] = self
 
     def holds(self, at: float) -> bool:
         """Whether the edges outside are still near their first state at ``at``."""
@@ -63,12 +76,12 @@ class Stretch:
         )  # fmt: skip
         return window, np.append(kinds[self.inside], 0), Outside(*outside)
 
-    def equilibrium(self, point: Point, at: float, reach: float) -> LocalPoint | None:
-        """Stable equilibrium at d = ``at`` near the one predicted from a point of this stretch."""
+    def equilibrium(self, gaps: Array, at: float, reach: float) -> LocalPoint | None:
+        """Stable equilibrium at d = ``at`` near these gaps, those outside on their way."""
         window, kinds, outside = self._model
         turn = window[:-1] - self.start.gaps[self.inside]  # whole periods
         local = window.copy()
-        local[:-1] = point.predicted(at)[self.inside] + np.round(turn / (2 * np.pi)) * 2 * np.pi
+        local[:-1] = gaps[self.inside] + np.round(turn / (2 * np.pi)) * 2 * np.pi
         ends = np.append(local.ravel(), local[0, 0] + 2 * np.pi)
         if not np.all(np.diff(ends) > 0):
             return None
@@ -129,37 +142,59 @@ class LocalPoint(Point):
         return float(self.__dict__["_separation"])
 
     @cached_property
-    def corrected(self) -> Point:
-        """The equilibrium of all edges; next to a fold, where it may be lost, as they are."""
+    def _full(self) -> Point | None:
         edges: EdgeMechanics = self.__dict__["stretch"].edges
-        full = edges.equilibrium(self.gaps, self.at, CORRECTED * edges.wave)
-        return full or Point(self.at, edges.field(self.gaps, self.at), self.rate, self.slope)
+        return edges.equilibrium(self.gaps, self.at, CORRECTED * edges.wave)
+
+    def confirmed(self) -> Point:
+        """The equilibrium of all edges.
+
+        Raises
+        ------
+        Astray
+            If there is none here.
+        """
+        stretch: Stretch = self.__dict__["stretch"]
+        full = self._full
+        if full is None:
+            raise Astray
+        away = float(np.abs(full.gaps - self.gaps)[stretch.others].max())
+        if away > _AWAY * stretch.edges.wave:
+            raise Astray
+        stretch.goes_on(full)
+        return full
 
     @cached_property
     def field(self) -> GapField:
-        """Field of the corrected edges."""
-        return self.corrected.field
+        """Field of the corrected edges; where their equilibrium is lost, of these."""
+        edges: EdgeMechanics = self.__dict__["stretch"].edges
+        return self._full.field if self._full else edges.field(self.gaps, self.at)
 
 
-def advance(edges: EdgeMechanics, point: Point, at: float, sure: bool) -> Point | None:
-    """Stable equilibrium at d = ``at`` near the one predicted from ``point``, or None.
+def confirmed(point: Point) -> Point:
+    """``point``, solved with all gaps; raises :class:`Astray` if it is no equilibrium."""
+    return point.confirmed() if isinstance(point, LocalPoint) else point
 
-    In a window where only few edges move. If ``sure``, a window's verdict that there is none is
-    not taken for all edges'.
+
+def advance(edges: EdgeMechanics, course: Course, at: float, windows: bool) -> Point | None:
+    """Stable equilibrium at d = ``at`` near where ``course`` leads, or None.
+
+    With ``windows``, in a window where only few edges move.
+
+    Raises
+    ------
+    Astray
+        If the point of the course is no equilibrium of all edges.
     """
     reach = CORRECTED * edges.wave
+    point = course.point
     if len(point.gaps) < edges.many:
-        return edges.equilibrium(point.predicted(at), at, reach)
-    stretch = point.__dict__.get("stretch")
-    if stretch is None or not stretch.holds(at):
-        start = point.corrected if isinstance(point, LocalPoint) else point
-        stretch = Stretch(edges, start)
-        if not stretch.holds(at):
-            return edges.equilibrium(start.predicted(at), at, reach)
-        start.__dict__["stretch"] = stretch
-        point = start
-    found = stretch.equilibrium(point, at, reach)
-    if found is None and sure:
-        full = point.corrected if isinstance(point, LocalPoint) else point
-        return edges.equilibrium(full.predicted(at), at, reach)
-    return found
+        return edges.equilibrium(course.gaps(at), at, reach)
+    stretch: Stretch | None = point.__dict__.get("stretch")
+    if stretch is None or not stretch.holds(at) or not windows:
+        point = confirmed(point)
+        stretch = Stretch(edges, point)
+        if not stretch.holds(at) or not windows:
+            return edges.equilibrium(course.gaps(at), at, reach)
+        point.__dict__["stretch"] = stretch
+    return stretch.equilibrium(course.gaps(at), at, reach)

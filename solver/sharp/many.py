@@ -14,6 +14,7 @@ from solver.sharp.source import Panels
 from solver.sharp.yielding import newton_many
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+_SHARE = 0.1  # of what an equilibrium may move with the error of the field
 
 
 @compiled
@@ -34,6 +35,8 @@ def equilibrium_many(
     last = np.inf
     found = False
     steps = 0
+    # so much is below the error of the field, and each correction here costs as all gaps do
+    settled = max(law.settled, _SHARE * law.coarse)
     while True:
         steps += 1
         of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
@@ -43,7 +46,7 @@ def equilibrium_many(
         if not np.isfinite(of.pressure):
             break
         stalled = size <= law.coarse and size > 0.3 * last
-        if size <= law.settled or stalled:
+        if size <= settled or stalled:
             found = stable or not patient
             break
         if not patient and size <= law.near:
@@ -54,9 +57,15 @@ def equilibrium_many(
         within = size <= reach and size <= 2 * last and np.abs(travelled).max() <= reach
         if not within or steps == _NEWTON_LIMIT:
             break
-        last = size
         moved = moved_gaps(at, step)
         if not narrowest(moved) > 0:
             break
         at = moved
+        if stable and last < np.inf and size * (size / last) ** 2 <= settled:
+            # the iteration converges quadratically: what is left is less than that
+            steps += 1
+            of, _ = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
+            found = np.isfinite(of.pressure)
+            break
+        last = size
     return found, at, plain(of), rate, slope, steps

@@ -12,6 +12,7 @@ which follows from Betti's theorem; the first term is the energy of full contact
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,12 +21,13 @@ from scipy.fft import dst, next_fast_len
 from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp.coordinate import one_minus_plus, theta_at
-from solver.sharp.field import RULES, GapField
+from solver.sharp.field import RULES, GapField, Kinds, Rules
 from solver.sharp.source import interpolate
 
 ENERGY_NODES = 3.0  # sine nodes per shortest wave: two resolve it, the rest is margin
 SHAPE_NODES = 6.0  # nodes per shortest wave that bracket every local minimum of the opening
 _LEAST = 64
+_MANY_NODES = 500
 
 
 @dataclass(frozen=True)
@@ -41,65 +43,143 @@ class Opening:
     modes: Array
 
 
-@compiled
-def _fewest_nodes(gap: Array, top: int, per_wave: float) -> int:
-    """Number of sine nodes so close that the shortest wave holds ``per_wave`` of them."""
-    widest = 0.0
-    for i in range(1, 24):
-        t = np.pi * i / 24
-        widest = max(widest, theta_at(gap, np.cos(t))[1] * np.sin(t))
-    return int(np.ceil(0.5 * per_wave * widest * top)) + _LEAST
+@dataclass(frozen=True)
+class Sines:
+    """Some gaps of a field at their fine sine nodes, equally many in each; θ falls along a row.
+
+    Attributes
+    ----------
+    gaps : int array, shape (G,)
+        Which they are.
+    theta, span : array, shape (G, nodes)
+        Nodes, and dθ/dt there.
+    modes : array, shape (G, nodes)
+        s_n of every mode that the nodes carry.
+    """
+
+    gaps: Kinds
+    theta: Array
+    span: Array
+    modes: Array
 
 
 @compiled
-def _fine_nodes(gap: Array, count: int) -> tuple[Array, Array, Array]:
-    """``count`` sine nodes: θ, dθ/dη, sin t."""
-    theta = np.empty(count)
-    stretch = np.empty(count)
-    sine = np.empty(count)
+def _fewest_nodes(table: Array, top: int, per_wave: float) -> Kinds:
+    """Numbers of sine nodes so close that the shortest wave holds ``per_wave`` of them."""
+    out = np.empty(table.shape[0], dtype=np.int64)
+    for k in range(table.shape[0]):
+        widest = 0.0
+        for i in range(1, 24):
+            t = np.pi * i / 24
+            widest = max(widest, theta_at(table[k], np.cos(t))[1] * np.sin(t))
+        out[k] = int(np.ceil(0.5 * per_wave * widest * top)) + _LEAST
+    return out
+
+
+def _sizes(fewest: Kinds) -> Kinds:
+    """Numbers of nodes, no fewer, for which the transform is fast and which many gaps share.
+
+    That is so where one more than the number of nodes has small factors.
+    """
+    power = 2 ** np.floor(np.log2(fewest + 1.0)).astype(np.int64)
+    finer = fewest > _MANY_NODES  # wide gaps are few, and it is their nodes that cost
+    steps = np.where(finer[:, None], [9, 10, 12, 15, 16], [12, 12, 12, 16, 16])  # in eighths
+    some = power[:, None] * steps // 8
+    first = (some < fewest[:, None] + 1).sum(axis=1)
+    return np.asarray(some[np.arange(len(some)), first] - 1)
+
+
+@compiled
+def _fine_nodes(table: Array, count: int) -> tuple[Array, Array]:
+    """``count`` sine nodes of each gap: θ, falling, and dθ/dt, shape (gaps, count)."""
+    theta = np.empty((table.shape[0], count))
+    span = np.empty((table.shape[0], count))
     for i in range(count):
-        t = np.pi * (count - i) / (count + 1)
-        sine[i] = np.sin(t)
-        theta[i], stretch[i] = theta_at(gap, np.cos(t))
-    return theta, stretch, sine
+        t = np.pi * (i + 1) / (count + 1)
+        cosine = np.cos(t)
+        sine = np.sin(t)
+        for k in range(table.shape[0]):
+            theta[k, i], stretch = theta_at(table[k], cosine)
+            span[k, i] = stretch * sine
+    return theta, span
 
 
-def _sine_modes(field: GapField, k: int, per_wave: float) -> tuple[Array, Array, Array]:
-    """θ and dθ of the fine nodes of gap k, and s_n for every mode that they carry."""
-    source = field.source
-    gap = field.solution.table[k]
-    # the transform is fast where one more than the number of nodes has small factors
-    count = next_fast_len(_fewest_nodes(gap, source.top, per_wave) + 1, real=True) - 1
-    theta, stretch, sine = _fine_nodes(gap, count)
-    s = interpolate(theta, source.panels.width, source.panels.stress)
-    span = stretch * sine
-    # the transform counts t upwards, the nodes run downwards in t
-    modes = dst((s * span)[::-1], type=1) / (len(theta) + 1)
-    return theta, span * np.pi / (len(theta) + 1), modes
+@compiled
+def _sampled(theta: Array, span: Array, width: float, stress: Array) -> Array:
+    """S dθ/dt at nodes."""
+    out = np.empty(theta.shape)
+    for k in range(theta.shape[0]):
+        values = interpolate(theta[k], width, stress)
+        for i in range(theta.shape[1]):
+            out[k, i] = values[i] * span[k, i]
+    return out
+
+
+def sines(field: GapField, per_wave: float, gaps: Kinds | None = None) -> Iterator[Sines]:
+    """The fine nodes of gaps (all by default), those of equally many together."""
+    source, table = field.source, field.solution.table
+    gaps = np.arange(len(table)) if gaps is None else gaps
+    sizes = _sizes(_fewest_nodes(table[gaps], source.top, per_wave))
+    for size in np.unique(sizes):
+        some = gaps[sizes == size]
+        theta, span = _fine_nodes(table[some], int(size))
+        load = _sampled(theta, span, source.panels.width, source.panels.stress)
+        yield Sines(some, theta, span, dst(load, type=1) / (size + 1))
+
+
+@compiled
+def _high_work(gaps: Kinds, modes: Array, kinds: Kinds, counts: Kinds) -> float:
+    """Σ s_n²/(n+1) over the modes of gaps above those of f."""
+    total = 0.0
+    for i in range(gaps.shape[0]):
+        for n in range(counts[kinds[gaps[i]]], modes.shape[1]):
+            total += modes[i, n] * modes[i, n] / (n + 1)
+    return total
 
 
 def work_of_gaps(field: GapField) -> float:
     """∫_gaps S_full T dθ."""
-    total = float(field.solution.rhs[:, 0] @ field.solution.f)
-    for k in range(len(field.gaps)):
-        s = _sine_modes(field, k, ENERGY_NODES)[2]
-        m = int(RULES.counts[field.solution.kinds[k]])
-        high = s[m:]
-        total -= np.pi / 2 * float(np.sum(high * high / np.arange(m + 1, len(s) + 1)))
+    of = field.solution
+    total = float(of.rhs[:, 0] @ of.f)
+    for part in sines(field, ENERGY_NODES):
+        total -= np.pi / 2 * _high_work(part.gaps, part.modes, of.kinds, RULES.counts)
     return total
+
+
+@compiled
+def _modes_of(
+    gaps: Kinds, modes: Array, kinds: Kinds, offset: Kinds, f: Array, rules: Rules
+) -> Array:
+    """b_n of gaps from their s_n and from f."""
+    out = np.empty(modes.shape)
+    for i in range(gaps.shape[0]):
+        kind = kinds[gaps[i]]
+        m = rules.counts[kind]
+        for n in range(m, modes.shape[1]):
+            out[i, n] = -modes[i, n] / (n + 1)
+        for n in range(m):
+            total = 0.0
+            for j in range(m):
+                w = rules.w[rules.start[kind] + j]
+                total += w * f[offset[gaps[i]] + j] * rules.modes[rules.square[kind] + j * m + n]
+            out[i, n] = 2 / np.pi * total
+    return out
+
+
+def opened(field: GapField, part: Sines) -> tuple[Array, Array]:
+    """Openings T of gaps at their fine nodes, and their b_n, both of shape (G, nodes)."""
+    of = field.solution
+    modes = _modes_of(part.gaps, part.modes, of.kinds, of.offset, of.f, RULES)
+    return dst(modes, type=1) / 2, modes
 
 
 def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> Opening:
     """Opening T of gap k at fine nodes."""
-    of = field.solution
-    theta, span, s = _sine_modes(field, k, per_wave)
-    m = int(RULES.counts[field.solution.kinds[k]])
-    start, square = RULES.start[of.kinds[k]], RULES.square[of.kinds[k]]
-    f = of.f[of.offset[k] : of.offset[k + 1]]
-    u = RULES.modes[square : square + m * m].reshape(m, m)
-    b = -s / np.arange(1, len(s) + 1)
-    b[:m] = (2 / np.pi) * (RULES.w[start : start + m] * f) @ u
-    return Opening(theta, dst(b, type=1)[::-1] / 2, span, b)
+    (part,) = sines(field, per_wave, np.array([k]))
+    opening, modes = opened(field, part)
+    count = part.theta.shape[1]
+    weight = part.span[0] * np.pi / (count + 1)
+    return Opening(part.theta[0, ::-1], opening[0, ::-1], weight[::-1], modes[0])
 
 
 def finer_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]:
@@ -107,7 +187,7 @@ def finer_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]:
     count = next_fast_len(factor * (len(modes) + 1), real=True) - 1
     more = np.zeros(count)
     more[: len(modes)] = modes
-    return _fine_nodes(gap, count)[0], dst(more, type=1)[::-1] / 2
+    return _fine_nodes(gap[None], count)[0][0, ::-1], dst(more, type=1)[::-1] / 2
 
 
 @compiled

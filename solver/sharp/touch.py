@@ -14,13 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.compiled import compiled
 from solver.method import PathError
 from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
 from solver.sharp.clearance import Clearances
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
-from solver.sharp.field import GapField
-from solver.sharp.opening import fine_opening, sum_modes
+from solver.sharp.field import GapField, Kinds
+from solver.sharp.opening import SHAPE_NODES, opened, sines, sum_modes
 
 _OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
 # A minimum below this (of what its curvature makes over a node's distance) is found from the whole
@@ -46,16 +47,6 @@ class Minima:
     theta: Array
     opening: Array
     curvature: Array
-
-    @classmethod
-    def of(cls, parts: list[Minima]) -> Minima:
-        """All minima of several gaps."""
-        parts = parts or [cls(np.empty(0), np.empty(0), np.empty(0))]
-        return cls(
-            np.concatenate([part.theta for part in parts]),
-            np.concatenate([part.opening for part in parts]),
-            np.concatenate([part.curvature for part in parts]),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +78,38 @@ def _bottom(
     return at, low, half
 
 
+@compiled
+def _bottoms(theta: Array, opening: Array) -> tuple[Kinds, Array, Array, Array, Array]:
+    """Local minima along rows in which θ falls: row, place, value, half the curvature, width.
+
+    By the parabola through three nodes, Newton's form; ``width`` is the distance of the outer two.
+    """
+    most = theta.size // 2 + 1
+    row = np.empty(most, dtype=np.int64)
+    out = np.empty((4, most))
+    count = 0
+    for k in range(theta.shape[0]):
+        y = opening[k]
+        x = theta[k]
+        for i in range(y.shape[0] - 2, 0, -1):
+            if y[i] <= y[i + 1] and y[i] < y[i - 1]:
+                first = (y[i] - y[i + 1]) / (x[i] - x[i + 1])
+                second = (y[i - 1] - y[i]) / (x[i - 1] - x[i])
+                width = x[i - 1] - x[i + 1]
+                half = (second - first) / width
+                slope = first + half * (x[i] - x[i + 1])
+                row[count] = k
+                out[0, count] = x[i] - slope / (2 * half)
+                out[1, count] = y[i] - slope * slope / (4 * half)
+                out[2, count] = half
+                out[3, count] = width
+                count += 1
+    return (
+        row[:count], out[0, :count].copy(), out[1, :count].copy(), out[2, :count].copy(),
+        out[3, :count].copy(),
+    )  # fmt: skip
+
+
 class Nucleation:
     """Finds touching points and puts seeds there."""
 
@@ -109,22 +132,27 @@ class Nucleation:
         overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
         return profile.h_max * profile.q0 - overlap, highest
 
-    def minima(self, field: GapField, k: int) -> Minima:
-        """Local minima of the opening inside gap ``k``."""
-        self.edges.count.openings += 1
-        shape = fine_opening(field, k)
-        x, y = shape.theta, shape.opening
-        i = np.flatnonzero((y[1:-1] <= y[:-2]) & (y[1:-1] < y[2:])) + 1
-        # parabola through three nodes, Newton's form
-        first = (y[i] - y[i - 1]) / (x[i] - x[i - 1])
-        second = (y[i + 1] - y[i]) / (x[i + 1] - x[i])
-        half = (second - first) / (x[i + 1] - x[i - 1])
-        slope = first + half * (x[i] - x[i - 1])
-        at, low = x[i] - slope / (2 * half), y[i] - slope**2 / (4 * half)
-        width = x[i + 1] - x[i - 1]
-        for j in np.flatnonzero(low < _CLOSE * half * width**2):
-            at[j], low[j], half[j] = _bottom(field, k, shape.modes, at[j], 0.5 * width[j])
-        return Minima(at, low, 2 * half)
+    def minima(self, field: GapField, gaps: Kinds) -> tuple[Minima, Kinds]:
+        """Local minima of the opening inside some gaps, and in which of them each lies."""
+        self.edges.count.openings += len(gaps)
+        found = [np.empty((3, 0))]
+        where = [np.empty(0, dtype=np.int64)]
+        for part in sines(field, SHAPE_NODES, gaps):
+            opening, modes = opened(field, part)
+            row, at, low, half, width = _bottoms(part.theta, opening)
+            for j in np.flatnonzero(low < _CLOSE * half * width**2):
+                k = row[j]
+                at[j], low[j], half[j] = _bottom(
+                    field, part.gaps[k], modes[k], at[j], 0.5 * width[j]
+                )
+            found.append(np.stack([at, low, 2 * half]))
+            where.append(part.gaps[row])
+        theta, depth, curvature = np.concatenate(found, axis=1)
+        order = np.argsort(theta, kind="stable")
+        return (
+            Minima(theta[order], depth[order], curvature[order]),
+            np.concatenate(where)[order],
+        )
 
     def clearance(self, opening: Array, curvature: Array) -> Array:
         """Opening left at minima before a patch is put there; not positive when it is time."""
@@ -153,14 +181,12 @@ class Nucleation:
         Only those are looked at; see :mod:`solver.sharp.clearance`.
         """
         left, place = self._clearances.left(field)
-        found = []
-        for k in np.flatnonzero(place < 0):
-            minima = self.minima(field, int(k))
-            over = self.clearance(minima.opening, minima.curvature)
-            left[k] = over.min(initial=np.inf)
-            found.append(minima)
+        fresh = np.flatnonzero(place < 0)
+        minima, where = self.minima(field, fresh)
+        left[fresh] = np.inf
+        np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
         self._clearances.note(field, place, left)
-        return float(left.min()), Minima.of(found)
+        return float(left.min()), minima
 
     def located(self, trail: list[Point], resolution: float) -> tuple[Located | None, float]:
         """First point of a trail at which surfaces touch inside a gap, with the touches.

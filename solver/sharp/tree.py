@@ -381,6 +381,41 @@ def respond(tree: Tree, gaps_own: Array, gaps_negative: Integers) -> Response:
     return Response(own, pair, felt, negative[runs - 1])
 
 
+@compiled_sums
+def _apply(a: Array, x: Array, out: Array) -> None:
+    """Into ``out``: a x, a flat."""
+    n = x.shape[0]
+    for i in range(out.shape[0]):
+        row = a[i * n : (i + 1) * n]
+        total = 0.0
+        for k in range(n):
+            total += row[k] * x[k]
+        out[i] = total
+
+
+@compiled_sums
+def _add_apply(a: Array, x: Array, out: Array) -> None:
+    """To ``out``: a x, a flat."""
+    n = x.shape[0]
+    for i in range(out.shape[0]):
+        row = a[i * n : (i + 1) * n]
+        total = 0.0
+        for k in range(n):
+            total += row[k] * x[k]
+        out[i] += total
+
+
+@compiled_sums
+def _add_transposed(a: Array, x: Array, out: Array) -> None:
+    """To ``out``: aᵀ x, a flat."""
+    n = out.shape[0]
+    for k in range(x.shape[0]):
+        value = x[k]
+        row = a[k * n : (k + 1) * n]
+        for j in range(n):
+            out[j] += value * row[j]
+
+
 @compiled
 def collect(tree: Tree, response: Response, alone: Array) -> Array:
     """Charges of all runs, without potentials from outside a run's parent, columns as ``alone``.
@@ -389,44 +424,41 @@ def collect(tree: Tree, response: Response, alone: Array) -> Array:
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    columns = alone.shape[1]
-    charge = np.empty((tree.at[runs], columns))
-    charge[: alone.shape[0]] = alone
+    charge = np.zeros((alone.shape[1], tree.at[runs]))
+    charge[:, : alone.shape[0]] = alone.T
+    room = np.empty((2, tree.rank.max()))
     for run in range(gaps, runs):
         one = tree.children[run, 0]
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
-        r = tree.rank[run]
-        first = response.own[tree.square[one] : tree.square[one + 1]].reshape(n, n)
-        second = response.own[tree.square[two] : tree.square[two + 1]].reshape(m, m)
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]].reshape(n, m)
-        w = response.pair[tree.inner[run] : tree.inner[run + 1]].reshape(n, n)
-        q1 = charge[tree.at[one] : tree.at[one + 1]]
-        q2 = charge[tree.at[two] : tree.at[two + 1]]
-        # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
-        a = np.empty((n, columns))
-        b = np.empty((n, columns))
-        c = np.empty((m, columns))
-        d = np.empty((m, columns))
-        _multiply(kernel, q2, a)
-        _multiply(first, a, b)
-        q1 += b
-        _multiply_transposed(kernel, q1, c)
-        _multiply(second, c, d)
-        _multiply(kernel, d, a)
-        _multiply(w, a, b)
-        q1 += b
-        _multiply_transposed(kernel, q1, c)
-        _multiply(second, c, d)
-        q2 += d
-        if r > 0:
-            lifted = tree.lifted[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
-            _multiply_transposed(lifted[:n], q1, charge[tree.at[run] : tree.at[run + 1]])
-            more = np.empty((r, columns))
-            _multiply_transposed(lifted[n:], q2, more)
-            charge[tree.at[run] : tree.at[run + 1]] += more
-    return charge
+        first = response.own[tree.square[one] : tree.square[one + 1]]
+        second = response.own[tree.square[two] : tree.square[two + 1]]
+        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]]
+        w = response.pair[tree.inner[run] : tree.inner[run + 1]]
+        up = tree.lifted[tree.lift[run] : tree.lift[run + 1]]
+        split = n * tree.rank[run]
+        a = room[0, :n]
+        b = room[1, :m]
+        for column in range(charge.shape[0]):
+            q1 = charge[column, tree.at[one] : tree.at[one + 1]]
+            q2 = charge[column, tree.at[two] : tree.at[two + 1]]
+            # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
+            _apply(kernel, q2, a)
+            _add_apply(first, a, q1)
+            b[:] = 0.0
+            _add_transposed(kernel, q1, b)
+            c = room[0, :m]
+            _apply(second, b, c)
+            _apply(kernel, c, room[1, :n])
+            _add_apply(w, room[1, :n], q1)
+            b[:] = 0.0
+            _add_transposed(kernel, q1, b)
+            _add_apply(second, b, q2)
+            q = charge[column, tree.at[run] : tree.at[run + 1]]
+            _add_transposed(up[:split], q1, q)
+            _add_transposed(up[split:], q2, q)
+    return np.ascontiguousarray(charge.T)
 
 
 @compiled
@@ -438,36 +470,41 @@ def distribute(tree: Tree, response: Response, charge: Array, outside: Array) ->
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    columns = charge.shape[1]
-    potential = np.empty(charge.shape)
-    potential[tree.at[runs - 1] : tree.at[runs]] = outside
+    charges = np.ascontiguousarray(charge.T)
+    potential = np.zeros(charges.shape)
+    potential[:, tree.at[runs - 1] : tree.at[runs]] = outside.T
+    room = np.empty(tree.rank.max())
     for run in range(runs - 1, gaps - 1, -1):
         one = tree.children[run, 0]
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
-        r = tree.rank[run]
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]].reshape(n, m)
-        q1 = charge[tree.at[one] : tree.at[one + 1]]
-        q2 = charge[tree.at[two] : tree.at[two + 1]]
-        g1 = np.zeros((n, columns))
-        g2 = np.zeros((m, columns))
-        if r > 0:
-            lifted = tree.lifted[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
-            felt = response.felt[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
-            g = potential[tree.at[run] : tree.at[run + 1]]
-            a = np.empty((n, columns))
-            b = np.empty((m, columns))
-            _multiply(felt[:n], g, a)
-            _multiply(felt[n:], g, b)
-            q1 -= a
-            q2 -= b
-            _multiply(lifted[:n], g, g1)
-            _multiply(lifted[n:], g, g2)
-        by_two = np.empty((n, columns))
-        by_one = np.empty((m, columns))
-        _multiply(kernel, q2, by_two)
-        _multiply_transposed(kernel, q1, by_one)
-        potential[tree.at[one] : tree.at[one + 1]] = g1 - by_two
-        potential[tree.at[two] : tree.at[two + 1]] = g2 - by_one
-    return potential[: tree.at[gaps]]
+        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]]
+        up = tree.lifted[tree.lift[run] : tree.lift[run + 1]]
+        felt = response.felt[tree.lift[run] : tree.lift[run + 1]]
+        split = n * tree.rank[run]
+        for column in range(charges.shape[0]):
+            q1 = charges[column, tree.at[one] : tree.at[one + 1]]
+            q2 = charges[column, tree.at[two] : tree.at[two + 1]]
+            g1 = potential[column, tree.at[one] : tree.at[one + 1]]
+            g2 = potential[column, tree.at[two] : tree.at[two + 1]]
+            g = potential[column, tree.at[run] : tree.at[run + 1]]
+            a = room[:n]
+            _apply(felt[:split], g, a)
+            for i in range(n):
+                q1[i] -= a[i]
+            b = room[:m]
+            _apply(felt[split:], g, b)
+            for i in range(m):
+                q2[i] -= b[i]
+            _apply(kernel, q2, a)
+            _apply(up[:split], g, g1)
+            for i in range(n):
+                g1[i] -= a[i]
+            b[:] = 0.0
+            _add_transposed(kernel, q1, b)
+            _apply(up[split:], g, g2)
+            for i in range(m):
+                g2[i] -= b[i]
+    charge[:] = charges.T
+    return np.ascontiguousarray(potential[:, : tree.at[gaps]].T)

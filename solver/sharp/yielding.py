@@ -17,8 +17,9 @@ import numpy as np
 from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp.coordinate import ALPHA, LEFT
-from solver.sharp.far import Gaps, by_gaps, spread
+from solver.sharp.far import Gaps, by_gaps, solve_many, spread
 from solver.sharp.field import Hold, Kinds, Rules, Solution, edge_openings, mapped, periodic
+from solver.sharp.source import Panels
 from solver.sharp.tree import collect, distribute, respond
 
 
@@ -231,3 +232,52 @@ def newton_step(
     step = motion[:, 0] - motion[:, 1] * (hold.share * mean[0] / yields)
     slope = rate if hold.share != 0 else rate * mean[1] / (2 * np.pi)
     return step, motion[:, 1] * rate, slope, stable
+
+
+@compiled
+def between_edges(
+    gaps: Array,
+    prescribed: float,
+    hold: Hold,
+    kinds: Kinds,
+    digits: float,
+    wanted: Kinds,
+    rules: Rules,
+    panels: Panels,
+) -> Array:
+    """∂C_e/∂θ_f between the edges ``wanted`` of many gaps, all others held; 0 for e = f."""
+    of, parts = solve_many(gaps, prescribed, hold, kinds, digits, 1, rules, panels)
+    n = of.theta.shape[0]
+    count = wanted.shape[0]
+    load = np.zeros((n, count))
+    charge = np.zeros((n, count))
+    p = np.zeros(count)
+    for i in range(count):
+        k = wanted[i] // 2
+        side = wanted[i] % 2
+        own = slice(of.offset[k], of.offset[k + 1])
+        m = of.offset[k + 1] - of.offset[k]
+        loads, charges, areas = singular_gap(of, k, parts.blocks[own, :m], rules)
+        load[own, i] = loads[:, side]
+        charge[own, i] = charges[:, side]
+        p[i] = areas[side]
+    column = spread(parts, of.kinds, of.offset, rules, load, charge)
+    if of.share != 0:
+        for i in range(count):
+            for j in range(n):
+                p[i] += of.weight[j] * column[j, i]
+            for j in range(n):
+                column[j, i] -= of.solved[j, 1] * p[i] / of.resistance
+    opening = edge_openings(column, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+    out = np.zeros((count, count))
+    for i in range(count):
+        f = wanted[i]
+        strength = (2 * (f % 2) - 1) * of.opening[f] * np.sqrt(of.slope[f // 2, f % 2] / 8)
+        for j in range(count):
+            e = wanted[j]
+            if e != f:
+                value = opening[e, i]
+                if e == f ^ 1:  # the singular opening's far end
+                    value += 0.5 * np.sqrt(2 * of.slope[e // 2, e % 2])
+                out[j, i] = strength * value
+    return out

@@ -191,3 +191,19 @@ def test_a_loop_in_windows_is_the_loop():
     assert windows.loss == pytest.approx(dense.loss, rel=2e-4)
     assert windows.loss_from_drops == pytest.approx(dense.loss_from_drops, rel=2e-4)
     assert abs(windows.audit_residual) < 1e-4
+
+
+def test_stiffness_between_some_edges_is_the_dense_one(loaded):
+    """What edges take from each other's force, by the tree, neighbours across a gap and others."""
+    method, state = loaded
+    edges, at = method.edges, state.separation * method.q0
+    point = edges.equilibrium(state.internal.gaps, at, edges.wave)
+    some = np.array([0, 1, 4, 7, 2 * len(point.gaps) - 1])
+    dense = edges.stiffness(point, some)
+    edges.many, before = 2, edges.many
+    try:
+        tree = edges.stiffness(point, some)
+    finally:
+        edges.many = before
+    np.fill_diagonal(dense, 0.0)
+    assert np.abs(tree - dense).max() < 1e-5 * np.abs(dense).max()
