@@ -287,7 +287,10 @@ class _Session:
             self._count(outcome if own_rows else self._write(outcome), progress, schedule)
 
         progress = ProgressLine(
-            self._counts, lambda: self._estimate(schedule, master.in_flight, workers)
+            self._counts,
+            lambda: self._estimate(
+                schedule, master.in_flight / self._campaign.branch_loops, workers
+            ),
         )
         master = Master(
             *(channel, schedule, self._groups, collect, self._limits),
@@ -396,7 +399,7 @@ class _Session:
         return None if deadline is None else deadline - time.time()
 
     @staticmethod
-    def _estimate(schedule: Schedule, in_flight: int, workers: int) -> float | None:
+    def _estimate(schedule: Schedule, in_flight: float, workers: int) -> float | None:
         waiting, mean = schedule.seconds_waiting, schedule.mean_estimate
         if waiting is None or mean is None:
             return None

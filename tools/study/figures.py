@@ -15,6 +15,7 @@ from ensemble.report.paper import TABLE_1
 from tools.study import jumps, monotone
 from tools.study.data import Study
 from tools.study.readings import readings
+from tools.study.tables import CUTOFFS, cutoff_place
 
 HURSTS = (0.7, 0.8, 0.9)
 COLOURS = {0.01: "#0072B2", 0.025: "#009E73", 0.04: "#E69F00", 0.07: "#D55E00"}
@@ -165,13 +166,10 @@ def of_cutoff(study: Study) -> Figure:
     figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
     left, right = figure.axes
     for hurst, colour, marker in ((0.4, "#0072B2", "o"), (0.8, "#D55E00", "s")):
-        for ratio in (10, 30, 100, 300):
-            name = "cutoff300" if ratio == 300 else "cutoff"
-            loss = study.by_realisation(
-                "loss_dimensionless", campaign=name, hurst=hurst, ratio=ratio
-            )
+        for ratio in CUTOFFS:
+            loss = study.by_realisation("loss_dimensionless", **cutoff_place(hurst, ratio))
             if len(loss) > 1:
-                label = f"H = {hurst:g}" if ratio == 10 else "_"
+                label = f"H = {hurst:g}" if ratio == CUTOFFS[0] else "_"
                 _points(
                     left, ratio, list(loss.values()), 1.0, color=colour, marker=marker, label=label
                 )

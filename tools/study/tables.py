@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -179,6 +180,50 @@ def _cells(study: Study) -> list[tuple[str, float, float]]:
     ]
 
 
+def stress(study: Study) -> Table:
+    """Mean stress at the turning point, which is no coordinate of the loading branch."""
+    rows = []
+    for campaign, hurst, gamma in _cells(study):
+        place = {"campaign": campaign, "hurst": hurst, "work_of_adhesion": gamma}
+        found = {
+            turn: study.by_realisation("stress_at_turn", max_penetration=turn, **place)
+            for turn in (0.6, 0.8, 0.9)
+        }
+        if not all(found.values()):
+            continue
+        both = aligned(*found.values())
+        lower = int(np.sum(both[2] < both[0]))
+        rows.append(
+            [
+                *(f"{gamma:g}", f"{hurst:g}"),
+                *(_mean(values, 1e3) for values in both),
+                f"{lower} of {both.shape[1]}",
+            ]
+        )
+    header = ["γ (J/m²)", "H", *(f"p̄ at {turn} (kPa)" for turn in (0.6, 0.8, 0.9))]
+    return [*header, "lower at 0.9 than at 0.6"], rows
+
+
+def under_load(study: Study) -> Table:
+    """Loops under a load of 500 Pa."""
+    rows = []
+    for gamma in (0.01, 0.04, 0.07):
+        for hurst in (0.7, 0.8, 0.9):
+            place = {"campaign": "load", "hurst": hurst, "work_of_adhesion": gamma}
+            done, failed = study.loops.where(**place), study.failed.where(**place)
+            if len(done) + len(failed) == 0:
+                continue
+            mean = _mean(done["loss_dimensionless"]) if len(done) > 1 else ""
+            contact = f"{done['largest_contact_fraction'].mean():.2f}" if len(done) else ""
+            paper = TABLE_1.get((hurst, gamma))
+            told = "–" if paper is None else f"{paper:g}"
+            rows.append(
+                [f"{gamma:g}", f"{hurst:g}", f"{len(done)}", f"{len(failed)}", mean, contact, told]
+            )
+    header = ["γ (J/m²)", "H", "loops", "into full contact", "W~", "largest A/A0", "paper"]
+    return header, rows
+
+
 def turning_point(study: Study) -> Table:
     """What changes between Δ~max = 0.6 and 0.9."""
     quantities: tuple[tuple[str, Callable[[str, float, float, float], dict[int, float]]], ...]
@@ -286,14 +331,30 @@ def kinds(study: Study) -> Table:
     return header, rows
 
 
+CUTOFFS = (3, 10, 30, 100)
+
+
+def cutoff_place(hurst: float, ratio: int) -> dict[str, Any]:
+    """Where the loops of a cut-off are: at H = 0.8 and 100 among those of `turns`."""
+    if ratio < 100:
+        return {"campaign": "cutoff", "hurst": hurst, "ratio": ratio}
+    if hurst < 0.5:
+        return {"campaign": "cutoff100", "hurst": hurst}
+    return {
+        "campaign": "turns",
+        "hurst": hurst,
+        "work_of_adhesion": 0.04,
+        "max_penetration": 0.8,
+    }
+
+
 def cutoff(study: Study) -> Table:
     """Loss against the short-wave cut-off."""
     rows = []
     for hurst in (0.4, 0.8):
         before: dict[int, float] = {}
-        for ratio in (10, 30, 100, 300):
-            name = "cutoff300" if ratio == 300 else "cutoff"
-            place = {"campaign": name, "hurst": hurst, "ratio": ratio}
+        for ratio in CUTOFFS:
+            place = cutoff_place(hurst, ratio)
             loss = study.by_realisation("loss_dimensionless", **place)
             if not loss:
                 continue
@@ -385,6 +446,8 @@ TABLES: dict[str, Callable[[Study], Table]] = {
     "campaigns": campaigns,
     "readings": main_readings,
     "without": without,
+    "stress": stress,
+    "load": under_load,
     "monotony": monotony,
     "mechanisms": mechanisms,
     "turning_point": turning_point,
