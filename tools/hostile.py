@@ -20,7 +20,7 @@ from adhesis import (
 from solver.method import ContactState, PathError
 from tests.support.explicit_solution import explicit_openings
 
-TIGHT = 4  # every so many scenes are followed again, a hundred times as accurately
+TIGHT = 4  # every so many scenes are followed again, to 1e-5 or a hundred times as accurately
 GRID = 20
 _LOOKED_AT = 6  # states, and those at jumps
 _MOST_NODES = 3000  # of the independent openings
@@ -65,7 +65,7 @@ def draw(seed: int, number: int) -> Scene:
         depth = float(10 ** rng.uniform(-4, -1))
     elif kind == 1:
         depth = 1 - float(10 ** rng.uniform(-6, -1))
-    n0 = int(rng.integers(1, 5 if kind == 3 else 9))
+    n0 = int(rng.integers(1, 5 if kind == 3 else 7))
     most = 12 if kind == 3 else int(rng.choice([12, 40, 250], p=[0.82, 0.16, 0.02]))
     ratio = int(min(np.ceil(10 ** rng.uniform(0, 1.8)), most // n0))
     rough = (-5, -3.7) if kind == 2 else (-7, -5)
@@ -171,7 +171,7 @@ def judge(scene: Scene, number: int) -> dict[str, Any]:
         found |= {"audit": loop.audit_residual, "drops": loop.loss_from_drops}
         if number % TIGHT == 0:
             found["kind"] = "tight"
-            _compare(found, loop, follow(scene, 1e-2 * scene.accuracy)[0])
+            _compare(found, loop, follow(scene, min(1e-5, 1e-2 * scene.accuracy))[0])
         elif number % GRID == 1 and scene.n0 * scene.ratio <= 40 and scene.g > 0.03:
             found["kind"] = "grid"
             _compare(found, loop, follow(scene, max(scene.accuracy, 1e-3), "grid")[0])

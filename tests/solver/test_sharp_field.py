@@ -9,9 +9,9 @@ from adhesis import Problem, self_affine_profile, single_wave
 from solver.grid.method import GridMethod
 from solver.sharp.coordinate import map_gaps, theta_at
 from solver.sharp.field import FIXED, GapField, Hold
-from solver.sharp.opening import fine_opening, work_of_gaps
+from solver.sharp.opening import fine_opening, sum_modes, work_of_gaps
 from solver.sharp.source import StressSource, gap_moments
-from tests.support.explicit_solution import explicit_solution
+from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.scenes import HALF_SPACE
 
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
@@ -73,6 +73,20 @@ def test_field_equals_the_explicit_solution(patches):
     assert np.abs(field.opening - opening).max() < 1e-11 * np.abs(opening).max()
     # p̄ = ±c_0 up to the factors 2 of the scaled product T
     assert abs(abs(c[0]) / 2**patches / abs(field.pressure) - 1) < 1e-10
+
+
+def test_openings_equal_the_explicit_solution():
+    """Closed forms of two kinds give the same gap everywhere, from profile and edges alone."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=5, h_rms=1e-6, seed=2)
+    separation = 0.6 * profile.h_max * profile.q0
+    gaps = np.array([[0.3, 0.8], [1.0, 2.0], [2.3, 5.1]])
+    field = GapField(StressSource(profile), gaps, separation, 1e-13)
+    theta, opening = explicit_openings(profile, gaps, separation)
+    assert np.all(np.diff(theta, axis=1) > 0)
+    for k in range(len(gaps)):
+        modes = fine_opening(field, k).modes
+        inside = sum_modes(field.solution.table[k], theta[k, 1:-1], modes)
+        assert np.abs(inside - opening[k, 1:-1]).max() < 1e-10 * np.abs(opening).max()
 
 
 def test_field_converges_with_its_tolerance(source, separation):

@@ -4,9 +4,9 @@ A scene is drawn from the seed and its number alone; what repeats one is printed
 loop ends in time and without a crash; that stresses, energies and losses are finite, drops are not
 negative, and states come in order; that surfaces nowhere overlap (by an independent solution of
 the field) and contact is not lost below s = h_max; that loop integral and sum of drops agree within
-``loss_error``; for every fourth scene that a run a hundred times as accurate agrees within both
-errors, where nothing raced; and for every twentieth that ``grid`` does. A path that is refused
-(PathError) is counted.
+``loss_error``; for every fourth scene that a run to 1e-5, or a hundred times as accurate, agrees
+within both errors, where nothing raced; and for every twentieth that ``grid`` does. A path that is
+refused (PathError) is counted.
 
     python tools/fuzz/loops.py --seed N [--scenes 2000] [--log FILE] [--number K]
 """
@@ -82,7 +82,7 @@ def calibration(found: list[dict[str, Any]]) -> str:
         return "loss_error: nothing to compare"
     ratio = np.array([f["loss_error"] / max(f["off"], 1e-300) for f in calm])
     return (
-        f"loss_error against runs a hundred times as accurate: {np.sum(ratio >= 1)} of {len(calm)} "
+        f"loss_error against far more accurate runs: {np.sum(ratio >= 1)} of {len(calm)} "
         f"losses within it, median {np.median(ratio):.2g} times the distance; "
         f"{len(compared) - len(calm)} loops with races left out"
     )

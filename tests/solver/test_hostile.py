@@ -1,0 +1,37 @@
+"""Scenes far from the ordinary, as `make fuzz` draws them; that the judge sees what is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from adhesis import run_loop
+from solver.sharp.method import SharpMethod
+from tools.hostile import draw, independent_clearance, judge
+
+
+@pytest.mark.parametrize("number", [2, 3, 4, 7])
+def test_a_hostile_loop_keeps_every_promise(number):
+    """Ends, no overlap, in order, audited; every fourth beside a far more accurate run."""
+    scene = draw(5, number)
+    found = judge(scene, number)
+    assert found["wrong"] == []
+    assert found["kind"] == ("tight" if number % 4 == 0 else "loop")
+
+
+def test_an_overlap_is_seen_without_the_method():
+    """Edges held, a state that is pressed down by a tenth of h_max overlaps."""
+    scene = draw(5, 2)
+    problem = scene.problem()
+    method = SharpMethod(problem)
+    states = []
+    run_loop(
+        method, max_penetration=0.3, load_steps=4, on_state=lambda _, state: states.append(state)
+    )
+    h_max = problem.profile.h_max
+    state = max(states, key=lambda s: (s.patches > 0) * np.diff(s.edges, axis=1).sum())
+    assert independent_clearance(method, state) >= 0
+    down = replace(state, separation=state.separation - 0.5 * h_max)
+    assert independent_clearance(method, down) < -1e-2
