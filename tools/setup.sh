@@ -160,7 +160,8 @@ need_slurm() {
     [ "$slurm" = yes ] && ! command -v slurmctld >/dev/null && [ ! -e .setup/no-slurm ] && can_apt
 }
 install_slurm() {
-    if ! step slurm "system packages for the test of the batch script: $SLURM" apt_install $SLURM; then
+    say "system packages for the test of the batch script: $SLURM"
+    if ! step slurm "system packages for that test" apt_install $SLURM; then
         # Tried once: the test is skipped and says so, and set-up stays quick.
         touch .setup/no-slurm
     fi
@@ -226,13 +227,22 @@ missing_system_packages() {
     wanted=$(missing $wanted)
 }
 
+# Python first: what needs no MPI goes on while the rest is installed.
 wanted=
 if can_apt; then missing_system_packages; fi
-if [ -n "$wanted" ]; then
-    part system "system packages ${wanted% }" apt_install $wanted
-    # A Python that is there and complete need not wait.
-    if [[ $wanted != *python3* ]] && find_python && has_venv; then begin_tools; fi
-    finish system || warn "apt-get could not install ${wanted% } (see .setup/system.log)"
+for name in $wanted; do
+    if [[ $name = python3* ]]; then pythons+=" $name"; else others+=" $name"; fi
+done
+if [ -n "${pythons:-}" ]; then
+    say "system packages for Python:$pythons"
+    step python "system packages for Python" apt_install $pythons ||
+        warn "apt-get could not install$pythons (see .setup/python.log)"
+fi
+if [ -n "${others:-}" ]; then
+    say "system packages:$others"
+    part system "system packages" apt_install $others
+    if find_python && has_venv; then begin_tools; fi
+    finish system || warn "apt-get could not install$others (see .setup/system.log)"
 fi
 find_python || die "Python 3.11 or newer is missing (say which with PYTHON=…)"
 has_venv || die "the venv module of $python is missing (Debian: apt-get install python3-venv)"
