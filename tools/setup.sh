@@ -313,7 +313,7 @@ part kernels "compiling the solver" compile_kernels
 part rest "all other packages" install_rest
 required rest
 if finish kernels; then
-    say "$(tail -n 1 .setup/kernels.log)"
+    say "$(grep '^compiled' .setup/kernels.log | tail -n 1)"
 else
     warn "the solver is not compiled yet (see .setup/kernels.log); the first loop does it"
 fi
