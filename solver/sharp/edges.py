@@ -28,7 +28,7 @@ from solver.sharp.source import StressSource
 from solver.sharp.window import descend_many
 from solver.sharp.yielding import between_edges
 
-MANY = 40  # from so many gaps on, windows and the tree of gaps replace dense matrices
+MANY = 30  # from so many gaps on, windows and the tree of gaps replace dense matrices
 CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min
 _NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
 _DESCENT_LIMIT = 100_000
