@@ -97,6 +97,24 @@ def test_no_state_overlaps_where_narrow_gaps_close_fast():
     assert losses[0] == pytest.approx(losses[1], rel=1e-3)
 
 
+def test_a_touch_on_the_last_step_to_a_fold_is_found_with_edges_held():
+    profile = profile_of(0.35, 3, 2, 7496, "rayleigh")
+    method = SharpMethod(Problem(profile, SOLID, 1e-3))
+    h_max = profile.h_max * profile.q0
+    state = method.follow(method.detached(profile.h_max), 0.8 * profile.h_max).states[-1]
+    point = method.edges.equilibrium(state.internal.gaps, 0.8 * h_max, 0.01)
+    clear, _ = method.nucleation.least(point.field)
+    assert clear > 1e-2 * h_max
+    assert method.nucleation.located_held(point, clear, 0.799 * h_max) is None
+    found = method.nucleation.located_held(point, clear, 0.2 * h_max)
+    assert 0.2 * h_max < found.point.at < 0.8 * h_max
+    np.testing.assert_array_equal(found.point.gaps, point.gaps)
+    _, opening = explicit_openings(profile, point.gaps, found.point.at)
+    touch = found.touches[0]
+    assert touch.opening == pytest.approx(0, abs=1e-6 * h_max)
+    assert opening.min() == pytest.approx(0, abs=1e-4 * h_max)  # at the nodes next to the touch
+
+
 def test_states_come_in_the_order_of_the_path_at_any_accuracy():
     """A touch is located before states beyond it are recorded; the audit falls with accuracy."""
     profile = profile_of(0.209, 5, 13, 675982, "rayleigh")
