@@ -19,7 +19,7 @@ import numpy as np
 from solver.profile import Array, self_affine_profile
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.far import solve_many
-from solver.sharp.field import FIXED, RULES, choose_kinds, solve_plain
+from solver.sharp.field import FIXED, RULES, Solution, choose_kinds, solve_plain
 from solver.sharp.source import StressSource
 from solver.sharp.yielding import newton_many
 
@@ -78,7 +78,7 @@ def main() -> None:
             solve_plain(*plain)
             dense_time, solution = _best(lambda a=plain: solve_plain(*a), 2)
             dense = f"{1e3 * dense_time:.2f}"
-            opening = solution[-1]
+            opening = Solution(*solution).opening
             difference = f"{np.abs(of.opening - opening).max() / np.abs(opening).max():.0e}"
         print(
             f"{count:6d} {len(of.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
