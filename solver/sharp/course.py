@@ -20,8 +20,8 @@ class Course:
 
     Parameters
     ----------
-    earlier : Point or None
     point : Point
+        With the point before it, if that is known.
 
     Attributes
     ----------
@@ -31,12 +31,13 @@ class Course:
         Distance in d of the fold beyond ``point``; inf if none is seen.
     """
 
-    def __init__(self, earlier: Point | None, point: Point) -> None:
+    def __init__(self, point: Point) -> None:
         self.point = point
         self.way, self.ahead, self._fold = 0.0, np.inf, np.inf
         rate = point.rate
         lead = int(np.argmax(np.abs(rate)))
         self.fastest = abs(float(rate[lead]))
+        earlier = point.before
         if earlier is None or earlier.rate.shape != rate.shape or earlier.at == point.at:
             return
         self.way = point.at - earlier.at

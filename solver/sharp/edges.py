@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +77,13 @@ class FullContact(Exception):
     """The last gap of the period closes: no state of gaps is left."""
 
 
+class Before(NamedTuple):
+    """d, and the rate of every edge, at an earlier point of a branch; see :class:`Point`."""
+
+    at: float
+    rate: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Point:
     """A stable equilibrium on a branch.
@@ -91,6 +99,8 @@ class Point:
         dY/dd along the branch: Y is p, under a load q0 s.
     clearance : float
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
+    before : Before, optional
+        The point before it on its branch.
     """
 
     at: float
@@ -98,6 +108,7 @@ class Point:
     rate: Array
     slope: float
     clearance: float = 0.0
+    before: Before | None = None
 
     @property
     def gaps(self) -> Array:
@@ -118,6 +129,12 @@ class Point:
         """Return this point with its clearance known."""
         point = copy(self)
         object.__setattr__(point, "clearance", clearance)
+        return point
+
+    def behind(self, before: Before | None) -> Point:
+        """Return this point with the one before it known."""
+        point = copy(self)
+        object.__setattr__(point, "before", before)
         return point
 
     def predicted(self, at: float) -> Array:

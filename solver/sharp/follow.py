@@ -9,7 +9,7 @@ import numpy as np
 from solver.jumps import Branch
 from solver.method import ContactState
 from solver.sharp.course import Course
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
+from solver.sharp.edges import CORRECTED, Before, EdgeMechanics, Point
 from solver.sharp.jump import Jumps
 from solver.sharp.local import Astray, LocalPoint, advance, confirmed
 from solver.sharp.states import Memory, States, Trace
@@ -134,6 +134,11 @@ class Follower:
     ) -> None:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.resolution = resolution
+        self._last: tuple[Memory, Point] | None = None
+
+    def remembered(self, memory: Memory) -> Point | None:
+        """Point of the state that was handed out last, if it is the one with this memory."""
+        return self._last[1] if self._last is not None and self._last[0] is memory else None
 
     def equilibrium(self, point: Point, at: float) -> Point | None:
         """Stable equilibrium at q0 s = ``at`` near the one predicted from ``point``."""
@@ -150,7 +155,7 @@ class Follower:
         wanted = np.inf
         finest = self.resolution.jump
         lost = np.inf  # distance of the nearest d at which no equilibrium was found
-        course = Course(None, point)
+        course = Course(point)
         walk = _Walk(point)
         shown = point
         windows = len(point.gaps) >= self.edges.many
@@ -162,7 +167,7 @@ class Follower:
                 if reached is None and abs(step) <= finest and windows:
                     # a window's verdict that this is a fold is not taken for that of all edges
                     point, windows = walk.confirm(), False
-                    course = Course(None, point)
+                    course = Course(point)
                     continue
                 if reached is not None:
                     error = self._trapezoid_error(shown, reached)
@@ -176,7 +181,7 @@ class Follower:
             except Astray:
                 far = point.at if reached is None else reached.at
                 point, windows, lost = walk.back(), False, np.inf
-                course = Course(None, point)
+                course = Course(point)
                 wanted = 0.5 * abs(far - point.at)
                 continue
             if reached is None:
@@ -200,6 +205,7 @@ class Follower:
             if coarse:
                 wanted = 0.5 * abs(step)
                 continue
+            reached = reached.behind(Before(point.at, point.rate))
             walk.add(reached, closed)
             if error > 1 or there:
                 exact = None
@@ -219,7 +225,7 @@ class Follower:
                 last = trace.states[-1]
                 after = self.jumps.run(trace, last, small, reached.at, target.branch)
                 return reached.at, after
-            course = Course(point, reached)
+            course = Course(reached)
             point, wanted = reached, 2 * abs(step)
             # only before a fold is a failure more than that of a prediction
             lost = lost - abs(step) if np.isfinite(course.ahead) else np.inf
@@ -227,7 +233,8 @@ class Follower:
         trace.states += walk.pending
         # What has not closed since the last look need not be looked at again.
         point = point.cleared(max(walk.clearance - walk.closed, 0.0))
-        remembered = Memory(point.field.gaps, point.clearance)
+        remembered = Memory(point.field.gaps, point.clearance, point.before)
+        self._last = remembered, point
         trace.states[-1] = replace(trace.states[-1], internal=remembered)
         return target.at, point
 
@@ -300,10 +307,11 @@ class Follower:
         Returns the point after the jump, and the separation to which the jump is to be located:
         below ``finest`` the jump was found too late for its drop, and was not recorded.
         """
-        last = self.states.of_point(point)
-        before = self.states.shifted(last, point.field, at)
         states, jumps = len(trace.states), len(trace.jumps)
-        trace.states += [last, before]
+        if not states or trace.states[-1].internal.gaps is not point.field.gaps:
+            trace.states.append(self.states.of_point(point))
+        before = self.states.shifted(trace.states[-1], point.field, at)
+        trace.states.append(before)
         after = self.jumps.run(trace, before, point.field.gaps, at, branch)
         late = self._late(before, trace.states[-1], abs(at - point.at))
         drop = trace.jumps[-1].energy_drop

@@ -201,9 +201,11 @@ class SharpMethod(Method):
             point = self.jumps.run(trace, before, np.empty((0, 2)), at, target.branch, highest)
         else:
             gaps = state.internal.gaps
-            point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
-            if point is not None:
-                point = point.cleared(state.internal.clearance)
+            point = self.follower.remembered(state.internal)
+            if point is None:
+                point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
+                if point is not None:
+                    point = point.cleared(state.internal.clearance).behind(state.internal.before)
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, at))
                 trace.states.append(before)
