@@ -20,7 +20,15 @@ from scipy.fft import dst, next_fast_len
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp.coordinate import one_minus_plus, theta_at
+from solver.sharp.coordinate import (
+    ALPHA,
+    LEFT,
+    LEFT_PATCH,
+    RIGHT,
+    RIGHT_PATCH,
+    one_minus_plus,
+    theta_at,
+)
 from solver.sharp.field import RULES, GapField, Kinds, Rules
 from solver.sharp.source import interpolate
 
@@ -28,6 +36,10 @@ ENERGY_NODES = 3.0  # sine nodes per shortest wave: two resolve it, the rest is 
 SHAPE_NODES = 6.0  # nodes per shortest wave that bracket every local minimum of the opening
 _LEAST = 64
 _MANY_NODES = 500
+
+_ANEW = 64  # rotations of a cosine before it is computed anew
+_PER_UNIT = 32  # entries of the table of exp(y) - 1 for a unit of y
+_EXPM1 = np.expm1(np.arange(20 * _PER_UNIT) / _PER_UNIT)
 
 
 @dataclass(frozen=True)
@@ -76,31 +88,64 @@ def _fewest_nodes(table: Array, top: int, per_wave: float) -> Kinds:
     return out
 
 
+@compiled
 def _sizes(fewest: Kinds) -> Kinds:
     """Numbers of nodes, no fewer, for which the transform is fast and which many gaps share.
 
     That is so where one more than the number of nodes has small factors.
     """
-    power = 2 ** np.floor(np.log2(fewest + 1.0)).astype(np.int64)
-    finer = fewest > _MANY_NODES  # wide gaps are few, and it is their nodes that cost
-    steps = np.where(finer[:, None], [9, 10, 12, 15, 16], [12, 12, 12, 16, 16])  # in eighths
-    some = power[:, None] * steps // 8
-    first = (some < fewest[:, None] + 1).sum(axis=1)
-    return np.asarray(some[np.arange(len(some)), first] - 1)
+    out = np.empty(fewest.shape[0], dtype=np.int64)
+    for k in range(fewest.shape[0]):
+        wanted = fewest[k] + 1
+        eighth = 1
+        while 16 * eighth <= wanted:
+            eighth *= 2
+        # wide gaps are few, and it is their nodes that cost
+        steps = (9, 10, 12, 15, 16) if fewest[k] > _MANY_NODES else (12, 12, 12, 16, 16)
+        for step in steps:
+            out[k] = step * eighth - 1
+            if out[k] >= fewest[k]:
+                break
+    return out
 
 
 @compiled
 def _fine_nodes(table: Array, count: int) -> tuple[Array, Array]:
-    """``count`` sine nodes of each gap: θ, falling, and dθ/dt, shape (gaps, count)."""
+    """``count`` sine nodes of each gap: θ, falling, and dθ/dt, shape (gaps, count).
+
+    As :func:`theta_at`, many at a time: cosines by rotation, computed anew every so many nodes, and
+    exp(y) - 1 from a table.
+    """
     theta = np.empty((table.shape[0], count))
     span = np.empty((table.shape[0], count))
-    for i in range(count):
-        t = np.pi * (i + 1) / (count + 1)
-        cosine = np.cos(t)
-        sine = np.sin(t)
-        for k in range(table.shape[0]):
-            theta[k, i], stretch = theta_at(table[k], cosine)
-            span[k, i] = stretch * sine
+    turn = np.pi / (count + 1)
+    turned = np.cos(turn), np.sin(turn)
+    for k in range(table.shape[0]):
+        left, right = table[k, LEFT], table[k, RIGHT]
+        alpha = 2 * table[k, ALPHA]
+        c = 0.0
+        s = 0.0
+        for i in range(count):
+            if i % _ANEW == 0:
+                c = np.cos(turn * (i + 1))
+                s = np.sin(turn * (i + 1))
+            from_left = c < 0
+            own = table[k, LEFT_PATCH] if from_left else table[k, RIGHT_PATCH]
+            other = table[k, RIGHT_PATCH] if from_left else table[k, LEFT_PATCH]
+            far = right - left + other
+            y = alpha * (1 + c if from_left else 1 - c)
+            place = int(y * _PER_UNIT)
+            if place < _EXPM1.shape[0]:
+                x = y - place / _PER_UNIT
+                grown = 1 / 24 + x * (1 / 120 + x * (1 / 720 + x / 5040))
+                grown = x * (1 + x * (0.5 + x * (1 / 6 + x * grown)))
+                grown = _EXPM1[place] + grown * (1 + _EXPM1[place])
+            else:
+                grown = np.expm1(y)
+            r = grown * own * far / (far + (1 + grown) * own)
+            span[k, i] = alpha * (own + r) * (far - r) / (own + far) * s
+            theta[k, i] = left + r if from_left else right - r
+            c, s = c * turned[0] - s * turned[1], s * turned[0] + c * turned[1]
     return theta, span
 
 
@@ -120,9 +165,9 @@ def sines(field: GapField, per_wave: float, gaps: Kinds | None = None) -> Iterat
     source, table = field.source, field.solution.table
     gaps = np.arange(len(table)) if gaps is None else gaps
     sizes = _sizes(_fewest_nodes(table[gaps], source.top, per_wave))
-    for size in np.unique(sizes):
+    for size in sorted(set(sizes.tolist())):
         some = gaps[sizes == size]
-        theta, span = _fine_nodes(table[some], int(size))
+        theta, span = _fine_nodes(table[some], size)
         load = _sampled(theta, span, source.panels.width, source.panels.stress)
         yield Sines(some, theta, span, dst(load, type=1) / (size + 1))
 

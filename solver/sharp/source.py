@@ -239,9 +239,26 @@ def _value(coefficients: Array, place: float) -> float:
 @compiled
 def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
     """Values of a piecewise series at each angle, shape (len(theta),)."""
-    out = np.empty(theta.shape[0])
-    for i in range(theta.shape[0]):
-        out[i] = _value(coefficients, theta[i] / width)
+    count = theta.shape[0]
+    out = np.empty(count)
+    last = coefficients.shape[0] - 1
+    for i in range(0, count - 1, 2):  # two recurrences side by side: each waits for its last term
+        place = theta[i] / width
+        other_place = theta[i + 1] / width
+        k = int(np.floor(place))
+        other_k = int(np.floor(other_place))
+        x = 2 * (place - k) - 1
+        y = 2 * (other_place - other_k) - 1
+        c = coefficients[k & last]
+        d = coefficients[other_k & last]
+        b1 = b2 = e1 = e2 = 0.0
+        for j in range(c.shape[0] - 1, 0, -1):
+            b1, b2 = 2 * x * b1 - b2 + c[j], b1
+            e1, e2 = 2 * y * e1 - e2 + d[j], e1
+        out[i] = x * b1 - b2 + c[0]
+        out[i + 1] = y * e1 - e2 + d[0]
+    if count % 2 == 1:
+        out[count - 1] = _value(coefficients, theta[count - 1] / width)
     return out
 
 
