@@ -26,8 +26,8 @@ from solver.sharp.source import Panels
 _REUSES = 8  # running steps that share one tangent
 # Longer steps, in longest unchecked ones, are looked at for a minimum that they leap over.
 _UNCHECKED_ALONE = 2.0  # of an edge that runs alone
-_STRIDE = 4.5  # longest of all
-_STRIDE_ALONE = 9.0
+_STRIDE = 3.0  # longest of all
+_STRIDE_ALONE = 6.0
 _RUNS = 0.25  # edges that move by this share of the longest motion run
 _NOISE = 1e-3  # a rise of the energy below this share of the work done both ways is rounding
 _TIE = 1e-3  # two ways off a saddle whose gains differ by less are equal

@@ -155,7 +155,7 @@ class Follower:
         wanted = np.inf
         finest = self.resolution.jump
         lost = np.inf  # distance of the nearest d at which no equilibrium was found
-        course = Course(point)
+        course = Course(point)  # straight at first: short steps there keep the integral exact
         walk = _Walk(point)
         shown = point
         windows = len(point.gaps) >= self.edges.many
@@ -233,8 +233,8 @@ class Follower:
         trace.states += walk.pending
         # What has not closed since the last look need not be looked at again.
         point = point.cleared(max(walk.clearance - walk.closed, 0.0))
-        remembered = Memory(point.field.gaps, point.clearance, point.before)
-        self._last = remembered, point
+        remembered = Memory(point.field.gaps, point.clearance)
+        self._last = remembered, point.behind(None)
         trace.states[-1] = replace(trace.states[-1], internal=remembered)
         return target.at, point
 

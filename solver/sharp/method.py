@@ -205,7 +205,7 @@ class SharpMethod(Method):
             if point is None:
                 point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
                 if point is not None:
-                    point = point.cleared(state.internal.clearance).behind(state.internal.before)
+                    point = point.cleared(state.internal.clearance)
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, at))
                 trace.states.append(before)

@@ -10,7 +10,7 @@ from solver.jumps import Branch, Jump
 from solver.method import ContactState
 from solver.problem import Problem
 from solver.profile import Array
-from solver.sharp.edges import Before, Counters, Point
+from solver.sharp.edges import Counters, Point
 from solver.sharp.field import GapField, Hold
 from solver.sharp.opening import work_of_gaps
 from solver.sharp.source import StressSource
@@ -30,11 +30,10 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What a state remembers: the ends of its gaps; clearance and ``before`` of its point."""
+    """What a state remembers: the ends of its gaps, and their clearance (``Point.clearance``)."""
 
     gaps: Array
     clearance: float
-    before: Before | None = None
 
 
 def hold_of(problem: Problem) -> Hold:
