@@ -214,3 +214,14 @@ def test_grid_leaves_equal_crests_as_sharp_does():
     problem = equal_waves(4, 499277, 0.00879)
     grid = run_loop(GridMethod(problem, nodes_per_wave=256), max_penetration=0.8, load_steps=10)
     assert grid.loss_dimensionless == pytest.approx(loss(problem), rel=5e-3)
+
+
+def test_a_coarse_grid_tells_what_it_misses_on_equal_crests():
+    """128 nodes: 4 in the first equilibrium width, and the loss is a quarter off."""
+    problem = equal_waves(4, 499277, 0.00879)
+    exact = loss(problem)
+    for nodes in (128, 512):
+        grid = run_loop(GridMethod(problem, nodes=nodes), max_penetration=0.8, load_steps=10)
+        told = grid.loss_error / grid.loss
+        assert abs(grid.loss_dimensionless / exact - 1) < told < 0.5
+        assert any("numerical error of the loss" in text for text in grid.warnings)
