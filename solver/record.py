@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.jumps import Branch, Jump
-from solver.method import ContactState, Path
+from solver.method import ContactState, Path, PathError
 from solver.problem import Problem
 from solver.profile import Array
 
@@ -114,9 +114,18 @@ class Record:
         )
 
     def work(self, problem: Problem) -> float:
-        """-∫ Y dx over the states, in J/m² (:mod:`solver.control`): the work of what moves it."""
+        """-∫ Y dx over the states, in J/m² (:mod:`solver.control`): the work of what moves it.
+
+        Raises
+        ------
+        PathError
+            If a state without contact lies below s = h_max, where surfaces overlap.
+        """
         control, h_max = problem.control, problem.profile.h_max
         separation, mean_stress = self.column("separation"), self.column("mean_stress")
+        free = separation[self.column("patches") == 0]
+        if not control.is_load and free.min(initial=np.inf) < h_max * (1 - _NEAR):
+            raise PathError(f"without contact at s = {free.min() / h_max:.9g} h_max: there is none")
         return -integral(
             control.prescribed(separation, mean_stress),
             control.conjugate(separation, mean_stress, h_max),

@@ -198,6 +198,23 @@ class _Upwards(ExactWave):
         return Path(path.states, down + up, 0.0)
 
 
+class _Falling(ExactWave):
+    """Loses its contact half-way up."""
+
+    def follow(self, state: ContactState, separation: float) -> Path:
+        path = super().follow(state, separation)
+        h_max = self.problem.profile.h_max
+        if separation > state.separation and separation > 0.7 * h_max:
+            return Path((self.detached(separation),), ())
+        return path
+
+
+def test_a_loop_without_contact_below_the_crests_has_no_loss():
+    """There is no such state: the loop ends with an error, not with a number."""
+    with pytest.raises(PathError, match=r"without contact at s = 0\.7"):
+        run_loop(_Falling(exact(0.2).problem), max_penetration=0.8, load_steps=10)
+
+
 def test_a_negative_drop_counts_in_the_error_and_is_said():
     """It is neither hidden from the sum of drops, which closes here, nor taken for nothing."""
     problem = exact(0.2).problem
