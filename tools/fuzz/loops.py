@@ -33,7 +33,7 @@ import numpy as np
 from tools.hostile import draw, judge
 
 LIMIT = 120.0  # s of CPU time of one scene, all its runs together
-_PATIENCE = 5  # times as many seconds of the clock, should a process only sleep
+_PATIENCE = 20  # times as many seconds of the clock, should a process only sleep
 
 
 def _work(tasks: Any, results: Any) -> None:
@@ -71,7 +71,11 @@ class Worker:
                 spent = self._spent() - started
         self.process.kill()
         self.process.join()
-        return {"wrong": [f"not done after {LIMIT:.0f} s"], "kind": "late", "seconds": spent}
+        return {
+            "wrong": [f"not done after {spent:.0f} s of CPU time"],
+            "kind": "late",
+            "seconds": spent,
+        }
 
 
 def calibration(found: list[dict[str, Any]]) -> str:
