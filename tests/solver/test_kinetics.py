@@ -99,9 +99,10 @@ def test_equivalent_edges_give_equivalent_ways_off_a_saddle(turn):
     assert step[lead] == pytest.approx(0.1)
 
 
-def test_the_hessian_is_the_derivative_of_the_forces():
-    profile = self_affine_profile(0.8, period=2e-3, n0=3, ratio=4, seed=1, h_rms=1e-6)
-    method = SharpMethod(Problem(profile, SOLID, 0.01), accuracy=1e-6)
+@pytest.mark.parametrize(("h_rms", "gamma"), [(1e-6, 0.01), (5e-5, 10.0)])  # flat, and steep
+def test_the_hessian_is_the_derivative_of_the_forces(h_rms, gamma):
+    profile = self_affine_profile(0.8, period=2e-3, n0=3, ratio=4, seed=1, h_rms=h_rms)
+    method = SharpMethod(Problem(profile, SOLID, gamma), accuracy=1e-6)
     edges, panels = method.edges, method.edges.source.panels
     gaps = np.array([[0.3, 1.7], [2.1, 4.4], [5.0, 6.4]])
     kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
@@ -123,6 +124,9 @@ def test_the_hessian_is_the_derivative_of_the_forces():
         way[e] = h
         slope = (forces(moved_gaps(gaps, way), 1)[3] - forces(moved_gaps(gaps, -way), 1)[3]) / h / 2
         np.testing.assert_allclose(matrix[:, e], slope, atol=2e-4 * np.abs(matrix).max())
+    # On the steep one the slope of what must be paid counts; its sign would be noticed.
+    share = np.abs(2 * residual * drift).max() / np.abs(matrix).max()
+    assert (share > 1e-3) == (h_rms > 1e-5)
 
 
 # ------------------------------------------------------------------ a race
