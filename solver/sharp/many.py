@@ -14,7 +14,6 @@ from solver.sharp.source import Panels
 from solver.sharp.yielding import newton_many
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
-_SHARE = 0.1  # of what an equilibrium may move with the error of the field
 
 
 @compiled
@@ -35,8 +34,6 @@ def equilibrium_many(
     last = np.inf
     found = False
     steps = 0
-    # so much is below the error of the field, and each correction here costs as all gaps do
-    settled = max(law.settled, _SHARE * law.coarse)
     while True:
         steps += 1
         of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
@@ -45,8 +42,7 @@ def equilibrium_many(
         size = np.abs(step).max()
         if not np.isfinite(of.pressure):
             break
-        stalled = size <= law.coarse and size > 0.3 * last
-        if size <= settled or stalled:
+        if size <= law.coarse:
             found = stable or not patient
             break
         if not patient and size <= law.near:
@@ -61,8 +57,10 @@ def equilibrium_many(
         if not narrowest(moved) > 0:
             break
         at = moved
-        if stable and last < np.inf and size * (size / last) ** 2 <= settled:
-            # the iteration converges quadratically: what is left is less than that
+        # The iteration converges quadratically. A correction that is expected to be no larger than
+        # what the field's error makes is not asked for: it would cost as much as this one.
+        expected = size * (size / last) ** 2 if last < np.inf else size * size / law.longest
+        if stable and expected <= law.coarse:
             steps += 1
             of, _ = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
             found = np.isfinite(of.pressure)
