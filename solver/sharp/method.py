@@ -206,6 +206,8 @@ class SharpMethod(Method):
                 point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
                 if point is not None:
                     point = point.cleared(state.internal.clearance)
+            else:
+                at = point.at  # but for rounding the place of the state
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, at))
                 trace.states.append(before)
