@@ -7,7 +7,10 @@ import re
 from pathlib import Path
 
 from tools.study.data import Study
+from tools.study.findings import findings
 from tools.study.tables import TABLES, Table, all_readings
+
+ALL = {"findings": findings, **TABLES}
 
 _PLACE = re.compile(r"<!-- table (\w+) -->\n.*?<!-- end -->", re.DOTALL)
 
@@ -24,7 +27,7 @@ def filled(text: str, study: Study) -> str:
 
     def table(match: re.Match[str]) -> str:
         name = match[1]
-        return f"<!-- table {name} -->\n{markdown(TABLES[name](study))}\n<!-- end -->"
+        return f"<!-- table {name} -->\n{markdown(ALL[name](study))}\n<!-- end -->"
 
     return _PLACE.sub(table, text)
 

@@ -16,6 +16,8 @@ TURNS = (0.6, 0.7, 0.8, 0.9)
 C0 = 1e-13
 DRAWS, SEED, OFF_DIAGONAL, OF_PAPER = 200_000, 2016, 0.8, 10
 FAR = 6.0
+FEWEST = 6  # realisations of a cell that is held against the paper
+LEAST = 1e-3  # eigenvalue of a correlation matrix from cells of different realisations
 BEYOND = 1.5  # works of adhesion are extrapolated by no larger factor
 COMPATIBLE, EXCLUDED = 0.05, 0.001
 Cell = tuple[float, float]
@@ -32,7 +34,7 @@ class Reading:
     cells : tuple of (H, γ)
         Of the paper's, those that were computed.
     losses : array, shape (cells, realisations)
-        W~.
+        W~; NaN where a cell lacks a realisation.
     """
 
     name: str
@@ -41,13 +43,13 @@ class Reading:
 
     @property
     def realisations(self) -> int:
-        """Number of profiles."""
-        return int(self.losses.shape[1])
+        """Number of profiles of the cell that has fewest."""
+        return int(np.isfinite(self.losses).sum(axis=1).min())
 
     @cached_property
     def means(self) -> Array:
         """Mean W~ of each cell."""
-        return np.asarray(self.losses.mean(axis=1))
+        return np.asarray(np.nanmean(self.losses, axis=1))
 
     @cached_property
     def deviation(self) -> Array:
@@ -58,9 +60,21 @@ class Reading:
     @cached_property
     def covariance(self) -> Array:
         """Of the deviation, were the reading right."""
-        relative = np.cov(self.losses / self.means[:, None])
+        away = self.losses / self.means[:, None] - 1
+        there = np.isfinite(away)
+        filled = np.where(there, away, 0.0)
+        count = there.astype(float)
+        shared = count @ count.T
+        # over the realisations that two cells share, about the means of all that each has
+        relative = (filled @ filled.T) / np.maximum(shared - 1, 1)
         shrunk = OFF_DIAGONAL * relative + (1 - OFF_DIAGONAL) * np.diag(np.diag(relative))
-        return np.asarray(shrunk * (1 / OF_PAPER + 1 / self.realisations))
+        own = np.diag(shared)
+        found = shrunk * (1 / OF_PAPER + shared / np.outer(own, own))
+        spread = np.sqrt(np.diag(found))
+        values, vectors = np.linalg.eigh(found / np.outer(spread, spread))
+        sound = (vectors * np.maximum(values, LEAST)) @ vectors.T
+        sound /= np.sqrt(np.outer(np.diag(sound), np.diag(sound)))
+        return np.asarray(sound * np.outer(spread, spread))
 
     @cached_property
     def z(self) -> Array:
@@ -148,15 +162,13 @@ class Losses:
 
 
 def _reading(name: str, of_cell: Callable[[float, float], Series]) -> Reading | None:
-    """Join the cells of a reading over the realisations that all of them have."""
+    """Join the cells of a reading."""
     found = {cell: of_cell(*cell) for cell in TABLE_1}
-    found = {cell: series for cell, series in found.items() if len(series) >= 3}
+    found = {cell: series for cell, series in found.items() if len(series) >= FEWEST}
     if len(found) < 4:
         return None
-    shared = sorted(set.intersection(*(set(series) for series in found.values())))
-    if len(shared) < 3:
-        return None
-    losses = np.array([[series[r] for r in shared] for series in found.values()])
+    every = sorted(set().union(*found.values()))
+    losses = np.array([[series.get(r, np.nan) for r in every] for series in found.values()])
     return Reading(name, tuple(found), losses)
 
 
