@@ -56,6 +56,8 @@ NOT_RUN = {
     "python benchmarks/endurance.py empty": "a quiet machine; test_mpi.py runs it short",
     "python benchmarks/endurance.py campaign jobs/example.toml": "as before",
     "python benchmarks/endurance.py campaign jobs/paper.toml --out paper.h5": "takes minutes",
+    "python -m tools.study collect study": "needs the results files of the study's campaigns",
+    "python -m tools.study page": "tests/project/test_study.py makes the tables anew",
     "adhesis report paper.h5 --to paper --beside beside/*.h5": "needs their results",
     "python examples/measured_profile.py --to out/measured": "test_measured_profile.py",
     "python examples/measured_profile.py trace.csv --to out/measured": "as before",
