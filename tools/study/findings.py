@@ -6,13 +6,14 @@ from collections import Counter
 
 import numpy as np
 
-from tools.study import jumps, monotone
+from tools.study import monotone
 from tools.study.data import Study
 from tools.study.tables import (
     Table,
     cutoff,
     errors,
     every_reading,
+    law_of,
     machine,
     turning_point,
 )
@@ -74,7 +75,7 @@ def findings(study: Study) -> Table:
     quarter = all(abs(_change(b)) < 0.25 * abs(_change(a)) for a, b in zip(loss, pull, strict=True))
     less = all(abs(_change(b)) < abs(_change(a)) for a, b in zip(loss, per, strict=True))
     laws = [
-        jumps.power_law(study.jumps.where(branch=branch), name)
+        law_of(study, branch, name)
         for name in ("energy_drop", "area")
         for branch in ("loading", "unloading")
     ]

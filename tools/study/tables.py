@@ -262,6 +262,12 @@ def turning_point(study: Study) -> Table:
     return ["γ (J/m²)", "H", "n", *(name for name, _ in quantities)], rows
 
 
+@cache
+def law_of(study: Study, branch: str, name: str) -> jumps.PowerLaw:
+    """A power law of the jumps of one branch, worked out once."""
+    return jumps.power_law(study.jumps.where(branch=branch), name)
+
+
 def power_laws(study: Study) -> Table:
     """Fits to the jumps."""
     rows = []
@@ -270,7 +276,7 @@ def power_laws(study: Study) -> Table:
             ("energy_drop", "energy (J/m²)", ""),
             ("area", "area (A/A0)", ""),
         ):
-            law = jumps.power_law(study.jumps.where(branch=branch), name)
+            law = law_of(study, branch, name)
             rows.append(
                 [
                     branch,
