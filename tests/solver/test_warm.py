@@ -27,3 +27,12 @@ def test_after_warming_up_loops_and_fields_compile_nothing(method, stiffness):
         run_loop(chosen, **turning, load_steps=7, on_state=lambda _, state: states.append(state))
         chosen.fields(max(states, key=lambda state: state.patches), chosen.nodes or 512)
     assert seen.functions == 0
+
+
+@pytest.mark.parametrize("method", ["sharp", "grid"])
+@pytest.mark.parametrize("work_of_adhesion", [0.04, 0.0])
+def test_the_loops_that_compile_everything_end(method, work_of_adhesion):
+    """Whatever is compiled already: with and without adhesion the small problem has its loop."""
+    chosen = make_method(method, small_problem(work_of_adhesion))
+    loop = run_loop(chosen, max_penetration=0.8, load_steps=2)
+    assert (loop.loss > 1e-3) is (work_of_adhesion > 0)
