@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import json
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from solver.code_cache import installed_folder
@@ -19,7 +19,7 @@ from solver.compiled import (
 )
 from solver.loop import run_loop
 from solver.material import HalfSpace
-from solver.method import Branch, ContactState, PathError
+from solver.method import Branch, ContactState
 from solver.problem import Problem
 from solver.profile import self_affine_profile
 from solver.registry import make_method
@@ -131,8 +131,6 @@ def _small_loops(method: str) -> None:
         run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
         if isinstance(chosen, SharpMethod) and work_of_adhesion > 0:
             chosen.edges.many = 3  # few enough for this loop: the ways of many gaps
-            # so few gaps are not what these are made for: where they lead does not matter here
-            with suppress(PathError):
-                run_loop(chosen, max_penetration=0.8, load_steps=2)
+            run_loop(chosen, max_penetration=0.8, load_steps=2)
         nodes = chosen.nodes or 256
         chosen.fields(max(states, key=lambda state: state.patches), nodes)
