@@ -23,7 +23,10 @@ from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.linear import is_definite
 from solver.sharp.source import Panels
 
-_REUSES = 8  # running steps that share one tangent
+# Further running steps with one tangent: of an edge that runs alone only the size of its step
+# depends on it, of several the direction, too.
+_REUSES_ALONE = 8
+_REUSES = 1
 # Longer steps, in longest unchecked ones, are looked at for a minimum that they leap over.
 _UNCHECKED_ALONE = 2.0  # of an edge that runs alone
 _STRIDE = 3.0  # longest of all
@@ -72,8 +75,8 @@ def descend(
     ``equal_speeds``: edges out of equilibrium run, all at the same speed (their limit, twice as
     long for one that runs alone), and edges near equilibrium follow them by Newton's step.
 
-    While edges run, a tangent serves several steps, unless an edge turns; the openings are always
-    fresh. A step that raised the energy is taken back and halved.
+    While edges run, a tangent serves several steps, of several edges two, unless an edge turns; the
+    openings are always fresh. A step that raised the energy is taken back and halved.
 
     ``track``, shape (n, 2L), holds the edges that another descent went through. One that has been
     away from it (``astray``) and comes back to it has met it.
@@ -107,7 +110,7 @@ def descend(
     looks = 0
     while fields < most:
         fields += 1
-        held = runners > 0 and reuses < _REUSES
+        held = runners > 0 and reuses < (_REUSES_ALONE if runners == 1 else _REUSES)
         table = map_gaps(gaps)
         kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
         of = solve(gaps, prescribed, law.hold, kinds, 2, rules, panels)
