@@ -70,6 +70,7 @@ PARTS = {
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),
     "bench": Part(("-m ensemble bench --budget 240 --to OUT",), "benchmark.png", "figures"),
+    "study": Part(("-m tools.study figures --to OUT",), "*.png", "study"),
     "paper": Part(_paper(), "paper/*.*", "paper"),
 }
 

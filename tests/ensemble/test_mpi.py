@@ -234,7 +234,8 @@ def test_a_run_that_is_complete_does_not_say_why_it_stopped(tmp_path):
     """The last task ends although the run was told to stop: nothing is left to resume."""
     path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
     words = ("run", path, "--out", tmp_path / "r.h5", "--max-failures", "1")
-    process = adhesis(*words, ranks=3, fake="fail=0.7:0.01:0 deaf=0.7:0.04:0")
+    # the failing task takes so long that the other one has surely begun
+    process = adhesis(*words, ranks=3, fake="fail=0.7:0.01:0 deaf=0.7:0.04:0 step=0.1")
     assert "1 of 2 tasks done, 1 failed" in process.stderr
     assert "stopped early" not in process.stderr
     assert process.returncode == 1

@@ -2,6 +2,7 @@
 
 python -m tools.study collect FOLDER    results files of the campaigns -> docs/study/*.csv
 python -m tools.study page              docs/study/*.csv -> tables of the page, figures
+python -m tools.study figures --to OUT  docs/study/*.csv -> figures
 """
 
 from __future__ import annotations
@@ -19,19 +20,23 @@ def main() -> None:
     collect = commands.add_parser("collect", help="results files to small tables")
     collect.add_argument("folder", type=Path)
     page = commands.add_parser("page", help="small tables to the page and its figures")
-    for command in (collect, page):
+    figures = commands.add_parser("figures", help="small tables to figures")
+    figures.add_argument("--to", type=Path, required=True, help="an existing folder")
+    for command in (collect, page, figures):
         command.add_argument("--study", type=Path, default=STUDY, help="folder of page and tables")
     args = parser.parse_args()
     if args.command == "collect":
         from tools.study.collect import collect_all
 
         collect_all(args.folder, args.study)
-    else:
-        from tools.study.figures import draw_all
+        return
+    from tools.study.figures import draw_all
+
+    if args.command == "page":
         from tools.study.page import write_page
 
         write_page(args.study)
-        draw_all(args.study)
+    draw_all(args.study, args.to if args.command == "figures" else args.study)
 
 
 if __name__ == "__main__":

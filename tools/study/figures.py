@@ -212,10 +212,10 @@ FIGURES: dict[str, Callable[[Study], Figure]] = {
 }
 
 
-def draw_all(folder: Path) -> None:
-    """Draw every figure into the study's folder."""
+def draw_all(folder: Path, to: Path) -> None:
+    """Draw every figure of the study in ``folder`` into the folder ``to``."""
     study = Study.at(folder)
     for name, draw in FIGURES.items():
         with style():
             figure = draw(study)
-            figure.savefig(folder / f"{name}.png", dpi=130)
+            figure.savefig(to / f"{name}.png", dpi=130)
