@@ -60,11 +60,16 @@ class Clearances:
         λ_min in θ.
     critical : float
         Critical opening C_c.
+
+    Attributes
+    ----------
+    seen : Seen
+        Set by whoever goes on from another state.
     """
 
     def __init__(self, wave: float, critical: float) -> None:
         self._near, self._beside = _NEAR * wave, critical / np.sqrt(wave)
-        self._seen = NOT_SEEN
+        self.seen = NOT_SEEN
 
     def left(self, field: GapField) -> tuple[Array, NDArray[np.int64]]:
         """Clearance that is surely left in each gap, negative if it has to be looked at.
@@ -73,7 +78,7 @@ class Clearances:
         """
         of = field.solution
         left, place = clearance_left(
-            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, *self._seen, self._near,
+            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, *self.seen, self._near,
             self._beside,
         )  # fmt: skip
         return left, place
@@ -81,9 +86,9 @@ class Clearances:
     def note(self, field: GapField, place: NDArray[np.int64], clearance: Array) -> None:
         """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
         of = field.solution
-        self._seen = Seen(
+        self.seen = Seen(
             *noted(
-                field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, *self._seen, place,
+                field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, *self.seen, place,
                 clearance,
             )
         )  # fmt: skip

@@ -35,6 +35,9 @@ _RUNS = 0.25  # edges that move by this share of the longest motion run
 _NOISE = 1e-3  # a rise of the energy below this share of the work done both ways is rounding
 _TIE = 1e-3  # two ways off a saddle whose gains differ by less are equal
 _LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
+# A lone edge that runs to and fro leaps over a minimum that no look at its steps shows.
+_TO_AND_FRO = 8  # turns after which the steps of a descent become shorter,
+_SHORTENED = 0.8  # each time to this share
 
 _MET = 0.4  # edges this close to another descent's track, in longest steps, are on it
 _LOOKS = 3  # in so many looks one after the other
@@ -108,6 +111,7 @@ def descend(
     passed[0] = gaps.ravel()
     count = 1
     looks = 0
+    turned = 0
     while fields < most:
         fields += 1
         held = runners > 0 and reuses < (_REUSES_ALONE if runners == 1 else _REUSES)
@@ -156,7 +160,8 @@ def descend(
         if fall > 0:
             share = min(1.0, 2 * share)
         force = fresh
-        longest = share * law.longest
+        pace = _SHORTENED ** max(turned - _TO_AND_FRO, 0)
+        longest = share * max(pace, _LEAST_SHARE) * law.longest
         unchecked = _UNCHECKED_ALONE * longest if runners == 1 else longest
         reach = unchecked
         if runners > 0:
@@ -192,6 +197,7 @@ def descend(
                 if abs(step[e]) > 0.2 * reach and step[e] * last[e] <= 0:
                     turns = True
             if turns:
+                turned += 1 if runners == 1 else 0
                 runners = 0
                 last = np.zeros(edges)
                 continue

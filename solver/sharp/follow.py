@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.jumps import Branch
 from solver.method import ContactState
+from solver.sharp.clearance import NOT_SEEN
 from solver.sharp.course import Course
 from solver.sharp.edges import CORRECTED, Before, EdgeMechanics, Point
 from solver.sharp.jump import Jumps
@@ -136,9 +137,15 @@ class Follower:
         self.resolution = resolution
         self._last: tuple[Memory, Point] | None = None
 
-    def remembered(self, memory: Memory) -> Point | None:
-        """Point of the state that was handed out last, if it is the one with this memory."""
-        return self._last[1] if self._last is not None and self._last[0] is memory else None
+    def remembered(self, memory: Memory | None) -> Point | None:
+        """Point at which a path stopped, if this is the memory of its state."""
+        self.nucleation.clearances.seen = NOT_SEEN if memory is None else memory.seen
+        if memory is None or memory.course is None:
+            return None
+        if self._last is not None and self._last[0] is memory:
+            return self._last[1]
+        at, rate, slope = memory.course
+        return Point(at, self.edges.field(memory.gaps, at), rate, slope, memory.clearance)
 
     def equilibrium(self, point: Point, at: float) -> Point | None:
         """Stable equilibrium at q0 s = ``at`` near the one predicted from ``point``."""
@@ -233,8 +240,15 @@ class Follower:
         trace.states += walk.pending
         # What has not closed since the last look need not be looked at again.
         point = point.cleared(max(walk.clearance - walk.closed, 0.0))
-        remembered = Memory(point.field.gaps, point.clearance)
-        self._last = remembered, point.behind(None)
+        remembered = Memory(
+            point.field.gaps,
+            point.clearance,
+            (point.at, point.rate, point.slope),
+            self.nucleation.clearances.seen,
+        )
+        # Few gaps have one field, whichever way it was come to; of many it depends on the way.
+        few = len(point.field.gaps) < self.edges.many
+        self._last = (remembered, point.behind(None)) if few else None
         trace.states[-1] = replace(trace.states[-1], internal=remembered)
         return target.at, point
 

@@ -26,7 +26,7 @@ from solver.method import (
 from solver.one_thread import on_one_thread
 from solver.problem import Problem
 from solver.profile import Profile
-from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact
 from solver.sharp.follow import Follower, Resolution, Target
 from solver.sharp.jump import Jumps
 from solver.sharp.output import fields_of, openings_of
@@ -187,7 +187,7 @@ class SharpMethod(Method):
         at = self.states.place(state)
         # the separation of a state at the target, where it is known without rounding
         exact = target.prescribed if control.is_fixed else None
-        point: Point | None
+        point = self.follower.remembered(state.internal)
         if not state.patches:
             touch, highest = self.nucleation.first_touch()
             first = 0.0 if control.is_load else touch
@@ -201,7 +201,6 @@ class SharpMethod(Method):
             point = self.jumps.run(trace, before, np.empty((0, 2)), at, target.branch, highest)
         else:
             gaps = state.internal.gaps
-            point = self.follower.remembered(state.internal)
             if point is None:
                 point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
                 if point is not None:

@@ -10,6 +10,7 @@ from solver.jumps import Branch, Jump
 from solver.method import ContactState
 from solver.problem import Problem
 from solver.profile import Array
+from solver.sharp.clearance import NOT_SEEN, Seen
 from solver.sharp.edges import Counters, Point
 from solver.sharp.field import GapField, Hold
 from solver.sharp.opening import work_of_gaps
@@ -30,10 +31,24 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What a state remembers: the ends of its gaps, and their clearance (``Point.clearance``)."""
+    """What a state remembers, so that a path goes on from it whatever was followed in between.
+
+    Attributes
+    ----------
+    gaps : array, shape (L, 2)
+        The ends of its gaps.
+    clearance : float
+        Of them (``Point.clearance``).
+    course : tuple of float, array, float, optional
+        Where a path stopped at it: d, dn/dd of every edge and dY/dd, as in ``Point``.
+    seen : Seen
+        The gaps as they were when they were last looked at.
+    """
 
     gaps: Array
     clearance: float
+    course: tuple[float, Array, float] | None = None
+    seen: Seen = NOT_SEEN
 
 
 def hold_of(problem: Problem) -> Hold:

@@ -115,7 +115,7 @@ class Nucleation:
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
-        self._clearances = Clearances(edges.wave, edges.critical)
+        self.clearances = Clearances(edges.wave, edges.critical)
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
         self.overlap = _OVERLAP * problem.profile.h_max * problem.profile.q0
 
@@ -180,12 +180,12 @@ class Nucleation:
 
         Only those are looked at; see :mod:`solver.sharp.clearance`.
         """
-        left, place = self._clearances.left(field)
+        left, place = self.clearances.left(field)
         fresh = np.flatnonzero(place < 0)
         minima, where = self.minima(field, fresh)
         left[fresh] = np.inf
         np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
-        self._clearances.note(field, place, left)
+        self.clearances.note(field, place, left)
         return float(left.min()), minima
 
     def located(self, trail: list[Point], resolution: float) -> tuple[Located | None, float]:

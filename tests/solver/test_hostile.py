@@ -21,6 +21,21 @@ def test_a_hostile_loop_keeps_every_promise(number):
     assert found["kind"] == ("tight" if number % 4 == 0 else "loop")
 
 
+def test_an_edge_that_leaps_to_and_fro_over_a_minimum_comes_to_rest():
+    """A lone edge, whose minimum a cubic and the energy's trapezium both miss."""
+    scene = draw(308, 90)
+    problem = scene.problem()
+    loops = [
+        run_loop(
+            SharpMethod(problem, accuracy=accuracy),
+            max_penetration=scene.max_penetration,
+            load_steps=scene.load_steps,
+        )
+        for accuracy in (scene.accuracy, 0.1 * scene.accuracy)
+    ]
+    assert abs(loops[0].loss - loops[1].loss) < loops[0].loss_error
+
+
 def test_an_overlap_is_seen_without_the_method():
     """Edges held, a state that is pressed down by a tenth of h_max overlaps."""
     scene = draw(5, 2)

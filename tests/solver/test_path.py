@@ -18,6 +18,8 @@ from adhesis import (
 from solver.method import PathError
 from solver.record import Axis
 from solver.references.exact_wave import ExactWave
+from solver.sharp.method import SharpMethod
+from solver.turns import LoadingBranch
 from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
 
 ROUGH = self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)
@@ -51,6 +53,19 @@ def test_loops_of_one_loading_branch_are_the_separate_loops():
     # the last one has the load steps of a loop of its own
     on_axis = together[-1].penetration[together[-1].states("loading", load_steps_only=True)]
     assert set(np.round(np.arange(9) * 0.1, 12)) <= set(np.round(on_axis, 12))
+
+
+def test_a_loop_has_the_same_bits_whichever_others_were_followed_before_it():
+    profile = self_affine_profile(0.5, period=PERIOD, n0=3, ratio=16, seed=5, h_rms=1e-6)
+
+    def branch() -> LoadingBranch:
+        method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.005))
+        method.edges.many = 4  # most states of these loops have more gaps, some fewer
+        return LoadingBranch(method, [0.3, 0.7], load_steps=4)
+
+    after_another = branch()
+    after_another.loop(0.3)
+    assert np.array_equal(after_another.loop(0.7).energy, branch().loop(0.7).energy)
 
 
 def test_a_path_of_one_turning_point_is_a_loop():
