@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis import Problem, single_wave
+from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from solver.references.single_wave import SingleWave
 from solver.sharp.method import SharpMethod
-from solver.sharp.touch import Minima, Nucleation, Touch
+from solver.sharp.touch import Minima, Nucleation, Touch, _bottoms
 from tests.support.scenes import HALF_SPACE
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3
@@ -42,3 +42,25 @@ def test_a_seed_is_narrower_than_the_first_equilibrium_that_it_grows_to(gamma: f
     gaps = nucleation(gamma).seeded(np.empty((0, 2)), [Touch(0.0, 0.0, AMPLITUDE * q0)])
     width = (2 * np.pi - (gaps[0, 1] - gaps[0, 0])) / q0
     assert 0.2 < width / (2 * wave.half_width(AMPLITUDE)) < 0.6
+
+
+def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None:
+    """Nodes that are not quite evenly spaced, minima anywhere between them."""
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        nodes = np.linspace(1, -1, 12) + rng.uniform(-0.01, 0.01, 12)
+        at, half, third = rng.uniform(-0.5, 0.5), rng.uniform(0.2, 1), rng.uniform(-0.6, 0.6)
+        opening = 1 + half * (nodes - at) ** 2 + third * (nodes - at) ** 3
+        _, place, low, _, _, doubt = _bottoms(nodes[None], opening[None])
+        if len(place) == 1 and abs(place[0] - at) < 0.3:
+            assert abs(low[0] - 1) <= 1.5 * doubt[0]
+
+
+def test_surfaces_that_touch_between_nodes_under_short_waves_are_seen() -> None:
+    """Where the third derivative is large beside the curvature the parabola errs by 5e-5 h_max."""
+    profile = self_affine_profile(
+        0.9, period=2e-3 * np.pi, n0=10, ratio=100, seed=2384431779287079, h_rms=1e-6
+    )
+    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.04))
+    loop = run_loop(method, max_penetration=0.6, load_steps=10)
+    assert abs(loop.audit_residual) < 1e-4
