@@ -20,7 +20,8 @@ from time import process_time
 
 import numpy as np
 
-from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile
+from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
+from solver.sharp.method import SharpMethod
 
 _COLUMNS = (
     "γ (J/m²)", "m to", "periods", "CPU s", "patches", "jumps", "fields", "ms a field", "W~",
@@ -36,14 +37,14 @@ def measure(gamma: float, ratio: float, periods: float, given: argparse.Namespac
     )
     warm = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=10, seed=1, h_rms=1e-6)
     for many in (6, 1000):  # load the code for many gaps, and for few
-        method = make_method("sharp", Problem(warm, HalfSpace(1e6, 0.5), 0.004))
-        method.edges.many = many  # type: ignore[attr-defined]
+        method = SharpMethod(Problem(warm, HalfSpace(1e6, 0.5), 0.004))
+        method.edges.many = many
         run_loop(method, max_penetration=0.5, load_steps=5)
-    method = make_method("sharp", Problem(profile, HalfSpace(1e6, 0.5), gamma))
+    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), gamma))
     started = process_time()
     loop = run_loop(method, max_penetration=given.max_penetration, load_steps=given.load_steps)
     seconds = process_time() - started
-    fields = loop.method.fields  # type: ignore[attr-defined]
+    fields = method.edges.count.fields
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return [
         f"{gamma:g}", f"{round(ratio * count)}", f"{periods:g}", f"{seconds:.3g}",

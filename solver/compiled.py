@@ -196,6 +196,7 @@ class _Kept:
         if not ready:
             return None
         target.codegen()._engine._defined_symbols.update(symbols)
+        # numba has no types
         result: Any = CompileResult._rebuild(target, *state)  # type: ignore[no-untyped-call]
         self._note(result, signature, calls, copied)
         return result
@@ -217,6 +218,7 @@ class _Kept:
             if not function.is_declaration and function.linkage == binding.Linkage.external
         ]
         state = result._reduce()
+        # numba has no types
         content: bytes = dumps((symbols, calls, copied, state))  # type: ignore[no-untyped-call]
         _files().write(self._file(signature), content)
 

@@ -31,7 +31,7 @@ def on_one_thread(function: F) -> F:
 def _libraries() -> Any:
     # The search finds what is loaded: compiled code loads these at its first call.
     import scipy.linalg.cython_blas
-    import scipy.linalg.cython_lapack  # noqa: F401
+    import scipy.linalg.cython_lapack  # noqa: F401  # to load its library
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

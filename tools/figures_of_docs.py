@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from ensemble.versions import commit, versions  # noqa: E402
+from ensemble.versions import commit, versions  # noqa: E402  # needs the path
 
 BESIDE = tuple(sorted((ROOT / "jobs" / "beside").glob("*.toml")))
 KEPT = (".png", ".csv", ".md")  # PDF, NetCDF and HTML are made anew by whoever wants them

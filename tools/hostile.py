@@ -18,6 +18,8 @@ from adhesis import (
     self_affine_profile,
 )
 from solver.method import ContactState, PathError
+from solver.profile import Amplitudes
+from solver.registry import MethodName
 from tests.support.explicit_solution import explicit_openings
 
 TIGHT = 4  # every so many scenes are followed again, to 1e-5 or a hundred times as accurately
@@ -36,7 +38,7 @@ class Scene:
     n0: int
     ratio: int
     seed: int
-    amplitudes: str
+    amplitudes: Amplitudes
     h_rms: float
     g: float
     max_penetration: float
@@ -47,7 +49,7 @@ class Scene:
         """Period 2 mm, E = 1 MPa, ν = 0.5."""
         profile = self_affine_profile(
             self.hurst, period=2e-3, n0=self.n0, ratio=self.ratio, seed=self.seed,
-            h_rms=self.h_rms, amplitudes=self.amplitudes,  # type: ignore[arg-type]
+            h_rms=self.h_rms, amplitudes=self.amplitudes,
         )  # fmt: skip
         half_space = HalfSpace(1e6, 0.5)
         gamma = self.g * half_space.modulus * self.h_rms**2 * profile.q0 * self.n0
@@ -85,10 +87,12 @@ def draw(seed: int, number: int) -> Scene:
     )
 
 
-def follow(scene: Scene, accuracy: float, name: str = "sharp") -> tuple[LoopResult, list[str]]:
+def follow(
+    scene: Scene, accuracy: float, name: MethodName = "sharp"
+) -> tuple[LoopResult, list[str]]:
     """Loop of a scene, and what is wrong with it."""
     problem = scene.problem()
-    method = make_method(name, problem, accuracy=accuracy)  # type: ignore[arg-type]
+    method = make_method(name, problem, accuracy=accuracy)
     states: list[ContactState] = []
     loop = run_loop(
         method,

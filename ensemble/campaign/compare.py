@@ -6,7 +6,7 @@ change a result.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from typing import Any
 
 from ensemble.campaign.rules import shown
@@ -55,8 +55,8 @@ def compare(old: Campaign, new: Campaign) -> Changes:
 
 
 def _is_free(key: str) -> bool:
-    table, name = key.split(".")
-    return any(f.name == name and f.metadata["free"] for f in fields(TABLES[table]))  # type: ignore[index]
+    entry = _entry(key)
+    return entry is not None and bool(entry.metadata["free"])
 
 
 def _extends(key: str, was: Any, now: Any) -> bool:
@@ -64,14 +64,21 @@ def _extends(key: str, was: Any, now: Any) -> bool:
         return bool(now > was)
     if key == "stop.relative_error":
         return was is not None and now is not None and bool(now < was)
-    table, name = key.split(".")
-    entry = next(f for f in fields(TABLES[table]) if f.name == name)  # type: ignore[index]
-    if key not in ("sweep.hurst", "sweep.work_of_adhesion") and entry.metadata["axis"] is None:
+    entry = _entry(key)
+    axis = entry is not None and entry.metadata["axis"] is not None
+    if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not axis:
         return False
     # All turning points of a profile belong together: they do not become more.
     if key in ("cycle.max_penetration", "cycle.max_stress"):
         return False
     return _values(was) < _values(now)
+
+
+def _entry(key: str) -> Field[Any] | None:
+    """Return the field of a key ``table.name``; None if there is none."""
+    table, name = key.split(".")
+    entries = (f for t in TABLES if t == table for f in fields(TABLES[t]) if f.name == name)
+    return next(entries, None)
 
 
 def _values(value: Any) -> set[Any]:

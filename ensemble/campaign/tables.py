@@ -66,7 +66,7 @@ class ProfileTable:
     h_rms: float | None = _key(positive_number("m"), "root mean square height in m", None, axis="m")
     m2: float | None = _key(positive_number("1"), "mean square slope", None, axis="1")
     c0: float | None = _key(positive_number("m²"), "C0 = |a_n0|² in m²", None, axis="m2")
-    amplitudes: Amplitudes = _key(  # noqa: RUF009
+    amplitudes: Amplitudes = _key(  # noqa: RUF009  # a field
         choice(*get_args(Amplitudes)),
         "amplitudes fixed by the power law, or scattered about it (a Gaussian process)",
         "deterministic",
@@ -127,7 +127,7 @@ class CycleTable:
         None,
         axis="Pa",
     )
-    control: PathControl = _key(  # noqa: RUF009
+    control: PathControl = _key(  # noqa: RUF009  # a field
         choice(*get_args(PathControl)), "what is prescribed along the path", "separation"
     )
     load_steps: int = _key(whole_number(1, 100_000), "equal steps of the loading branch")
@@ -166,7 +166,7 @@ class CycleTable:
 class SolverTable:
     """``[solver]``: the method and its accuracy."""
 
-    method: MethodName = _key(  # noqa: RUF009
+    method: MethodName = _key(  # noqa: RUF009  # a field
         choice(*METHOD_NAMES), "how contact states are found; auto chooses", "auto"
     )
     accuracy: float = _key(number_between(0, 1), "wanted relative error of the loss", 1e-3)

@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from ensemble.run.ranks import launched
 
     if launched()[1] > 0:  # rank 0 complains for all
+        # of this parser alone, which argparse made: no class of ours to override it in
         parser.error = lambda message: sys.exit(BAD_INPUT)  # type: ignore[method-assign]
     parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
     parser.add_argument(

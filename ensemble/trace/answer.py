@@ -15,6 +15,7 @@ from ensemble.trace.prepare import Prepared
 from solver.loop import check_cycle
 from solver.material import HalfSpace
 from solver.problem import Problem
+from solver.registry import MethodName
 
 QUANTITIES = {
     "loss": "J/m²",
@@ -129,7 +130,7 @@ def loss_of_trace(
     work_of_adhesion: Several,
     max_penetration: Several = 0.9,
     load_steps: int = 40,
-    method: str = "auto",
+    method: MethodName = "auto",
     accuracy: float = 1e-3,
     quick: bool = False,
     processes: int | None = None,
@@ -181,7 +182,7 @@ def make_cycle(
     work_of_adhesion: Several,
     max_penetration: Several,
     load_steps: int,
-    method: str,
+    method: MethodName,
     accuracy: float,
 ) -> Cycle:
     """Contact and cycle, with the values of both tables."""

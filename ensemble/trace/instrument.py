@@ -86,7 +86,7 @@ def _library() -> ModuleType:
     # Its NuMPI would start MPI as soon as it can import mpi4py; reading a file needs no ranks.
     hidden = "mpi4py" not in sys.modules
     if hidden:
-        sys.modules["mpi4py"] = None  # type: ignore[assignment]
+        sys.modules["mpi4py"] = None  # type: ignore[assignment]  # None: cannot be imported
     try:
         import SurfaceTopography.IO as io
     finally:

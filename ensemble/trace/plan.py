@@ -15,6 +15,7 @@ from ensemble.trace.units import length_text
 from ensemble.trace.worker import Job
 from solver.material import HalfSpace
 from solver.profile import Profile
+from solver.registry import MethodName
 
 # Loops beyond this many waves are compared at a coarser cut-off when a doubt is measured.
 _MOST_WAVES_OF_VARIANTS = 8000
@@ -34,7 +35,7 @@ class Cycle:
     works_of_adhesion: tuple[float, ...]
     max_penetrations: tuple[float, ...]
     load_steps: int = 40
-    method: str = "auto"
+    method: MethodName = "auto"
     accuracy: float = 1e-3
 
 

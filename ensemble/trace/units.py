@@ -159,10 +159,10 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
         if len(units) != 1:
             continue
         plain = re.sub(r"[_\-.]|(?<=[a-z])(?=[A-Z])", " ", line)
-        x, z, both = _X.search(plain), _Z.search(plain), _BOTH.search(plain)
+        x, z, both = (bool(name.search(plain)) for name in (_X, _Z, _BOTH))
         compact = re.search(r"\b([xyz]) ?units?\b", plain.lower())
         if compact:
-            x, z = (True, None) if compact[1] == "x" else (None, True)  # type: ignore[assignment]
+            x, z = compact[1] == "x", compact[1] != "x"
         for place, named in enumerate((x, z)):
             if (named and not (x and z)) or (both and not (x or z)):
                 known[place] |= units

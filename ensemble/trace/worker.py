@@ -11,10 +11,13 @@ import pickle
 import sys
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from solver.registry import MethodName
 
 _SECONDS_BETWEEN_REPORTS = 1.0
 
@@ -40,7 +43,7 @@ class Job:
     work_of_adhesion: float
     max_penetration: float
     load_steps: int
-    method: str
+    method: MethodName
     accuracy: float
 
 
@@ -83,7 +86,7 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
 
     profile = Profile(job.period, job.coefficients)
     problem = Problem(profile, HalfSpace(job.young, job.poisson), job.work_of_adhesion)
-    method = make_method(job.method, problem, accuracy=job.accuracy)  # type: ignore[arg-type]
+    method = make_method(job.method, problem, accuracy=job.accuracy)
     loop = run_loop(
         method,
         max_penetration=job.max_penetration,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,11 +23,11 @@ COLOURS = {0.01: "#0072B2", 0.025: "#009E73", 0.04: "#E69F00", 0.07: "#D55E00"}
 MARKERS = {0.01: "o", 0.025: "D", 0.04: "s", 0.07: "^"}
 
 
-def _points(axes: Axes, x: float, values: list[float], unit: float, **look: object) -> None:
+def _points(axes: Axes, x: float, values: list[float], unit: float, **look: Any) -> None:
     data = np.array(values) / unit
     low, high = (float(end) for end in interval(data))
     error = [[data.mean() - low], [high - data.mean()]]
-    axes.errorbar([x], [data.mean()], yerr=error, capsize=2, markersize=4, linestyle="", **look)  # type: ignore[arg-type]
+    axes.errorbar([x], [data.mean()], yerr=error, capsize=2, markersize=4, linestyle="", **look)
 
 
 def _label(axes: Axes, text: str) -> None:
