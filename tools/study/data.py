@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -79,6 +80,13 @@ class Study:
         return cls(
             loops.where(status="done"), loops.where(status="failed"), read(folder / "jumps.csv")
         )
+
+    def joined(self, name: str, campaigns: Sequence[str], **values: Any) -> dict[int, float]:
+        """One column of the loops with these values; the first campaign that has a realisation."""
+        found: dict[int, float] = {}
+        for campaign in campaigns:
+            found = {**self.by_realisation(name, campaign=campaign, **values), **found}
+        return found
 
     def by_realisation(self, name: str, **values: Any) -> dict[int, float]:
         """One column of the loops with these values, by realisation."""

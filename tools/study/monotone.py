@@ -13,6 +13,7 @@ from ensemble.interval import interval
 from tools.study.data import Array, Study, aligned
 
 LEVEL = 0.05
+CAMPAIGNS = ("turns", "slope", "between", "weak", "cells", "cells001")
 # (γ, turning point, quantity)
 ROWS = (
     *((0.04, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
@@ -75,13 +76,12 @@ class Row:
 def series(study: Study, gamma: float, turn: float, name: str) -> dict[float, dict[int, float]]:
     """A column by H, each by realisation."""
     found: dict[float, dict[int, float]] = {}
-    for campaign in ("turns", "slope", "between", "weak"):
+    for campaign in CAMPAIGNS:
         rows = study.loops.where(campaign=campaign, work_of_adhesion=gamma, max_penetration=turn)
         for hurst in rows.values("hurst"):
             one = rows.where(hurst=hurst)
-            found[hurst] = dict(
-                zip(one["realisation"].astype(int).tolist(), one[name].tolist(), strict=True)
-            )
+            more = zip(one["realisation"].astype(int).tolist(), one[name].tolist(), strict=True)
+            found[hurst] = {**dict(more), **found.get(hurst, {})}
     return found
 
 

@@ -20,6 +20,7 @@ FEWEST = 6  # realisations of a cell that is held against the paper
 LEAST = 1e-3  # eigenvalue of a correlation matrix from cells of different realisations
 BEYOND = 1.5  # works of adhesion are extrapolated by no larger factor
 COMPATIBLE, EXCLUDED = 0.05, 0.001
+AT_100 = {0.01: ("weak", "cells001"), 0.025: ("between",)}
 Cell = tuple[float, float]
 Series = dict[int, float]
 
@@ -119,9 +120,11 @@ class Losses:
 
     def direct(self, name: str, hurst: float, gamma: float, turn: float, ratio: int) -> Series:
         """A column at what was computed; empty if nothing was."""
-        campaign = "waves" if ratio == 200 else {0.01: "weak", 0.025: "between"}.get(gamma, "turns")
-        return self._study.by_realisation(
-            name, campaign=campaign, hurst=hurst, work_of_adhesion=gamma, max_penetration=turn
+        return self._study.joined(
+            *(name, ("waves",) if ratio == 200 else AT_100.get(gamma, ("turns", "cells"))),
+            hurst=hurst,
+            work_of_adhesion=gamma,
+            max_penetration=turn,
         )
 
     def scaled(
@@ -185,10 +188,7 @@ def _square(study: Study, normalisation: str, hurst: float, ratio: int) -> float
 
 def _height_factor(study: Study, heights: str, hurst: float, ratio: int) -> Series:
     """What W~ with own h_max is to be multiplied by, for each realisation."""
-    campaign = "waves" if ratio == 200 else "turns"
-    h_max = study.by_realisation(
-        "h_max", campaign=campaign, hurst=hurst, work_of_adhesion=0.04, max_penetration=0.9
-    )
+    h_max = Losses(study).direct("h_max", hurst, 0.04, 0.8, ratio)
     values = np.sort(np.array(list(h_max.values())))
     if heights == "own":
         return dict.fromkeys(h_max, 1.0)
@@ -272,9 +272,7 @@ def _other_turning_points(study: Study, losses: Losses) -> Iterator[Reading]:
     for s in (0.2e-6, 0.4e-6, 0.6e-6, 0.8e-6, 1.0e-6):
 
         def at_separation(hurst: float, gamma: float, s: float = s) -> Series:
-            h_max = study.by_realisation(
-                "h_max", campaign="turns", hurst=hurst, work_of_adhesion=0.04, max_penetration=0.9
-            )
+            h_max = losses.direct("h_max", hurst, 0.04, 0.8, 100)
             return _at_turns(losses.along(hurst, gamma), lambda r: 1 - s / h_max.get(r, np.nan))
 
         reading = _reading(f"common separation {1e6 * s:.1f} µm", at_separation)
