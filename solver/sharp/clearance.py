@@ -78,7 +78,7 @@ class Clearances:
         """
         of = field.solution
         left, place = clearance_left(
-            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, *self.seen, self._near,
+            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, self.seen, self._near,
             self._beside,
         )  # fmt: skip
         return left, place
@@ -86,12 +86,9 @@ class Clearances:
     def note(self, field: GapField, place: NDArray[np.int64], clearance: Array) -> None:
         """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
         of = field.solution
-        self.seen = Seen(
-            *noted(
-                field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, *self.seen, place,
-                clearance,
-            )
-        )  # fmt: skip
+        self.seen = noted(
+            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, self.seen, place, clearance
+        )
 
 
 @compiled
@@ -109,12 +106,7 @@ def clearance_left(
     theta: Array,
     f: Array,
     rules: Rules,
-    seen_gaps: Array,
-    seen_kinds: Kinds,
-    seen_offset: Kinds,
-    seen_theta: Array,
-    seen_opening: Array,
-    seen_clearance: Array,
+    seen: Seen,
     near: float,
     beside: float,
 ) -> tuple[Array, Kinds]:
@@ -123,38 +115,38 @@ def clearance_left(
     place = np.full(gaps.shape[0], -1)
     j = 0
     for k in range(gaps.shape[0]):
-        while j < seen_gaps.shape[0] and seen_gaps[j, 0] < gaps[k, 0] - near:
+        while j < seen.gaps.shape[0] and seen.gaps[j, 0] < gaps[k, 0] - near:
             j += 1
-        if j == seen_gaps.shape[0]:
+        if j == seen.gaps.shape[0]:
             break
-        begin = gaps[k, 0] - seen_gaps[j, 0]
-        end = gaps[k, 1] - seen_gaps[j, 1]
-        if abs(begin) > near or abs(end) > near or kinds[k] != seen_kinds[j]:
+        begin = gaps[k, 0] - seen.gaps[j, 0]
+        end = gaps[k, 1] - seen.gaps[j, 1]
+        if abs(begin) > near or abs(end) > near or kinds[k] != seen.kinds[j]:
             continue
         closed = 0.0
         m = rules.counts[kinds[k]]
         comparable = True
         for i in range(m):
-            at = seen_offset[j] + i
+            at = seen.offset[j] + i
             # the slope between the node's neighbours, or the gap's end
             if i > 0:
-                before, low = seen_theta[at - 1], seen_opening[at - 1]
+                before, low = seen.theta[at - 1], seen.opening[at - 1]
             else:
-                before, low = seen_gaps[j, 0], 0.0
+                before, low = seen.gaps[j, 0], 0.0
             if i < m - 1:
-                after, high = seen_theta[at + 1], seen_opening[at + 1]
+                after, high = seen.theta[at + 1], seen.opening[at + 1]
             else:
-                after, high = seen_gaps[j, 1], 0.0
-            moved = theta[offset[k] + i] - seen_theta[at]
+                after, high = seen.gaps[j, 1], 0.0
+            moved = theta[offset[k] + i] - seen.theta[at]
             if abs(moved) > near:
                 comparable = False
-            was = seen_opening[at] + (high - low) / (after - before) * moved
+            was = seen.opening[at] + (high - low) / (after - before) * moved
             closed = max(closed, was - _low_opening(f[offset[k] + i], kinds[k], i, rules))
         if not comparable:
             continue
         grown = max(begin, 0.0) + max(-end, 0.0)
-        rest = seen_clearance[j] - _SAFETY * closed - beside * grown
-        if rest > _LEFT * seen_clearance[j]:
+        rest = seen.clearance[j] - _SAFETY * closed - beside * grown
+        if rest > _LEFT * seen.clearance[j]:
             left[k] = rest
             place[k] = j
     return left, place
@@ -168,16 +160,11 @@ def noted(
     theta: Array,
     f: Array,
     rules: Rules,
-    seen_gaps: Array,
-    seen_kinds: Kinds,
-    seen_offset: Kinds,
-    seen_theta: Array,
-    seen_opening: Array,
-    seen_clearance: Array,
+    seen: Seen,
     place: Kinds,
     clearance: Array,
-) -> tuple[Array, Kinds, Kinds, Array, Array, Array]:
-    """As :meth:`Clearances.note`: the new :class:`Seen`, plain."""
+) -> Seen:
+    """As :meth:`Clearances.note`."""
     new_gaps = gaps.copy()
     new_theta = theta.copy()
     new_opening = np.empty(theta.shape[0])
@@ -185,13 +172,13 @@ def noted(
     for k in range(gaps.shape[0]):
         j = place[k]
         if j >= 0:
-            new_gaps[k] = seen_gaps[j]
-            new_clearance[k] = seen_clearance[j]
+            new_gaps[k] = seen.gaps[j]
+            new_clearance[k] = seen.clearance[j]
         for i in range(rules.counts[kinds[k]]):
             at = offset[k] + i
             if j >= 0:
-                new_theta[at] = seen_theta[seen_offset[j] + i]
-                new_opening[at] = seen_opening[seen_offset[j] + i]
+                new_theta[at] = seen.theta[seen.offset[j] + i]
+                new_opening[at] = seen.opening[seen.offset[j] + i]
             else:
                 new_opening[at] = _low_opening(f[at], kinds[k], i, rules)
-    return new_gaps, kinds.copy(), offset.copy(), new_theta, new_opening, new_clearance
+    return Seen(new_gaps, kinds.copy(), offset.copy(), new_theta, new_opening, new_clearance)
