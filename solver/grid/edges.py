@@ -20,15 +20,18 @@ def patch_ranges(mask: Mask) -> tuple[Indices, Indices]:
     Sorted by the first node; a patch may reach round the period. A contact set without a free node
     is one patch that starts at node 0.
     """
-    before = np.roll(mask, 1)
-    first = np.flatnonzero(mask & ~before)
-    stop = np.flatnonzero(before & ~mask)
-    if first.size == 0:
-        whole = np.array([0] if mask.any() else [], dtype=np.intp)
-        return whole, whole + mask.size
-    if stop[0] < first[0]:
-        stop = np.concatenate((stop[1:], [stop[0] + mask.size]))
-    return first, stop - first
+    ends = np.flatnonzero(mask[1:] != mask[:-1])
+    ends += 1
+    if mask[0] and mask[-1]:  # the last patch reaches round the period
+        if ends.size == 0:
+            return np.zeros(1, dtype=np.intp), np.array([mask.size])
+        ends = np.append(ends[1:], ends[0] + mask.size)
+    elif mask[0]:
+        ends = np.concatenate(([0], ends))
+    elif mask[-1]:
+        ends = np.append(ends, mask.size)
+    first = ends[::2]
+    return first, ends[1::2] - first
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,9 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         nothing = np.empty(0)
         return Edges(none, none, none, none, none, nothing, nothing, np.empty(0, dtype=bool))
     last = first + width - 1
-    gap_right = np.roll(first, -1) - last - 1
-    gap_right[-1] += n
-    gap_left = np.roll(gap_right, 1)
+    following = np.append(first[1:], first[0] + n)
+    gap_right = following - last - 1
+    gap_left = np.append(gap_right[-1], gap_right[:-1])
     side = np.repeat(np.array([-1, 1], dtype=np.intp), count)
     inner = np.concatenate((first, last)) % n
     outer = (inner + side) % n

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.grid.fourier import RealFourier
+from solver.grid.fourier import RealFourier, symbol
 from solver.profile import Array
 
 
@@ -38,13 +38,15 @@ class ElasticGrid:
         self.modulus = modulus
         self._fourier = RealFourier(n)
         q = 2 * np.pi / period * np.arange(n // 2 + 1)
-        self._stiffness = 0.5 * modulus * q / n
-        self._compliance = np.zeros_like(q)
-        self._compliance[1:] = 2 / (modulus * q[1:]) / n
+        stiffness = 0.5 * modulus * q / n
+        compliance = np.zeros_like(q)
+        compliance[1:] = 2 / (modulus * q[1:]) / n
         # The opposite-order operator is singular at q = 0, a preconditioner must not be: the mean
         # over the contact is given the stiffness of the longest wave.
-        self._preconditioner = self._stiffness.copy()
-        self._preconditioner[0] = self._stiffness[1]
+        preconditioner = stiffness.copy()
+        preconditioner[0] = stiffness[1]
+        self._stiffness, self._compliance = symbol(stiffness), symbol(compliance)
+        self._preconditioner = symbol(preconditioner)
 
     def displacement(self, stress: Array) -> Array:
         """Displacement v in m (zero mean) of a stress in Pa; a buffer, see ``multiply``."""

@@ -13,6 +13,15 @@ from numpy.typing import NDArray
 from solver.profile import Array
 
 
+def symbol(eigenvalues: Array) -> Array:
+    """Real eigenvalues of a circulant operator, shape (n // 2 + 1,), as ``multiply`` takes them.
+
+    Each stands twice, shape (n + 2,), for the real and the imaginary part: numpy would make complex
+    numbers of real ones before every product of the two.
+    """
+    return np.repeat(eigenvalues, 2)
+
+
 class RealFourier:
     """Pair of real transforms of n values on buffers of its own.
 
@@ -35,6 +44,7 @@ class RealFourier:
         self.spectrum: NDArray[np.complex128] = pyfftw.zeros_aligned(
             n // 2 + 1, dtype=np.complex128
         )
+        self._parts: Array = self.spectrum.view(np.float64)
         options = {"flags": ("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"), "threads": 1}
         self._forward = pyfftw.FFTW(self.values, self.spectrum, **options)
         self._inverse = pyfftw.FFTW(
@@ -49,13 +59,13 @@ class RealFourier:
         """Transform ``spectrum`` to ``values``: n times the inverse of :meth:`forward`."""
         self._inverse.execute()
 
-    def multiply(self, symbol: Array, field: Array) -> Array:
+    def multiply(self, by: Array, field: Array) -> Array:
         """Apply a circulant operator to a field.
 
         Parameters
         ----------
-        symbol : array, shape (n // 2 + 1,)
-            Real eigenvalues of the operator, divided by n.
+        by : array, shape (n + 2,)
+            :func:`symbol` of the operator's eigenvalues, divided by n.
         field : array, shape (n,)
 
         Returns
@@ -65,6 +75,6 @@ class RealFourier:
         """
         self.values[:] = field
         self._forward.execute()
-        np.multiply(self.spectrum, symbol, out=self.spectrum)
+        np.multiply(self._parts, by, out=self._parts)
         self._inverse.execute()
         return self.values

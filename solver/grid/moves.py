@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ Key = tuple[int, int, int]
 """Name of a move of a contact set."""
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """What is remembered of an edge: direction and length of its last move, and what is carried.
 
     ``carried`` is the part of a node that it was to move and has not yet.
@@ -37,8 +36,7 @@ Memory = dict[tuple[int, int], Motion]
 """Motion of the edge with this side and contact node."""
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """One edge's move: ``length`` nodes outwards (``direction`` +1) or inwards (-1), maybe none."""
 
     edge: int
@@ -90,7 +88,7 @@ def edge_moves(
     if not moves:
         return moves
     if caution:
-        moves = [replace(m, length=1) for m in moves]
+        moves = [m._replace(length=1) for m in moves]
     if caution < 2:
         return moves if equal_speeds else _in_proportion(moves)
     # 2, 3, …: the most unstable half, quarter, … by one node
@@ -112,7 +110,7 @@ def _in_proportion(moves: list[Move]) -> list[Move]:
         way = m.carried + leading * m.release / fastest
         # what ties in release ties in way
         length = min(int(way + 10 * _TIE * leading), m.length)
-        shared.append(replace(m, length=length, carried=min(max(way - length, 0.0), 1.0)))
+        shared.append(m._replace(length=length, carried=min(max(way - length, 0.0), 1.0)))
     return shared
 
 

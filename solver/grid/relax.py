@@ -197,7 +197,11 @@ class _Descent:
                     self.caution = 0
                     self.alone = False
                 if self.abort is not None and self.abort(energy, self.current):
-                    return None
+                    if not self._unsolved():
+                        return None
+                    # Energy and mean stress of a stress solved so loosely may both mislead.
+                    self.solver.solve(self.current, self.rules.tight)
+                    continue
                 self.anchor = self.current.copy()
                 self.anchor_energy = energy
             else:

@@ -86,7 +86,7 @@ def test_a_node_under_compression_is_never_removed(lattice: Lattice) -> None:
     contact = Contact(0.0, 0.0, mask, stress, np.zeros(N))
     unit = 1e3 * least_release(lattice)
     edges = edges_of(mask, [unit] * 4, -1)
-    moves = [replace(m, length=5) for m in edge_moves(edges, lattice, 8, {}, set(), 0, True)]
+    moves = [m._replace(length=5) for m in edge_moves(edges, lattice, 8, {}, set(), 0, True)]
     _, flips = apply_moves(contact, edges, moves)
     assert np.flatnonzero(contact.mask).tolist() == [*range(22, 36), *range(155, 169)]
     assert flips == 2 + 5 + 5 + 2
