@@ -166,9 +166,16 @@ class Steps:
             change = abs(conjugate - self.lattice.conjugate(relaxing))
             return energy - now - work * change > noise
 
+        touched = self._touched(contact, frozen)
+        overlaps = touched < 1 and stride > _NEAREST * self.scale
         flips = relaxation.flips
-        relaxed = relaxation.relax(frozen, jumped if divisible else None)
+        relaxed = relaxation.relax(frozen, jumped if divisible or overlaps else None)
         if relaxed is None:
+            if overlaps:
+                # No state is handed out in which surfaces overlap.
+                self.share = touched
+                if not divisible:
+                    self.least = 2 * touched * stride
             return None, False
         flips = relaxation.flips - flips
         drop = energy - self.energy(relaxed)
@@ -182,12 +189,6 @@ class Steps:
             if work * abs(change) > allowed and stride > least:
                 wanted = allowed / (self.period * abs(change)) if allowed else least
                 self.least = min(0.5 * stride, wanted)
-                return None, False
-            touched = self._touched(contact, frozen)
-            if touched < 1 and stride > _NEAREST * self.scale:
-                # No state is handed out in which surfaces overlap.
-                self.share = touched
-                self.least = 2 * touched * stride
                 return None, False
             before = state_of(self.lattice, frozen)
             self.states.append(before)
