@@ -56,18 +56,19 @@ def _fine_both(length: int) -> tuple[int, ...]:
     return tuple(sorted({*half, *(length - offset for offset in half)}))
 
 
-_rounded_known: dict[int, int] = {}
+class _Rounded(dict[int, int]):
+    """Lengths on a scale of equal ratios, exact up to ``_EXACT_LENGTH``; computed when missing."""
+
+    def __missing__(self, length: int) -> int:
+        rounded = length
+        if length > _EXACT_LENGTH:
+            steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
+            rounded = round(_EXACT_LENGTH * _RATIO**steps)
+        self[length] = rounded
+        return rounded
 
 
-def _rounded(length: int) -> int:
-    """Length on a scale of equal ratios, exact below ``_EXACT_LENGTH``."""
-    if length <= _EXACT_LENGTH:
-        return length
-    known = _rounded_known.get(length)
-    if known is None:
-        steps = round(float(np.log(length / _EXACT_LENGTH) / np.log(_RATIO)))
-        known = _rounded_known[length] = round(_EXACT_LENGTH * _RATIO**steps)
-    return known
+_rounded = _Rounded()
 
 
 class EdgeCompliance:
@@ -125,11 +126,12 @@ class EdgeCompliance:
         key: tuple[int, ...]
         if neighbours is None:
             # Either the patch or the gap is taken exactly: together they are the period.
-            short = _rounded(min(width, self.n - width))
+            short = _rounded[min(width, self.n - width)]
             width = short if width <= self.n - width else self.n - short
             key = (width,)
         else:
-            key = (_rounded(width), _rounded(gap), *(_rounded(k) for k in neighbours))
+            near, far_gap, far = neighbours
+            key = (_rounded[width], _rounded[gap], _rounded[near], _rounded[far_gap], _rounded[far])
         known = self._known.get(key)
         if known is None:
             known = self._known[key] = self._compute(key)
@@ -150,11 +152,11 @@ class EdgeCompliance:
         key: tuple[int, ...]
         if before == 0 and after == 0:
             # A single patch: either it or the only gap is taken exactly.
-            short = _rounded(min(width, self.n - width))
+            short = _rounded[min(width, self.n - width)]
             width = short if width <= self.n - width else self.n - short
             key = (0, width, self.n - width, 0, 0, 0)
         else:
-            key = (0, *(_rounded(k) for k in (width, left, right, before, after)))
+            key = (0, *(_rounded[k] for k in (width, left, right, before, after)))
         known = self._pairs.get(key)
         if known is None:
             _, width, left, right, before, after = key
@@ -177,7 +179,7 @@ class EdgeCompliance:
         near, gap, far : int
             Nodes of the patch before the gap, of the gap, and of the patch after it.
         """
-        key = (1, *(_rounded(k) for k in (near, gap, far)))
+        key = (1, *(_rounded[k] for k in (near, gap, far)))
         known = self._pairs.get(key)
         if known is None:
             _, near, gap, far = key

@@ -171,7 +171,7 @@ class ContactSolver:
         target = self.height - contact.separation
         stress = contact.stress
         displacement, contact.residual, gain = self._solve(
-            inside, stress, target, most, energy_tolerance
+            inside, stress, contact.displacement, target, most, energy_tolerance
         )
         contact.displacement = displacement
         contact.energy_error = gain if np.isfinite(gain) else 0.0
@@ -188,7 +188,7 @@ class ContactSolver:
         """Bring a solved contact to the separation that belongs to what is prescribed, in place."""
         scale = float(np.abs(self.height).max())
         gives.displacement, residual, _ = self._solve(
-            inside, gives.stress, np.ones_like(inside), most / scale, np.inf
+            inside, gives.stress, gives.displacement, np.ones_like(inside), most / scale, np.inf
         )
         mean, per_separation = float(contact.stress.mean()), float(gives.stress.mean())
         control = self.control
@@ -206,15 +206,27 @@ class ContactSolver:
         contact.residual += abs(way) * residual
 
     def _solve(
-        self, inside: Array, stress: Array, target: Array, most: float, energy_tolerance: float
+        self,
+        inside: Array,
+        stress: Array,
+        displacement: Array,
+        target: Array,
+        most: float,
+        energy_tolerance: float,
     ) -> tuple[Array, float, float]:
         """Bring ``stress``, in place, to where its displacement is the target on Ω.
+
+        ``displacement`` is that of the stress as it is, and left as it is.
 
         Returns the displacement, the largest residual, and what the last iteration gained, in J/m.
         """
         elastic = self.elastic
-        stress *= inside
-        displacement = elastic.displacement(stress).copy()
+        kept = stress * inside
+        if np.array_equal(kept, stress):
+            displacement = displacement.copy()
+        else:
+            stress[:] = kept
+            displacement = elastic.displacement(stress).copy()
         residual = (target - displacement) * inside
         direction = np.zeros_like(residual)
         rz_before = 0.0
