@@ -25,11 +25,11 @@ def patch_ranges(mask: Mask) -> tuple[Indices, Indices]:
     if mask[0] and mask[-1]:  # the last patch reaches round the period
         if ends.size == 0:
             return np.zeros(1, dtype=np.intp), np.array([mask.size])
-        ends = np.append(ends[1:], ends[0] + mask.size)
+        ends = np.concatenate((ends[1:], ends[:1] + mask.size))
     elif mask[0]:
         ends = np.concatenate(([0], ends))
     elif mask[-1]:
-        ends = np.append(ends, mask.size)
+        ends = np.concatenate((ends, [mask.size]))
     first = ends[::2]
     return first, ends[1::2] - first
 
@@ -82,18 +82,17 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         nothing = np.empty(0)
         return Edges(none, none, none, none, none, nothing, nothing, np.empty(0, dtype=bool))
     last = first + width - 1
-    following = np.append(first[1:], first[0] + n)
-    gap_right = following - last - 1
-    gap_left = np.append(gap_right[-1], gap_right[:-1])
-    side = np.repeat(np.array([-1, 1], dtype=np.intp), count)
+    gap_right = np.concatenate((first[1:], first[:1] + n)) - last - 1
+    gap_left = np.concatenate((gap_right[-1:], gap_right[:-1]))
+    side = np.ones(2 * count, dtype=np.intp)
+    side[:count] = -1
     inner = np.concatenate((first, last)) % n
     outer = (inner + side) % n
     gap = np.concatenate((gap_left, gap_right))
 
-    s_grow = np.empty(2 * count)
-    s_recede = np.empty(2 * count)
-    total = int(width.sum())
+    grow, recede = [0.0] * (2 * count), [0.0] * (2 * count)
     w, gl, gr = width.tolist(), gap_left.tolist(), gap_right.tolist()
+    total = sum(w)
     for k in range(count):
         before, after = w[k - 1], w[(k + 1) % count]
         if count == 2:  # one patch, on both sides
@@ -106,12 +105,14 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
             (count + k, after, gr[k], gl[k], before),
         ):
             others = None if count == 1 else (near, far_gap, far)
-            s_grow[edge] = compliance(w[k], near_gap, others)
-            s_recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
+            grow[edge] = compliance(w[k], near_gap, others)
+            recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
+    s_grow, s_recede = np.array(grow), np.array(recede)
 
-    give, opening = lattice.extra_compliance(contact, outer)
-    s_grow += give * opening**2
-    s_recede += give * opening**2  # a node that leaves has the opening of the one beside it
+    if contact.yields is not None:
+        give, opening = lattice.extra_compliance(contact, outer)
+        s_grow += give * opening**2
+        s_recede += give * opening**2  # a node that leaves has the opening of the one beside it
     t = contact.displacement[outer] - lattice.height[outer] + contact.separation
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < overlap_below

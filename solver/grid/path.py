@@ -69,6 +69,7 @@ class Steps:
         self.jumps: list[Jump] = []
         self.error = 0.0
         self.share = 0.5  # of a step that must be shortened
+        self.last: tuple[Contact, Contact] | None = None  # where a step began, and its frozen end
         self.reached = np.nan  # what was prescribed in the last state
         self.energy = self.lattice.energy
         self.period = problem.profile.period
@@ -153,10 +154,11 @@ class Steps:
         accuracy, relaxation = self.accuracy, self.relaxation
         self.share = 0.5
         stride = abs(target - contact.prescribed)
-        frozen = contact.at(target, self.lattice.control)
+        frozen = self._frozen(contact, target)
         if self.adhesion_scale == 0:
             return relaxation.relax_without_adhesion(frozen), False
         self.solver.solve(frozen, relaxation.tight)
+        self.last = contact, frozen
         energy = self.energy(frozen)
         conjugate = self.lattice.conjugate(frozen)
         work = self.period * stride
@@ -204,6 +206,21 @@ class Steps:
         if abs(drop - smooth) > allowed and divisible:
             return None, False
         return relaxed, False
+
+    def _frozen(self, contact: Contact, target: float) -> Contact:
+        """Contact with the same edges where x is ``target``, yet to be solved.
+
+        Stress is linear in what is prescribed: a shorter step begins with its share of the last.
+        """
+        frozen = contact.at(target, self.lattice.control)
+        if self.last is not None and self.last[0] is contact:
+            far = self.last[1]
+            share = (target - contact.prescribed) / (far.prescribed - contact.prescribed)
+            frozen.stress += share * (far.stress - contact.stress)
+            frozen.displacement += share * (far.displacement - contact.displacement)
+            if contact.yields is not None:
+                frozen.separation += share * (far.separation - contact.separation)
+        return frozen
 
     def _touched(self, contact: Contact, frozen: Contact) -> float:
         """At what share of the step to ``frozen`` nodes overlap as far as is allowed; at most 1.
