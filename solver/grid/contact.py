@@ -27,6 +27,7 @@ EDGE_COMPLIANCE = 1.7286
 """S E*/dx at the edge of a long isolated patch (numerical)."""
 
 _MAX_ITERATIONS = 500
+_NOTHING = 1e-9  # of the residual wanted: below it there is nothing left to solve
 # Error of the energy that a unit of tolerance allows, in closing energies.
 _ENERGY_TOLERANCE = 0.05
 
@@ -233,7 +234,7 @@ class ContactSolver:
         gain = np.inf
         largest = float(np.abs(residual).max())
         for _ in range(_MAX_ITERATIONS):
-            if (largest <= most and gain <= energy_tolerance) or largest == 0.0:
+            if (largest <= most and gain <= energy_tolerance) or largest <= _NOTHING * most:
                 break
             correction = elastic.precondition(residual)
             rz = dot(residual, correction)
