@@ -15,6 +15,7 @@ from solver.grid.kernels import dot, inverse_form
 from solver.grid.lattice import Lattice
 from solver.grid.method import GridMethod
 from solver.grid.pairs import pairs
+from solver.grid.path import Steps
 from tests.support.scenes import HALF_SPACE
 
 PERIOD = 2e-3 * np.pi
@@ -47,6 +48,31 @@ def exact_energy(method: GridMethod, mask: np.ndarray, separation: float) -> flo
 
 
 # ------------------------------------------------------------------ conjugate gradients
+
+
+@pytest.mark.parametrize("stiffness", [None, 1e12])
+def test_a_shortened_step_begins_where_the_held_edges_lead(stiffness):
+    # with the edges held stress is linear in what is prescribed: nothing is left to solve
+    control = Control() if stiffness is None else Control(stiffness)
+    profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=8, seed=5, h_rms=1e-6)
+    method = GridMethod(Problem(profile, HALF_SPACE, 0.02, control), nodes=512)
+    steps = Steps(method.problem, method.relaxation, 1e-3, "loading", method.count)
+    contact = method.solver.empty(0.4e-6)
+    contact.mask = random_contact(np.random.default_rng(4), method.n, 3)
+    method.solver.solve(contact, 1e-6)
+    contact.prescribed = control.prescribed(contact.separation, float(contact.stress.mean()))
+    far = contact.at(contact.prescribed - 4e-8, control)
+    method.solver.solve(far, 1e-6)
+    steps.last = contact, far
+    near = steps._frozen(contact, contact.prescribed - 1e-8)
+    elastic, inside = method.lattice.elastic, near.mask
+    np.testing.assert_allclose(near.displacement, elastic.displacement(near.stress), atol=1e-17)
+    rest = method.lattice.height - near.separation - near.displacement
+    assert np.abs(rest[inside]).max() < 2e-6 * method.solver.closing_gap
+    mean_stress = float(near.stress.mean())
+    assert control.prescribed(near.separation, mean_stress) == pytest.approx(
+        near.prescribed, rel=1e-8
+    )
 
 
 @pytest.mark.parametrize("patches", [1, 3, 8])
