@@ -84,7 +84,7 @@ def main() -> None:
             "--max-penetration", str(given.max_penetration),
             "--load-steps", str(given.load_steps),
         ]  # fmt: skip
-        row = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+        row = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout.strip()
         cells = row.split(" | ")
         now = float(cells[3]), float(cells[4])
         exponent = ""

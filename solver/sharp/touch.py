@@ -32,6 +32,7 @@ _DOUBT = 3.0
 _NARROWER = 3
 _FLAT = 1e-100  # half the curvature, where none is seen
 _MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
+_MOST_CLEAR = 2  # aims by a secant that are clear, one after the other, before a halving
 
 
 @dataclass(frozen=True)
@@ -224,12 +225,14 @@ class Nucleation:
                 high, hit, hit_minima, hit_value = middle, trail[middle], minima, value
         last = trail[low]
         clear = last.at
+        cleared = 0  # aims one after the other that were clear
         for _ in range(_MOST_AIMS):
             near = abs(clear - hit.at) <= resolution
             if hit_value == 0 or (near and hit_value > -0.5 * self.overlap):
                 break
             share = 0.5
-            if np.isfinite(clear_value):
+            # The least clearance may be another gap's than the overlap: then a secant creeps.
+            if np.isfinite(clear_value) and cleared < _MOST_CLEAR:
                 # secant to half of the overlap that is allowed, kept off the ends
                 aimed = clear_value + 0.2 * self.overlap
                 share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
@@ -242,6 +245,7 @@ class Nucleation:
             if point is None:
                 break
             value, minima = self.least(point.field)
+            cleared = cleared + 1 if value > 0 else 0
             if value > 0:
                 last, clear, clear_value = point, aim, value
             else:
@@ -257,6 +261,7 @@ class Nucleation:
     def located_held(self, point: Point, clearance: float, end: float) -> Located | None:
         """Where surfaces touch between a point with this clearance and ``end``, edges held."""
         clear, low, hit = point.at, clearance, end
+        cleared = 0
         field = self.edges.field(point.gaps, hit)
         high, minima = self.least(field)
         if high > -self.overlap:
@@ -266,9 +271,10 @@ class Nucleation:
                 break
             # Openings are linear in d: a secant to a fourth of the overlap that is allowed
             share = min(max((low + 0.25 * self.overlap) / (low - high), 0.02), 0.98)
-            aim = clear + (hit - clear) * share
+            aim = clear + (hit - clear) * (share if cleared < _MOST_CLEAR else 0.5)
             aimed = self.edges.field(point.gaps, aim)
             value, there = self.least(aimed)
+            cleared = cleared + 1 if value > 0 else 0
             if value > 0:
                 clear, low = aim, value
             else:
