@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,7 +13,9 @@ from ensemble.interval import interval
 from tools.study.data import Array, Study, aligned
 
 LEVEL = 0.05
-CAMPAIGNS = ("turns", "slope", "between", "weak", "cells", "cells001")
+# The campaigns that were decided on first, and those of two hundred realisations beside them.
+FIRST = ("turns", "slope", "between", "weak")
+HUNDREDS = ("cells", "cells001")
 # (γ, turning point, quantity)
 ROWS = (
     *((0.04, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
@@ -73,10 +75,16 @@ class Row:
         return "open"
 
 
-def series(study: Study, gamma: float, turn: float, name: str) -> dict[float, dict[int, float]]:
+def series(
+    study: Study,
+    gamma: float,
+    turn: float,
+    name: str,
+    campaigns: Sequence[str] = (*FIRST, *HUNDREDS),
+) -> dict[float, dict[int, float]]:
     """A column by H, each by realisation."""
     found: dict[float, dict[int, float]] = {}
-    for campaign in CAMPAIGNS:
+    for campaign in campaigns:
         rows = study.loops.where(campaign=campaign, work_of_adhesion=gamma, max_penetration=turn)
         for hurst in rows.values("hurst"):
             one = rows.where(hurst=hurst)
@@ -86,35 +94,48 @@ def series(study: Study, gamma: float, turn: float, name: str) -> dict[float, di
 
 
 def rows(study: Study) -> Iterator[Row]:
-    """Every row that has been computed."""
+    """Every row that has been computed: all H, and those of hundreds of realisations."""
     for gamma, turn, name in ROWS:
-        losses = series(study, gamma, turn, name)
-        if len(losses) < 2:
-            continue
+        first = series(study, gamma, turn, name, FIRST)
+        many = series(study, gamma, turn, name, HUNDREDS)
         slopes = series(study, gamma, turn, "m2")
-        hursts = sorted(losses, reverse=True)
-        pairs = [(a, b, aligned(losses[a], losses[b])) for a, b in pairwise(hursts)]
-        raw = [_one_sided(both[1] - both[0]) for _, _, both in pairs]
-        rise = _holm([p for p, _ in raw])
-        fall = _holm([p for _, p in raw])
-        steps = []
-        for (a, b, both), up, down in zip(pairs, rise, fall, strict=True):
-            scale = both.mean()
-            relative = (both[1] - both[0]) / scale
-            low, high = interval(relative)
-            steps.append(
-                Step(
-                    hursts=(a, b),
-                    slopes=(next(iter(slopes[a].values())), next(iter(slopes[b].values()))),
-                    difference=float(relative.mean()),
-                    low=float(low),
-                    high=float(high),
-                    p_rise=up,
-                    p_fall=down,
-                    n=both.shape[1],
-                )
+        if len(first) > 1 and not set(first) <= set(many):
+            yield _row(gamma, turn, name, first, slopes)
+        if len(many) > 1:
+            yield _row(gamma, turn, name, many, slopes)
+
+
+def _row(
+    gamma: float,
+    turn: float,
+    name: str,
+    losses: dict[float, dict[int, float]],
+    slopes: dict[float, dict[int, float]],
+) -> Row:
+    """One row: losses by H and realisation."""
+    hursts = sorted(losses, reverse=True)
+    pairs = [(a, b, aligned(losses[a], losses[b])) for a, b in pairwise(hursts)]
+    raw = [_one_sided(both[1] - both[0]) for _, _, both in pairs]
+    rise = _holm([p for p, _ in raw])
+    fall = _holm([p for _, p in raw])
+    steps = []
+    for (a, b, both), up, down in zip(pairs, rise, fall, strict=True):
+        scale = both.mean()
+        relative = (both[1] - both[0]) / scale
+        low, high = interval(relative)
+        steps.append(
+            Step(
+                hursts=(a, b),
+                slopes=(next(iter(slopes[a].values())), next(iter(slopes[b].values()))),
+                difference=float(relative.mean()),
+                low=float(low),
+                high=float(high),
+                p_rise=up,
+                p_fall=down,
+                n=both.shape[1],
             )
-        yield Row(gamma, turn, name, tuple(steps))
+        )
+    return Row(gamma, turn, name, tuple(steps))
 
 
 def _one_sided(differences: Array) -> tuple[float, float]:
