@@ -35,6 +35,8 @@ from numba.core import config as _config
 from numba.core import event
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
+from numba.extending import overload
+from numba.np import arrayobj
 
 from solver.code_cache import CodeFiles, folder_name
 
@@ -53,6 +55,24 @@ _SETTINGS = (
 )
 
 
+def _shapes_differ(source: Any, target: Any) -> None:
+    """Raise that a slice cannot be assigned; a name for what compiled code does."""
+    raise NotImplementedError
+
+
+@overload(_shapes_differ)
+def _shapes_differ_compiled(source: Any, target: Any) -> Any:
+    def plainly(source: Any, target: Any) -> None:
+        raise ValueError("cannot assign a slice from an array of another shape")
+
+    return plainly
+
+
+# numba's own message tells the shapes, for which half of Python's strings are compiled: 3.5 s.
+if hasattr(arrayobj, "raise_with_shape_context"):
+    arrayobj.raise_with_shape_context = _shapes_differ
+
+
 def compiled(function: F) -> F:
     """Compile ``function`` at its first call (numba, nopython), keeping the result on disk.
 
@@ -60,6 +80,14 @@ def compiled(function: F) -> F:
     loops out of vector registers.
     """
     return _compile(function, error_model="numpy")
+
+
+def compiled_for_both(function: F) -> F:
+    """Compile likewise what is called from Python as often as from compiled code: once for both.
+
+    Others called from both are compiled twice.
+    """
+    return _compile(function, from_python=True, error_model="numpy")
 
 
 def compiled_sums(function: F) -> F:
@@ -72,11 +100,17 @@ def compiled_finite_sums(function: F) -> F:
     return _compile(function, fastmath={"reassoc", "nnan", "nsz", "contract"})
 
 
-def _compile(function: F, **options: Any) -> F:
+def _compile(function: F, from_python: bool = False, **options: Any) -> F:
     options["no_cfunc_wrapper"] = True  # that is for calls from C
     dispatcher: Any = numba.njit(**options)(function)
     dispatcher._cache = _Kept(function)
-    template = dispatcher.get_call_template
+    # Most functions are called by compiled ones alone, which need nothing to unpack objects.
+    inner: Any = dispatcher
+    if not from_python:
+        options["no_cpython_wrapper"] = True
+        inner = numba.njit(**options)(function)
+        inner._cache = _Kept(function, "-inner")
+    template = inner.get_call_template
 
     def of_any_value(args: Any, kws: Any) -> Any:
         unliteral: Any = numba.types.unliteral
@@ -87,6 +121,8 @@ def _compile(function: F, **options: Any) -> F:
 
     # otherwise a function is compiled once more for each number that stands in a call
     dispatcher.get_call_template = of_any_value
+    dispatcher.get_overload = inner.get_overload
+    dispatcher.inner = inner
     compiled_function: F = dispatcher
     return compiled_function
 
@@ -151,7 +187,7 @@ class _Call:
 
     def is_ready(self) -> bool:
         """Load it, or compile it; whether it has the name under which it is called."""
-        dispatcher: Any = getattr(sys.modules[self.module], self.function)
+        dispatcher: Any = getattr(sys.modules[self.module], self.function).inner
         dispatcher.compile(self.signature)
         found = dispatcher.overloads[self.signature].fndesc.llvm_func_name
         return bool(found == self.symbol)
@@ -169,9 +205,9 @@ def _calls_in(library: Any) -> list[_Call]:
 class _Kept:
     """What numba's dispatcher asks of a cache, for one function."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], kind: str = "") -> None:
         self._module, self._function = function.__module__, function.__qualname__
-        self._name = f"{self._module}.{self._function}"
+        self._name = f"{self._module}.{self._function}{kind}"
 
     @property
     def cache_path(self) -> str:

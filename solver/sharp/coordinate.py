@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
+from solver.compiled import compiled, compiled_for_both
 from solver.profile import Array
 
 # Columns of the table of gaps.
@@ -22,7 +22,7 @@ LEFT, RIGHT, LEFT_PATCH, RIGHT_PATCH, ALPHA = 0, 1, 2, 3, 4
 _COLUMNS = 5
 
 
-@compiled
+@compiled_for_both
 def map_gaps(gaps: Array) -> Array:
     """Table of gaps, shape (L, 5): both ends, widths of the patches beside them, α.
 

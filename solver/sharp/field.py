@@ -38,7 +38,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compiled import compiled, compiled_sums
+from solver.compiled import compiled, compiled_for_both, compiled_sums
 from solver.profile import Array
 from solver.sharp.coordinate import (
     ALPHA,
@@ -277,7 +277,7 @@ class GapField:
         return by_edge, pressure
 
 
-@compiled
+@compiled_for_both
 def choose_kinds(table: Array, digits: float, counts: Kinds) -> Kinds:
     """Kind of each gap whose modes leave an error of exp(-digits), or the largest kind."""
     kinds = np.zeros(table.shape[0], dtype=np.int64)
@@ -449,7 +449,7 @@ def solve_plain(
     return plain(solve(gaps, prescribed, hold, kinds, fields, rules, panels))
 
 
-@compiled
+@compiled_for_both
 def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
     """∂C_e/∂θ_f, shape (2L, 2L), and ∂Y/∂θ_f, shape (2L,), of a solution with S and S'.
 

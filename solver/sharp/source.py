@@ -22,7 +22,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
-from solver.compiled import compiled, compiled_sums
+from solver.compiled import compiled, compiled_for_both, compiled_sums
 from solver.profile import Array, Profile
 from solver.sharp.coordinate import (
     ALPHA,
@@ -236,7 +236,7 @@ def _value(coefficients: Array, place: float) -> float:
     return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
 
 
-@compiled
+@compiled_for_both
 def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
     """Values of a piecewise series at each angle, shape (len(theta),)."""
     count = theta.shape[0]

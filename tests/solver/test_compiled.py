@@ -265,4 +265,32 @@ def test_numbers_in_a_call_make_no_code_of_their_own(places, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "inner", module.compiled(inner))
     ahead = module.compiled(lambda: inner(1) + inner(2))
     assert ahead() == 5
-    assert len(inner.signatures) == 1
+    assert len(inner.inner.signatures) == 1
+
+
+# ------------------------------------------------------------------------- what is not compiled
+
+
+def put(values: np.ndarray, part: np.ndarray) -> float:
+    values[: part.size] = part
+    values[:2] = part
+    return values[0]
+
+
+def test_assigning_to_a_slice_compiles_no_strings_and_still_refuses_other_shapes(places):
+    with module.watch_compilation() as seen:
+        function = module.compiled(put)
+        assert function(np.zeros(3), np.ones(2)) == 1.0
+    assert seen.functions < 10  # with numba's own message 40 more
+    with pytest.raises(ValueError, match="another shape"):
+        function(np.zeros(5), np.ones(3))
+
+
+def test_only_what_python_calls_can_be_called_from_python(places):
+    called = module.compiled(double)
+    caller = module.compiled(lambda x: called(x) + 1)
+    assert caller(1.5) == 4.0
+    assert not called.overloads  # its code for compiled callers unpacks no objects
+    assert called(1.5) == 3.0
+    both = module.compiled_for_both(double)
+    assert both.inner is both
