@@ -673,6 +673,30 @@ def edge_openings(
     return out
 
 
+@compiled_sums
+def _singular_load(
+    rows: Array,
+    density: Array,
+    sine: Array,
+    cosine: Array,
+    weight: Array,
+    edge_sine: float,
+    edge_cosine: float,
+    strength: float,
+    out: Array,
+) -> None:
+    """Into ``out``: load on other gaps of a density of a gap's ``rows`` and a weight at its end."""
+    scale = strength / (4 * np.pi)
+    for i in range(out.shape[0]):
+        half = sine[i] * edge_cosine - cosine[i] * edge_sine
+        out[i] = scale * weight[i] / (half * half)
+    for j in range(density.shape[0]):
+        row = rows[j]
+        value = density[j]
+        for i in range(out.shape[0]):
+            out[i] -= value * row[i]
+
+
 @compiled
 def _singular_loads(of: Solution, rules: Rules) -> tuple[Array, Array]:
     """Right-hand sides of the regular part of the solution singular at each edge, and its area.
@@ -710,26 +734,23 @@ def _singular_loads(of: Solution, rules: Rules) -> tuple[Array, Array]:
             area[2 * k + 1] += weight[base + j] * high[j]
         edge_sine = np.sin(0.5 * table[k, LEFT : LEFT + 2])
         edge_cosine = np.cos(0.5 * table[k, LEFT : LEFT + 2])
-        for i in range(n):
-            own = base <= i < base + m
-            total_low = 0.0
-            total_high = 0.0
-            for j in range(m):
-                value = matrix[i, base + j]
-                if own:
-                    value -= b[square[kinds[k]] + (i - base) * m + j]
-                total_low -= value * low[j]
-                total_high -= value * high[j]
-            for side in range(2):
-                edge = table[k, LEFT + side]
-                strength = weight[i] * point / slope[k, side]
-                if own:
-                    place = start[kinds[k]] + i - base
-                    bent = mapped(table[k, ALPHA], eta[place] - (2 * side - 1))
-                    extra = w[place] * point * bent + strength * periodic(theta[i] - edge)
-                else:
-                    half = sine[i] * edge_cosine[side] - cosine[i] * edge_sine[side]
-                    extra = strength / (half * half)
-                total = total_low if side == 0 else total_high
-                load[i, 2 * k + side] = total + extra / (4 * np.pi)
+        crack = b[square[kinds[k]] : square[kinds[k]] + m * m].reshape(m, m)
+        for side in range(2):
+            edge = table[k, LEFT + side]
+            strength = point / slope[k, side]
+            density = low if side == 0 else high
+            column = np.empty(n)
+            _singular_load(
+                matrix[base : base + m], density, sine, cosine, weight, edge_sine[side],
+                edge_cosine[side], strength, column,
+            )  # fmt: skip
+            for i in range(m):  # its own gap
+                total = 0.0
+                for j in range(m):
+                    total -= (matrix[base + i, base + j] - crack[i, j]) * density[j]
+                place = start[kinds[k]] + i
+                bent = w[place] * point * mapped(table[k, ALPHA], eta[place] - (2 * side - 1))
+                images = weight[base + i] * strength * periodic(theta[base + i] - edge)
+                column[base + i] = total + (bent + images) / (4 * np.pi)
+            load[:, 2 * k + side] = column
     return load, area

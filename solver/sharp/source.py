@@ -236,6 +236,19 @@ def _value(coefficients: Array, place: float) -> float:
     return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
 
 
+@compiled
+def _both_values(panels: Panels, place: float) -> tuple[float, float]:
+    """S and S' at θ = place · panel width: two recurrences side by side."""
+    k = int(np.floor(place))
+    x = 2 * (place - k) - 1
+    k &= panels.finest - 1
+    b1 = b2 = e1 = e2 = 0.0
+    for j in range(panels.stress.shape[1] - 1, 0, -1):
+        b1, b2 = 2 * x * b1 - b2 + panels.stress[k, j], b1
+        e1, e2 = 2 * x * e1 - e2 + panels.slope[k, j], e1
+    return x * b1 - b2 + panels.stress[k, 0], x * e1 - e2 + panels.slope[k, 0]
+
+
 @compiled_for_both
 def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
     """Values of a piecewise series at each angle, shape (len(theta),)."""
@@ -330,9 +343,12 @@ def _end_piece(
                 weight = panels.w[i] * (stop - at) / 2
             place = (gap[LEFT] + r if side == 0 else gap[RIGHT] - r) / panels.width
             nodes[_MINUS, count], nodes[_PLUS, count] = one_minus_plus(gap, r, side)
-            nodes[_STRESS, count] = weight * _value(panels.stress, place)
             if nodes.shape[0] > _SLOPE:
-                nodes[_SLOPE, count] = weight * _value(panels.slope, place)
+                stress, slope = _both_values(panels, place)
+                nodes[_STRESS, count] = weight * stress
+                nodes[_SLOPE, count] = weight * slope
+            else:
+                nodes[_STRESS, count] = weight * _value(panels.stress, place)
             count += 1
         at = stop
         stop = min(2 * at, length)
