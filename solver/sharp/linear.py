@@ -1,7 +1,7 @@
 """Dense symmetric positive definite systems, compiled: small ones without a call of LAPACK.
 
 A field of a few gaps has some tens of unknowns; there the overhead of library calls and their
-copies is what costs. Larger systems are handed to LAPACK and BLAS in blocks.
+copies is what costs. Many right-hand sides of larger systems are handed to BLAS in blocks.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from solver.compiled import compiled, compiled_sums
 from solver.profile import Array
 
-_SMALL = 32  # up to this order the loops here are faster than LAPACK called from compiled code
+_SMALL = 32  # up to this order plain loops are faster than panels and BLAS
 _BLOCK = 48
 
 
@@ -66,12 +66,8 @@ def _factor_panels(a: Array) -> bool:
                 row[j] *= scale
         for i in range(stop, n):  # so there are four
             row = a[i, i:]
-            one, two, three, four = (
-                a[start, i:],
-                a[start + 1, i:],
-                a[start + 2, i:],
-                a[start + 3, i:],
-            )
+            one, two = a[start, i:], a[start + 1, i:]
+            three, four = a[start + 2, i:], a[start + 3, i:]
             c1, c2, c3, c4 = one[0], two[0], three[0], four[0]
             for j in range(row.shape[0]):
                 row[j] -= c1 * one[j] + c2 * two[j] + c3 * three[j] + c4 * four[j]
