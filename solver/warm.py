@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from solver.code_cache import installed_folder
 from solver.compiled import (
     Compilation,
@@ -114,6 +116,14 @@ def small_problem(work_of_adhesion: float) -> Problem:
     return Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
 
 
+def _crowded() -> SharpMethod:
+    """A method that takes a dozen gaps for many, on a profile that has them."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=1, h_rms=1e-6)
+    method = SharpMethod(Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.004))
+    method.edges.many = 6
+    return method
+
+
 def _small_loops(method: str) -> None:
     """Loops that call all compiled functions with all types of arguments that loops call them."""
     for work_of_adhesion in (0.04, 0.0):
@@ -130,7 +140,6 @@ def _small_loops(method: str) -> None:
 
         run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
         if isinstance(chosen, SharpMethod) and work_of_adhesion > 0:
-            chosen.edges.many = 3  # few enough for this loop: the ways of many gaps
-            run_loop(chosen, max_penetration=0.8, load_steps=2)
+            run_loop(_crowded(), max_penetration=0.5, load_steps=2)
         nodes = chosen.nodes or 256
         chosen.fields(max(states, key=lambda state: state.patches), nodes)

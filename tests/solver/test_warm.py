@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from solver.control import Control
 from solver.loop import run_loop
+from solver.material import HalfSpace
+from solver.problem import Problem
+from solver.profile import self_affine_profile
 from solver.registry import make_method
+from solver.sharp.method import SharpMethod
 from solver.warm import small_problem, warm, watch_compilation
 
 
@@ -36,3 +41,14 @@ def test_the_loops_that_compile_everything_end(method, work_of_adhesion):
     chosen = make_method(method, small_problem(work_of_adhesion))
     loop = run_loop(chosen, max_penetration=0.8, load_steps=2)
     assert (loop.loss > 1e-3) is (work_of_adhesion > 0)
+
+
+def test_after_warming_up_loops_with_many_gaps_compile_nothing():
+    warm(["sharp"])
+    profile = self_affine_profile(0.7, period=2e-3 * np.pi, n0=10, ratio=6, seed=2, h_rms=1e-6)
+    method = SharpMethod(Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.003))
+    method.edges.many = 7
+    with watch_compilation() as seen:
+        loop = run_loop(method, max_penetration=0.6, load_steps=6)
+    assert loop.patches.max() > method.edges.many
+    assert seen.functions == 0
