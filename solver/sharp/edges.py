@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from solver.method import PathError
 from solver.profile import Array
-from solver.sharp.balance import Law
+from solver.sharp.balance import Law, imbalance
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.descent import LOST, MET, NARROW, RESTING, descend
 from solver.sharp.equilibrium import equilibrium
@@ -344,7 +344,26 @@ class EdgeMechanics:
                 point = self.equilibrium(gaps, prescribed, reach, kinds, patient=patient)
                 if point is not None:
                     return point
+                if rests > 2 * _RESTS:
+                    break
+                if not patient:
+                    gaps = self._pushed_on(gaps, prescribed, rests - _RESTS)
         raise PathError(f"the descent at q0 s = {prescribed:.9g} did not end")
+
+    def _pushed_on(self, gaps: Array, prescribed: float, times: int) -> Array:
+        """Gaps whose most unbalanced edge has gone on, ``times`` half a longest step.
+
+        Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
+        minimum: the flow stands still there. A minimum draws the edge back.
+        """
+        residual, _ = imbalance(self.field(gaps, prescribed).solution, self.law, self.source.panels)
+        e = int(np.argmax(np.abs(residual)))
+        length, patch = self.widths(gaps)
+        beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
+        step = np.zeros(gaps.size)
+        step[e] = min(0.5 * times * self.law.longest, 0.25 * length[e // 2], 0.25 * beside)
+        onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
+        return onwards
 
     def without_small(self, gaps: Array) -> Array | None:
         """Gaps without closed gaps or vanished patches, or None if there are none."""

@@ -9,7 +9,7 @@ from adhesis import HalfSpace, Problem, self_affine_profile
 from solver.loop import run_loop
 from solver.sharp.balance import imbalance, symmetric, tangent_of
 from solver.sharp.coordinate import map_gaps
-from solver.sharp.edges import EdgeMechanics
+from solver.sharp.edges import CORRECTED, EdgeMechanics
 from solver.sharp.far import solve_many
 from solver.sharp.field import FIXED, RULES, Solution, choose_kinds, derivatives, solve_plain
 from solver.sharp.linear import is_definite
@@ -19,6 +19,7 @@ from solver.sharp.source import StressSource
 from solver.sharp.tree import plant
 from solver.sharp.window import surroundings
 from solver.sharp.yielding import newton_many
+from tests.support import ghost
 
 
 @pytest.fixture(scope="module")
@@ -231,3 +232,20 @@ def test_stiffness_between_some_edges_is_the_dense_one(loaded):
         edges.many = before
     np.fill_diagonal(dense, 0.0)
     assert np.abs(tree - dense).max() < 1e-5 * np.abs(dense).max()
+
+
+def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
+    """Balanced to the field's error, and Newton's iteration finds nothing: it goes on all the same.
+
+    In windows, and with dense matrices, to one minimum.
+    """
+    profile = self_affine_profile(
+        ghost.HURST, period=2e-3 * np.pi, n0=10, ratio=100, seed=ghost.SEED, h_rms=1e-6
+    )
+    found = []
+    for many in (30, 100):
+        edges = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), ghost.WORK_OF_ADHESION)).edges
+        edges.many = many
+        found.append(edges.relax(ghost.GAPS, ghost.SEPARATION, CORRECTED * edges.wave))
+        assert edges.count.fields < 2000
+    assert np.abs(found[0].field.gaps - found[1].field.gaps).max() < 0.1 * edges.wave
