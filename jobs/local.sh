@@ -12,7 +12,8 @@ set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 campaign=${1:?which campaign? usage: jobs/local.sh CAMPAIGN.toml [RANKS]}
-ranks=${2:-$(($(nproc 2>/dev/null || getconf _NPROCESSORS_ONLN) + 1))}
+# nproc goes by OMP_NUM_THREADS, which says nothing of ranks
+ranks=${2:-$(($(env -u OMP_NUM_THREADS nproc 2>/dev/null || getconf _NPROCESSORS_ONLN) + 1))}
 name=$(basename "$campaign" .toml)
 out=${OUT:-out}
 

@@ -271,7 +271,7 @@ build_h5py() {
     # A compile job for each core and no optimisation, which h5py's thin wrappers do not need: 2 min, not 8.
     # Without isolation, or the build would first compile an old mpi4py from source.
     local config=$root/.setup/build.cfg
-    printf '[build_ext]\nparallel = %s\n' "$(nproc 2>/dev/null || echo 2)" >"$config"
+    printf '[build_ext]\nparallel = %s\n' "$(env -u OMP_NUM_THREADS nproc 2>/dev/null || echo 2)" >"$config"
     install $(locked mpi4py) &&
         DIST_EXTRA_CONFIG=$config CC=$compiler HDF5_MPI=ON HDF5_DIR=$hdf5 CFLAGS='-O1 -g0 -w' \
             pip wheel --no-cache-dir --no-build-isolation --no-deps \
