@@ -10,6 +10,7 @@ A stamp is a text "Source" inside the PNG: version and commit of adhesis, and th
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
@@ -131,6 +132,8 @@ def make(name: str, ranks: int) -> None:
                 continue
             to = ROOT / "docs" / part.folder / (part.name or path.name)
             shutil.copyfile(path, to)
+            if to.suffix == ".md":  # links to what is not kept
+                to.write_text(re.sub(r" \(\[PDF\]\([^)]*\)\)", "", to.read_text("utf-8")), "utf-8")
             if to.suffix == ".png":
                 stamp(to, source(name))
             print(to.relative_to(ROOT), flush=True)
