@@ -1,17 +1,19 @@
 """Dense symmetric positive definite systems, compiled: small ones without a call of LAPACK.
 
 A field of a few gaps has some tens of unknowns; there the overhead of library calls and their
-copies is what costs. Many right-hand sides of larger systems are handed to BLAS in blocks.
+copies is what costs. Larger systems are handed to LAPACK and BLAS in blocks.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from solver.compiled import compiled, compiled_sums
 from solver.profile import Array
 
-_SMALL = 32  # up to this order plain loops are faster than panels and BLAS
+_SMALL = 32  # up to this order the loops here are faster than LAPACK called from compiled code
 _BLOCK = 48
 
 
@@ -42,48 +44,21 @@ def factor_rows(a: Array, floor: float) -> bool:
     return True
 
 
-@compiled_sums
-def _factor_panels(a: Array) -> bool:
-    """Lower Cholesky factor in place, above the diagonal, too; False if there is none.
-
-    Four rows of its transpose at a time: what is left of the matrix passes through the processor
-    once for the four.
-    """
-    n = a.shape[0]
-    for start in range(0, n, 4):
-        stop = min(start + 4, n)
-        for k in range(start, stop):
-            row = a[k, k:]
-            for earlier in range(start, k):
-                other = a[earlier, k:]
-                factor = other[0]
-                for j in range(row.shape[0]):
-                    row[j] -= factor * other[j]
-            if not row[0] > 0:
-                return False
-            scale = 1 / np.sqrt(row[0])
-            for j in range(row.shape[0]):
-                row[j] *= scale
-        for i in range(stop, n):  # so there are four
-            row = a[i, i:]
-            one, two = a[start, i:], a[start + 1, i:]
-            three, four = a[start + 2, i:], a[start + 3, i:]
-            c1, c2, c3, c4 = one[0], two[0], three[0], four[0]
-            for j in range(row.shape[0]):
-                row[j] -= c1 * one[j] + c2 * two[j] + c3 * three[j] + c4 * four[j]
-    for i in range(n):
-        for k in range(i):
-            a[i, k] = a[k, i]
-    return True
-
-
 @compiled
 def cholesky(a: Array) -> tuple[Array, bool]:
-    """Lower Cholesky factor of ``a``, whatever stands above it, and whether there is one."""
+    """Lower Cholesky factor of ``a`` and whether there is one.
+
+    Raises
+    ------
+    LinAlgError
+        If there is none and the system is a large one.
+    """
+    if a.shape[0] > _SMALL:
+        lapack: Any = np.linalg.cholesky(a)  # numpy promises some float
+        return lapack, True
     factor = a.copy()
-    if factor.shape[0] > _SMALL:
-        return factor, _factor_panels(factor)
-    return factor, factor_rows(factor, 0.0)
+    definite = factor_rows(factor, 0.0)
+    return factor, definite
 
 
 @compiled

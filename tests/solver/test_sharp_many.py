@@ -19,7 +19,7 @@ from solver.sharp.source import StressSource
 from solver.sharp.tree import plant
 from solver.sharp.window import surroundings
 from solver.sharp.yielding import newton_many
-from tests.support import ghost
+from tests.support import next_to_a_fold
 
 
 @pytest.fixture(scope="module")
@@ -240,12 +240,21 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
     In windows, and with dense matrices, to one minimum.
     """
     profile = self_affine_profile(
-        ghost.HURST, period=2e-3 * np.pi, n0=10, ratio=100, seed=ghost.SEED, h_rms=1e-6
+        next_to_a_fold.HURST,
+        period=2e-3 * np.pi,
+        n0=10,
+        ratio=100,
+        seed=next_to_a_fold.SEED,
+        h_rms=1e-6,
     )
     found = []
     for many in (30, 100):
-        edges = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), ghost.WORK_OF_ADHESION)).edges
+        edges = SharpMethod(
+            Problem(profile, HalfSpace(1e6, 0.5), next_to_a_fold.WORK_OF_ADHESION)
+        ).edges
         edges.many = many
-        found.append(edges.relax(ghost.GAPS, ghost.SEPARATION, CORRECTED * edges.wave))
+        found.append(
+            edges.relax(next_to_a_fold.GAPS, next_to_a_fold.SEPARATION, CORRECTED * edges.wave)
+        )
         assert edges.count.fields < 2000
     assert np.abs(found[0].field.gaps - found[1].field.gaps).max() < 0.1 * edges.wave
