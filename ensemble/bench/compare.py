@@ -18,7 +18,20 @@ from ensemble.bench.measure import Measured, Measurement, Run, measure
 from ensemble.bench.scenes import FULL, GROWTH, QUICK, WARM_UP, Scene
 from ensemble.bench.tamaas import has_tamaas
 
-__all__ = ["FULL", "GROWTH", "QUICK", "Line", "Ratio", "Reference", "benchmark", "growth", "ratios"]
+__all__ = [
+    "FULL",
+    "GROWTH",
+    "QUICK",
+    "Exponent",
+    "Line",
+    "Quotient",
+    "Ratio",
+    "Reference",
+    "benchmark",
+    "exponents",
+    "growth",
+    "ratios",
+]
 
 # Doubling the nodes costs a grid run up to this factor.
 _NEXT_GRID = 4.0
@@ -51,17 +64,60 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Ratio:
-    """CPU time of ``grid`` over that of one run of ``sharp``, at the error of the latter.
+class Quotient:
+    """A ratio of CPU times at equal error.
 
     ``bound`` is "" if the error lies within the grid's series (interpolated, log-log), ">" if no
     grid run is as exact (``value`` is then the ratio to the most exact one: the true one is
     larger), "<" if the cheapest grid run is already more exact.
     """
 
-    line: Line
     value: float
     bound: str
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """CPU time of ``grid`` over that of one run of ``sharp``, at the error of the latter.
+
+    The errors of ``grid`` come from single jumps and change their sign from one number of nodes to
+    the next: a coarse grid can be right by chance, and who has no reference does not know when.
+
+    Attributes
+    ----------
+    kept : Quotient
+        To the grid from which on every finer one that finished is as exact.
+    lucky : Quotient
+        To the cheapest grid that happens to be as exact.
+    """
+
+    line: Line
+    kept: Quotient
+    lucky: Quotient
+
+
+@dataclass(frozen=True)
+class Exponent:
+    """Growth of the CPU time of ``sharp`` as a power, by least squares in the logarithms.
+
+    Attributes
+    ----------
+    among : str
+        What the lines have in common.
+    variable : str
+        What grows.
+    least, most : int
+        Its range.
+    of_loop, of_solution : float
+        Exponents of the CPU time of a loop, and of a solution.
+    """
+
+    among: str
+    variable: str
+    least: int
+    most: int
+    of_loop: float
+    of_solution: float
 
 
 def benchmark(
@@ -100,17 +156,58 @@ def growth(
     seconds: float = 360.0,
     on_line: Callable[[Line], None] | None = None,
 ) -> list[Line]:
-    """Measure how the cost of ``sharp`` grows; these lines have no reference and no error."""
+    """Measure how cost grows; these lines have no reference and no error."""
     unknown = Reference(math.nan, "none")
-    lines = []
+    lines: list[Line] = []
     _fill_caches()
     for scene in scenes:
-        for accuracy in scene.accuracies:
-            run = Run(scene, "sharp", accuracy, scene.load_steps, seconds)
-            lines.append(Line(run, unknown, measure(run)))
-            if on_line is not None:
-                on_line(lines[-1])
+        settings: list[tuple[Measured, Sequence[float]]] = [
+            ("sharp", scene.accuracies),
+            ("grid", scene.grids),
+        ]
+        for method, values in settings:
+            for value in values:
+                run = Run(scene, method, value, scene.load_steps, seconds)
+                lines.append(Line(run, unknown, measure(run)))
+                if on_line is not None:
+                    on_line(lines[-1])
     return lines
+
+
+def exponents(lines: Sequence[Line]) -> list[Exponent]:
+    """Fit how the CPU time of ``sharp`` grows with its patches, and with the wave numbers.
+
+    From each series of finished lines of :func:`growth` that differ in γ alone, or in the highest
+    harmonic alone.
+    """
+    done = [line for line in lines if line.run.method == "sharp" and not line.measured.note]
+    found = []
+    for top in sorted({_top(line) for line in done}):
+        series = [line for line in done if _top(line) == top]
+        sizes = [line.measured.patches for line in series]
+        found += _exponent(f"m to {top}", "patches", sizes, series)
+    for gamma in sorted({line.run.scene.work_of_adhesion for line in done}, reverse=True):
+        series = [line for line in done if line.run.scene.work_of_adhesion == gamma]
+        found += _exponent(f"γ = {gamma:g}", "wave numbers", [_top(s) for s in series], series)
+    return found
+
+
+def _top(line: Line) -> int:
+    return line.run.scene.n0 * line.run.scene.ratio
+
+
+def _exponent(
+    among: str, variable: str, sizes: Sequence[int], series: Sequence[Line]
+) -> list[Exponent]:
+    if len(set(sizes)) < 2:
+        return []
+    seconds = np.array([line.measured.cpu_seconds for line in series])
+    solutions = np.array([line.measured.solutions for line in series])
+    of_loop, of_solution = (
+        float(np.polyfit(np.log(sizes), np.log(cost), 1)[0])
+        for cost in (seconds, seconds / solutions)
+    )
+    return [Exponent(among, variable, min(sizes), max(sizes), of_loop, of_solution)]
 
 
 def ratios(lines: Sequence[Line]) -> list[Ratio]:
@@ -130,29 +227,34 @@ def ratios(lines: Sequence[Line]) -> list[Ratio]:
             and math.isfinite(other.error)
         ]
         if series:
-            found.append(_ratio(line, series))
+            kept, lucky = _quotient(line, _kept(series)), _quotient(line, series)
+            found.append(Ratio(line, kept, lucky))
     return found
 
 
-def _ratio(line: Line, series: Sequence[tuple[float, float]]) -> Ratio:
+def _quotient(line: Line, series: Sequence[tuple[float, float]]) -> Quotient:
     front = _front(series)
     errors, seconds = (np.array(column) for column in zip(*front, strict=True))
     own = line.measured.cpu_seconds
     error = max(abs(line.error), 1e-300)
     if error < errors[-1]:
-        return Ratio(line, float(seconds[-1] / own), ">")
+        return Quotient(float(seconds[-1] / own), ">")
     if error > errors[0]:
-        return Ratio(line, float(seconds[0] / own), "<")
+        return Quotient(float(seconds[0] / own), "<")
     at_equal_error = np.interp(-np.log(error), -np.log(errors), np.log(seconds))
-    return Ratio(line, float(np.exp(at_equal_error) / own), "")
+    return Quotient(float(np.exp(at_equal_error) / own), "")
+
+
+def _kept(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Runs (error, seconds), coarse to fine, each with the largest error of it and finer ones."""
+    kept: list[tuple[float, float]] = []
+    for error, seconds in reversed(series):
+        kept.append((max(error, kept[-1][0]) if kept else error, seconds))
+    return kept[::-1]
 
 
 def _front(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Runs (error, seconds) that no cheaper run beats in error; errors fall along the list.
-
-    An error that changes its sign passes through zero by chance, and a finer grid can then be less
-    exact; counting the lucky run in favours the grid.
-    """
+    """Runs (error, seconds) that no cheaper run beats in error; errors fall along the list."""
     front: list[tuple[float, float]] = []
     for error, seconds in sorted(series, key=lambda pair: pair[1]):
         if not front or error < front[-1][0]:

@@ -23,7 +23,7 @@ from ensemble.bench.tamaas import tamaas_loop
 from ensemble.run.launch import ONE_THREAD
 from solver.loop import LoopResult, run_loop
 from solver.registry import MethodName, make_method
-from solver.warm import watch_compilation
+from solver.warm import warm, watch_compilation
 
 Measured = Literal["grid", "sharp", "tamaas"]
 
@@ -141,6 +141,8 @@ def measure_here(run: Run, *, limited: bool = False) -> Measurement:
             _limit(run.seconds)
         return _measure_tamaas(run)
     _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
+    if run.method == "sharp" and run.scene.shape == "rough":
+        warm(("sharp",))  # loads the code for many gaps, too
     before = peak_megabytes()
     if limited:
         _limit(run.seconds)

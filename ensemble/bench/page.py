@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ensemble.bench.compare import Line, Ratio
+from ensemble.bench.compare import Exponent, Line, Quotient, Ratio
 
 LINE_COLUMNS = (
     "method",
@@ -17,7 +17,12 @@ LINE_COLUMNS = (
     "audit",
     "solutions",
 )
-GROWTH_COLUMNS = ("scene", "setting", "CPU s", "MB", "W~", "patches", "jumps", "solutions", "ms")
+GROWTH_COLUMNS = (
+    *("scene", "method", "setting", "CPU s", "MB", "W~", "audit"),
+    *("patches", "jumps", "solutions", "ms"),
+)
+_RATIO_COLUMNS = ("scene", "sharp", "error", "grid / sharp", "luckiest grid / sharp")
+_EXPONENT_COLUMNS = ("among", "grows with", "from", "to", "CPU time of a loop", "of a solution")
 
 
 def line_cells(line: Line) -> list[str]:
@@ -41,17 +46,32 @@ def growth_cells(line: Line) -> list[str]:
     """Return one line of the table of growth as text."""
     measured, run = line.measured, line.run
     if measured.note:
-        return [run.scene.title, run.described, measured.note, *[""] * (len(GROWTH_COLUMNS) - 3)]
+        rest = [""] * (len(GROWTH_COLUMNS) - 4)
+        return [run.scene.title, run.method, run.described, measured.note, *rest]
     return [
         run.scene.title,
+        run.method,
         run.described,
         _seconds(measured.cpu_seconds),
         f"{measured.megabytes:.0f}",
         f"{measured.loss_dimensionless:.6g}",
+        _signed(measured.audit_residual),
         str(measured.patches),
         str(measured.jumps),
         str(measured.solutions),
         f"{1e3 * measured.cpu_seconds / measured.solutions:.2f}",
+    ]
+
+
+def exponent_cells(one: Exponent) -> list[str]:
+    """Return one line of the table of exponents as text."""
+    return [
+        one.among,
+        one.variable,
+        str(one.least),
+        str(one.most),
+        f"{one.of_loop:.2f}",
+        f"{one.of_solution:.2f}",
     ]
 
 
@@ -84,7 +104,11 @@ def record(line: Line) -> dict[str, object]:
 
 
 def page(
-    lines: Sequence[Line], grown: Sequence[Line], compared: Sequence[Ratio], made_by: str
+    lines: Sequence[Line],
+    grown: Sequence[Line],
+    compared: Sequence[Ratio],
+    fitted: Sequence[Exponent],
+    made_by: str,
 ) -> str:
     """Return the Markdown page: a table for each scene, the ratios, the growth."""
     parts = [f"Made by {made_by}.", ""]
@@ -105,20 +129,28 @@ def page(
                 ratio.line.run.scene.title,
                 ratio.line.run.described,
                 f"{abs(ratio.line.error):.1e}",
-                f"{ratio.bound} {ratio.value:.2g}".strip(),
+                _quotient(ratio.kept),
+                _quotient(ratio.lucky),
             ]
             for ratio in compared
         ]
-        parts += [*_markdown(("scene", "sharp", "error", "grid / sharp"), rows), ""]
+        parts += [*_markdown(_RATIO_COLUMNS, rows), ""]
     if grown:
-        parts += ["### How the cost of sharp grows", ""]
+        parts += ["### How the cost grows", ""]
         parts += [*_markdown(GROWTH_COLUMNS, [growth_cells(line) for line in grown]), ""]
+    if fitted:
+        parts += ["### Exponents of the growth of sharp", ""]
+        parts += [*_markdown(_EXPONENT_COLUMNS, [exponent_cells(one) for one in fitted]), ""]
     return "\n".join(parts)
 
 
 def _markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     rule = ["---" if k < 2 else "---:" for k in range(len(columns))]
     return ["| " + " | ".join(row) + " |" for row in (columns, rule, *rows)]
+
+
+def _quotient(one: Quotient) -> str:
+    return f"{one.bound} {one.value:.2g}".strip()
 
 
 def _seconds(value: float) -> str:

@@ -138,6 +138,7 @@ ROUGH = Scene(
     work_of_adhesion=0.01,
     n0=10,
     ratio=25,
+    grids=(8, 16, 32, 64, 128, 256),
     ranges=(0.3, 0.2),
     tightest=(1e-7, 1e-6, 1e-5, 1e-4),
 )
@@ -155,6 +156,15 @@ PAPER = Scene(
 QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
 FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)
 
+# Highest over lowest harmonic, γ, and the grid beside sharp: the coarsest, where that ends in time.
+_GROWTH = (
+    *((25, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025)),
+    *((100, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025, 0.0006)),
+    (100, 0.00015, ()),
+    (1000, 0.04, (8,)),
+    *((1000, gamma, ()) for gamma in (0.01, 0.0025)),
+    (10_000, 0.04, ()),
+)
 GROWTH = tuple(
     Scene(
         name=f"growth-{10 * ratio}-{gamma:g}",
@@ -163,12 +173,12 @@ GROWTH = tuple(
         work_of_adhesion=gamma,
         n0=10,
         ratio=ratio,
+        grids=grids,
         accuracies=(1e-3,),
     )
-    for ratio in (25, 100, 1000)
-    for gamma in (0.04, 0.01, 0.0025)
+    for ratio, gamma, grids in _GROWTH
 )
-"""How the cost of ``sharp`` grows with the number of patches (small γ) and of wave numbers."""
+"""How cost grows with the number of patches (small γ) and of wave numbers."""
 
 # Meets touch, jumps, merging and vanishing in well below a second: compiles what a method compiles.
 WARM_UP = Scene(

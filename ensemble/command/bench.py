@@ -1,7 +1,7 @@
 """Speed of each method against its error in the loss: CPU time, memory, table and figure.
 
 Every run has a process of its own with one thread; time is CPU time, so other work on the machine
-does not count. The full benchmark takes about half an hour, --quick less than a minute.
+does not count. The full benchmark takes three quarters of an hour, --quick less than a minute.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ensemble.bench.compare import FULL, QUICK, Line, benchmark, growth, ratios
+from ensemble.bench.compare import FULL, QUICK, Line, benchmark, exponents, growth, ratios
 from ensemble.bench.page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page, record
 from ensemble.errors import InputError
 from ensemble.ticker import tell, ticking
@@ -82,11 +82,11 @@ def execute(args: argparse.Namespace) -> int:
         console.print(_table(title, LINE_COLUMNS, [line_cells(line) for line in chosen]))
     if grown:
         rows = [growth_cells(line) for line in grown]
-        console.print(_table("How the cost of sharp grows", GROWTH_COLUMNS, rows))
+        console.print(_table("How the cost grows", GROWTH_COLUMNS, rows))
     compared = ratios(lines)
     _write_csv(args.to / "benchmark.csv", [*lines, *grown])
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
-    text = page(lines, grown, compared, f"`{command}` on {_machine()}")
+    text = page(lines, grown, compared, exponents(grown), f"`{command}` on {_machine()}")
     (args.to / "benchmark.md").write_text(text, encoding="utf-8")
     _draw(lines, args.to / "benchmark")
     console.print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
