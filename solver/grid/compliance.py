@@ -160,6 +160,10 @@ class EdgeCompliance:
         known = self._pairs.get(key)
         if known is None:
             _, width, left, right, before, after = key
+            # Rounded lengths must not reach round the period.
+            left = min(left, self.n - 2)
+            right = min(right, self.n - 1 - left)
+            width = min(width, self.n - left - right)
             blocks = [(0, 1, _fine_both(width))]
             free = self.n - width - left - right
             after = min(after, free)
@@ -183,6 +187,9 @@ class EdgeCompliance:
         known = self._pairs.get(key)
         if known is None:
             _, near, gap, far = key
+            # Rounded lengths must not reach round the period.
+            gap = min(gap, self.n - 2)
+            near = min(near, self.n - gap - 1)
             far = min(far, self.n - gap - near)
             blocks = [(0, -1, _fine_both(near))]
             if far > 0:
@@ -192,17 +199,21 @@ class EdgeCompliance:
 
     def _compute(self, key: tuple[int, ...]) -> float:
         """Schur complement of the node at 0; the patch lies at -1 and beyond."""
-        blocks = [(0, -1, _fine_both(key[0]))]
-        if len(key) > 1:
-            width, gap, next_width, other_gap, other_width = key
-            # Rounded lengths must not reach round the period.
-            free = self.n - gap - width - other_gap
-            next_width = min(next_width, free)
-            other_width = min(other_width, free - next_width)
-            if next_width > 0:
-                blocks.append((gap, 1, _fine_near(next_width)))
-            if other_width > 0:
-                blocks.append((-width - other_gap, -1, _fine_near(other_width)))
+        if len(key) == 1:
+            return float(self._schur([(0, -1, _fine_both(key[0]))], (0,))[0, 0])
+        width, gap, next_width, other_gap, other_width = key
+        # Rounded lengths must not reach round the period.
+        gap = min(gap, self.n - 1)
+        other_gap = min(other_gap, self.n - gap)
+        width = min(width, self.n - gap - other_gap)
+        free = self.n - gap - width - other_gap
+        next_width = min(next_width, free)
+        other_width = min(other_width, free - next_width)
+        blocks = [(0, -1, _fine_both(width))]
+        if next_width > 0:
+            blocks.append((gap, 1, _fine_near(next_width)))
+        if other_width > 0:
+            blocks.append((-width - other_gap, -1, _fine_near(other_width)))
         return float(self._schur(blocks, (0,))[0, 0])
 
     def _schur(

@@ -201,6 +201,35 @@ def test_compliance_of_a_single_patch_down_to_the_last_gap():
     assert compliance(n - 1, 1, None) < 1e-6 * kernel[0]
 
 
+@pytest.mark.parametrize("gap", [27, 43, 70, 306, 700])
+def test_compliance_of_a_pair_of_edges_where_patches_fill_the_period(gap):
+    """Lengths are rounded, up to a few per cent longer than the period that they share."""
+    n = 1024
+    kernel = ElasticGrid(n, 1.0, 1e6).kernel()
+    for near in {(n - gap) // 3 + 1, (n - gap) // 2, n - gap - 2 - (n - gap) // 5}:
+        compliance = EdgeCompliance(kernel)
+        nodes = np.arange(gap, n)  # both patches, which are one here
+        across = dense(kernel, np.array([0, gap - 1]), nodes)
+        own = dense(kernel, np.array([0, gap - 1]), np.array([0, gap - 1]))
+        exact = own - across @ np.linalg.solve(dense(kernel, nodes, nodes), across.T)
+        found = compliance.across_gap(near, gap, n - gap - near)
+        assert np.abs(found - exact).max() < 0.05 * exact[0, 0]
+
+
+@pytest.mark.parametrize("width", [3, 27, 43, 306, 700, 1000, 1017])
+def test_compliance_of_edges_of_a_patch_that_fills_the_period(width):
+    n = 1024
+    kernel = ElasticGrid(n, 1.0, 1e6).kernel()
+    compliance = EdgeCompliance(kernel)
+    left, right = 3, 2
+    for other in {1, (n - width - left - right) // 2, n - width - left - right}:
+        found = compliance.across_patch(width, left, right, other, n - width - left - right - other)
+        assert np.isfinite(found).all()
+        assert np.linalg.eigvalsh(found)[0] > 0
+        one = compliance(width, right, (other, left, n - width - left - right - other))
+        assert 0 < one < 3 * kernel[0]
+
+
 def test_moving_an_edge_by_one_node_costs_what_the_survey_says():
     method = rough()
     separation = 0.5e-6
