@@ -25,8 +25,9 @@ from solver.sharp.equilibrium import equilibrium
 from solver.sharp.far import solve_many_plain
 from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution, choose_kinds
 from solver.sharp.many import equilibrium_many
+from solver.sharp.nearby import Start
 from solver.sharp.source import StressSource
-from solver.sharp.window import descend_many
+from solver.sharp.window import About, descend_many, known_about
 from solver.sharp.yielding import between_edges
 
 MANY = 30  # from so many gaps on, windows and the tree of gaps replace dense matrices
@@ -36,6 +37,9 @@ _DESCENT_LIMIT = 100_000
 _RESTS = 20  # how often a descent may come to rest without a minimum that Newton's iteration finds
 _FAINT = 10.0  # forces this small, in units of the field's tolerance, are its error
 _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
+_SHORT = 0.3  # share of the way to an earlier point below which a nearer one tells less of a branch
+_CHANGED = 0.3  # share by which the rate of an edge may change in a jump that does not concern it
+_ALIKE = 0.01  # edges of two descents that come to rest so near to each other, in λ_min, have met
 
 
 @dataclass
@@ -60,11 +64,14 @@ class Track:
         One for every set of gaps on the way.
     astray, met : bool
         Whether the other descent has left the track, and come back to it.
+    rest : array, optional
+        Gaps of a window in which the descent first came to rest.
     """
 
     ways: list[Array] = field(default_factory=list)
     astray: bool = False
     met: bool = False
+    rest: Array | None = None
 
     def of(self, edges: int) -> Array:
         """The track where there are so many edges."""
@@ -75,6 +82,13 @@ class Track:
 
 class FullContact(Exception):
     """The last gap of the period closes: no state of gaps is left."""
+
+
+class Past(NamedTuple):
+    """Of every edge of a branch, d at an earlier place and its rate there; NaN if not known."""
+
+    at: Array
+    rate: Array
 
 
 class Before(NamedTuple):
@@ -101,6 +115,10 @@ class Point:
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     before : Before, optional
         The point before it on its branch.
+    about : About, optional
+        Of many gaps: what windows on it are opened with.
+    past : Past, optional
+        Likewise: how its edges moved earlier.
     """
 
     at: float
@@ -109,6 +127,8 @@ class Point:
     slope: float
     clearance: float = 0.0
     before: Before | None = None
+    about: About | None = None
+    past: Past | None = None
 
     @property
     def gaps(self) -> Array:
@@ -136,6 +156,47 @@ class Point:
         point = copy(self)
         object.__setattr__(point, "before", before)
         return point
+
+    def after(self, earlier: Point) -> Point:
+        """Return this point with what ``earlier``, one of the same gaps, tells of its past."""
+        at, rate = np.full(earlier.rate.shape, earlier.at), earlier.rate
+        if earlier.past is not None:
+            # rates of too near a point tell little
+            near = np.abs(self.at - at) < _SHORT * np.abs(self.at - earlier.past.at)
+            at = np.where(near, earlier.past.at, at)
+            rate = np.where(near, earlier.past.rate, rate)
+        point = copy(self)
+        object.__setattr__(point, "past", Past(at, rate))
+        return point
+
+    def heir(self, earlier: Point, near: float) -> Point:
+        """Return this point, which a jump led to from ``earlier``, with the past of its edges.
+
+        Those that moved by less than ``near``, and whose rate is still much the same.
+        """
+        past = Past(np.full(self.rate.shape, np.nan), np.full(self.rate.shape, np.nan))
+        if earlier.past is not None:
+            place = np.searchsorted(earlier.gaps[:, 0], self.gaps[:, 0] - near)
+            place = np.minimum(place, len(earlier.gaps) - 1)
+            edge = (2 * place[:, None] + [0, 1]).ravel()
+            moved = np.abs(earlier.gaps[place] - self.gaps).ravel()
+            other = np.abs(earlier.rate[edge] - self.rate) > _CHANGED * np.abs(self.rate)
+            same = (moved < near) & ~other
+            past.at[same] = earlier.past.at[edge[same]]
+            past.rate[same] = earlier.past.rate[edge[same]]
+        point = copy(self)
+        object.__setattr__(point, "past", past)
+        return point
+
+    def towards(self, other: Point, at: float) -> Array:
+        """Gaps at d = ``at`` between this point and another of the same branch, by a cubic."""
+        way = other.at - self.at
+        t = (at - self.at) / way
+        sign = outward(self.gaps)
+        begin, end = ((sign * p.rate * way).reshape(-1, 2) * (t * (1 - t)) for p in (self, other))
+        straight = self.gaps + (other.gaps - self.gaps) * (t * t * (3 - 2 * t))
+        cubic: Array = straight + begin * (1 - t) - end * t
+        return cubic
 
     def predicted(self, at: float) -> Array:
         """Gaps at d = ``at``, along the tangent."""
@@ -264,10 +325,46 @@ class EdgeMechanics:
         self.count.derivatives += steps
         if not found:
             return None
-        field = GapField(
-            self.source, at, prescribed, self.tolerance, self.law.hold, Solution(*solution)
+        about = solution if isinstance(solution, About) else None
+        of = about.of if about else Solution(*solution)
+        field = GapField(self.source, at, prescribed, self.tolerance, self.law.hold, of)
+        return Point(prescribed, field, rate, slope, about=about)
+
+    def about(self, point: Point) -> About:
+        """What windows on a point of many gaps are opened with."""
+        if point.about is not None:
+            return point.about
+        self.count.fields += 1
+        self.count.derivatives += 1
+        known: About = known_about(
+            point.gaps, point.at, point.field.solution.kinds, self.law, RULES, self.source.panels
         )
-        return Point(prescribed, field, rate, slope)
+        return known
+
+    def start(self, point: Point | None) -> Start | None:
+        """``point`` as the start of a descent in a window; None for few gaps."""
+        if point is None or len(point.gaps) < self.many:
+            return None
+        leads = int(np.argmax(np.abs(point.rate))) // 2
+        return Start(point.gaps, self.about(point), leads)
+
+    def _begun(
+        self, start: Start, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
+        track: Track,
+    ) -> Point | Array | None:  # fmt: skip
+        """As :meth:`relax`, in a window on a known state; gaps to go on from if that is no end."""
+        rest = start.descend(self, gaps, prescribed, equal_speeds=equal_speeds)
+        if rest is None:
+            return None
+        if rest.ended == RESTING:
+            if not equal_speeds:
+                track.rest = rest.local
+            elif track.rest is not None and track.rest.shape == rest.local.shape:
+                track.met = bool(np.abs(track.rest - rest.local).max() < _ALIKE * self.wave)
+            point = None if track.met else self.equilibrium(rest.gaps, prescribed, reach)
+            if point is not None:
+                return point
+        return rest.gaps
 
     def relax(
         self,
@@ -277,11 +374,12 @@ class EdgeMechanics:
         *,
         equal_speeds: bool = False,
         track: Track | None = None,
+        start: Start | None = None,
     ) -> Point | Array:
         """Descend in energy, what is prescribed being fixed, to the next minimum.
 
         By linear kinetics, which leaves its ``track``; or with ``equal_speeds`` by the rule it is
-        compared with, until that has met the track.
+        compared with, until that has met the track. From a ``start`` in a window.
 
         Returns
         -------
@@ -304,6 +402,17 @@ class EdgeMechanics:
         rests = 0
         track = track or Track()
         other = track.of(gaps.size if equal_speeds else 0)
+        if start is not None and len(gaps) >= self.many:
+            begun = self._begun(start, gaps, prescribed, reach, equal_speeds, track)
+            if isinstance(begun, Point):
+                return begun
+            if track.met:
+                return np.empty((0, 2))
+            if begun is not None:
+                gaps = begun
+                rest = self.without_small(gaps)
+                if rest is not None:
+                    return rest
         while left > 0:
             panels = self.source.panels
             if len(gaps) < self.many:

@@ -17,7 +17,10 @@ from solver.sharp.states import Memory, States, Trace
 from solver.sharp.touch import Located, Nucleation
 
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
-_FASTEST_CLOSING = 4.0  # a gap closes locally at most so many times faster than gaps on average
+# A gap closes locally at most so many times faster than gaps on average; where there are many, a
+# look for touches costs more than to go back to one that was passed.
+_FASTEST_CLOSING = 4.0
+_CLOSING_OF_MANY = 2.0
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten the trapezoidal rule
 
 
@@ -172,10 +175,7 @@ class Follower:
             try:
                 reached = self._advance(course, step, target.at, windows)
                 if reached is None and abs(step) <= finest and windows:
-                    # a window's verdict that this is a fold is not taken for that of all edges
-                    point, windows = walk.confirm(), False
-                    course = Course(point)
-                    continue
+                    point = walk.confirm()
                 if reached is not None:
                     error = self._trapezoid_error(shown, reached)
                     closed = self._closed(point, reached, target.branch)
@@ -204,7 +204,15 @@ class Follower:
                 if touched is not None:
                     trace.states.append(self.states.of_point(point))
                     return self._touch(trace, touched, target.branch)
+                known = len(trace.states), len(trace.jumps), trace.late
                 after, better = self._fold(trace, point, at, target.branch, finest)
+                if windows and self._nearby(point, after):
+                    # A window's verdict that this is a fold is not taken for that of all edges:
+                    # where the descent ends nearby, the step is taken once more with all of them.
+                    del trace.states[known[0] :], trace.jumps[known[1] :]
+                    trace.late = known[2]
+                    windows, course = False, Course(point)
+                    continue
                 if better < finest:
                     wanted = finest = better
                     continue
@@ -230,7 +238,7 @@ class Follower:
                 if shown is not reached:
                     trace.states.append(self.states.of_point(reached))
                 last = trace.states[-1]
-                after = self.jumps.run(trace, last, small, reached.at, target.branch)
+                after = self.jumps.run(trace, last, small, reached.at, target.branch, known=reached)
                 return reached.at, after
             course = Course(reached)
             point, wanted = reached, 2 * abs(step)
@@ -256,7 +264,9 @@ class Follower:
         """Whether surfaces have touched since the last look; hands out the states before that."""
         touched = None
         if len(walk.trail) > 1:
-            touched, clearance = self.nucleation.located(walk.trail, self.resolution.jump)
+            touched, clearance = self.nucleation.located(
+                walk.trail, self.resolution.jump, walk.clearance
+            )
             walk.restart(clearance)
         way = -1.0 if branch == "loading" else 1.0
         for state in walk.pending:
@@ -288,7 +298,9 @@ class Follower:
 
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """
-        return float(_FASTEST_CLOSING * 2 * np.pi / np.diff(point.gaps, axis=1).sum())
+        many = len(point.gaps) >= self.edges.many
+        fastest = _CLOSING_OF_MANY if many else _FASTEST_CLOSING
+        return float(fastest * 2 * np.pi / np.diff(point.gaps, axis=1).sum())
 
     def _touch(self, trace: Trace, touched: Located, branch: Branch) -> tuple[float, Point | None]:
         """Jump from the point of a branch at which surfaces touch inside a gap."""
@@ -296,7 +308,7 @@ class Follower:
         before = self.states.of_point(point)
         trace.states.append(before)
         gaps = point.field.gaps
-        after = self.jumps.run(trace, before, gaps, point.at, branch, touched.touches)
+        after = self.jumps.run(trace, before, gaps, point.at, branch, touched.touches, point)
         trace.late += self._late(before, trace.states[-1], touched.late)
         return point.at, after
 
@@ -326,7 +338,7 @@ class Follower:
             trace.states.append(self.states.of_point(point))
         before = self.states.shifted(trace.states[-1], point.field, at)
         trace.states.append(before)
-        after = self.jumps.run(trace, before, point.field.gaps, at, branch)
+        after = self.jumps.run(trace, before, point.field.gaps, at, branch, known=point)
         late = self._late(before, trace.states[-1], abs(at - point.at))
         drop = trace.jumps[-1].energy_drop
         allowed = self.resolution.late * max(drop, self.resolution.least_drop)
@@ -336,6 +348,12 @@ class Follower:
             return None, max(share * min(abs(at - point.at), finest), self.resolution.finest)
         trace.late += late
         return after, finest
+
+    def _nearby(self, point: Point, after: Point | None) -> bool:
+        """Whether a descent from ``point`` led no further than a step along a branch."""
+        if after is None or after.gaps.shape != point.gaps.shape:
+            return False
+        return bool(np.abs(after.gaps - point.gaps).max() < _PREDICTED * self.edges.wave)
 
     def _late(self, before: ContactState, after: ContactState, late: float) -> float:
         """Work in J/m² that a jump found ``late`` (in d) adds to the loss, at most."""

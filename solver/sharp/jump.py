@@ -11,6 +11,7 @@ from solver.jumps import Branch
 from solver.method import ContactState, PathError
 from solver.profile import Array
 from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point, Track, outward
+from solver.sharp.nearby import Start
 from solver.sharp.states import States, Trace
 from solver.sharp.touch import Nucleation, Touch
 
@@ -44,16 +45,21 @@ class Jumps:
         at: float,
         branch: Branch,
         touches: list[Touch] | None = None,
+        known: Point | None = None,
     ) -> Point | None:
         """Descend at q0 s = ``at`` from the gaps ``start``; adds the jump and the state after it.
+
+        The gaps are those of a ``known`` equilibrium, or nearly.
 
         Returns the minimum as it was found: next to a fold it may not be found again from its own
         edges. None if no contact is left.
         """
         rivals: list[Rival] = []
-        point = self._descend(start, at, touches or [], rivals)
+        point = self._descend(start, at, touches or [], rivals, known)
         point = self._settle(
-            point, at, lambda gaps, touching: self._descend(gaps, at, touching, rivals)
+            point,
+            at,
+            lambda gaps, touching, before: self._descend(gaps, at, touching, rivals, before),
         )
         after = self._after(before, point, at)
         other = after
@@ -67,6 +73,8 @@ class Jumps:
                     other = self._after(before, rival, at)
         trace.jumps.append(self.states.jump(before, after, branch, other))
         trace.states.append(after)
+        if known is not None and point is not None and len(point.gaps) >= self.edges.many:
+            point = point.heir(known, CORRECTED * self.edges.wave)
         return point
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
@@ -80,13 +88,19 @@ class Jumps:
         return self._settle(
             point,
             at,
-            lambda gaps, touching: self._relax(
-                self.nucleation.seeded(gaps, touching), at, equal_speeds=True
+            lambda gaps, touching, before: self._relax(
+                self.nucleation.seeded(gaps, touching),
+                at,
+                equal_speeds=True,
+                start=self.edges.start(before),
             ),
         )
 
     def _settle(
-        self, point: Point | None, at: float, descend: Callable[[Array, list[Touch]], Point | None]
+        self,
+        point: Point | None,
+        at: float,
+        descend: Callable[[Array, list[Touch], Point | None], Point | None],
     ) -> Point | None:
         """Let contact nucleate wherever surfaces overlap in a minimum, the deepest place first.
 
@@ -102,12 +116,12 @@ class Jumps:
                 if not (adhesive and self.states.overlaps_when_detached(at)):
                     return None
                 _, touches = self.nucleation.first_touch()
-                point = descend(np.empty((0, 2)), touches)
+                point = descend(np.empty((0, 2)), touches, None)
                 continue
             least, minima = self.nucleation.least(point.field)
             if least > 0:
                 return point.cleared(least)
-            grown = descend(point.field.gaps, self.nucleation.ready(minima))
+            grown = descend(point.field.gaps, self.nucleation.ready(minima), point)
             if grown is not None and self._same(grown.field.gaps, point.field.gaps):
                 if adhesive and least < -self.nucleation.overlap:
                     break
@@ -128,7 +142,12 @@ class Jumps:
         return one.shape == other.shape and bool(np.abs(one - other).max() < 10 * self.edges.coarse)
 
     def _descend(
-        self, gaps: Array, at: float, touches: list[Touch], rivals: list[Rival]
+        self,
+        gaps: Array,
+        at: float,
+        touches: list[Touch],
+        rivals: list[Rival],
+        known: Point | None = None,
     ) -> Point | None:
         """Descend to the next minimum of the energy; None when no contact is left.
 
@@ -138,10 +157,11 @@ class Jumps:
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
         track = Track()
-        point = self._relax(gaps, at, track=track)
+        start = self.edges.start(known)
+        point = self._relax(gaps, at, track=track, start=start)
         if not rivals and self._may_have_raced(gaps, point):
             try:
-                rival = self._relax(gaps, at, equal_speeds=True, track=track)
+                rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
             except FullContact as full:
                 rivals.append(full)
             else:
@@ -150,14 +170,22 @@ class Jumps:
         return point
 
     def _relax(
-        self, gaps: Array, at: float, *, equal_speeds: bool = False, track: Track | None = None
+        self,
+        gaps: Array,
+        at: float,
+        *,
+        equal_speeds: bool = False,
+        track: Track | None = None,
+        start: Start | None = None,
     ) -> Point | None:
         reach = CORRECTED * self.edges.wave
         while len(gaps):
-            found = self.edges.relax(gaps, at, reach, equal_speeds=equal_speeds, track=track)
+            found = self.edges.relax(
+                gaps, at, reach, equal_speeds=equal_speeds, track=track, start=start
+            )
             if isinstance(found, Point):
                 return found
-            gaps = found
+            gaps, start = found, None
         return None
 
     def _may_have_raced(self, start: Array, end: Point | None) -> bool:

@@ -13,19 +13,20 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.profile import Array
-from solver.sharp.coordinate import map_gaps
 from solver.sharp.course import Course
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, outward
 from solver.sharp.equilibrium import equilibrium
-from solver.sharp.field import RULES, GapField, Solution, choose_kinds
-from solver.sharp.outside import Outside
-from solver.sharp.window import surroundings
+from solver.sharp.field import RULES, GapField, Solution
+from solver.sharp.nearby import Window
 
-_HALF_WIDTH = 3  # gaps of a window on each side of the fastest edge
+_HALF_WIDTH = 3  # gaps of a window on each side of the edge that leads
+_MOVING = 0.15  # motion of an edge, in λ_min, that ends a stretch as a fold does
+_BEFORE_FOLD = 0.5  # share of the way to its fold that an edge outside may go
+_LEAST_SPAN = 0.1  # of the way that the motion of the edges outside allows, whatever their folds
 _STILL = 0.05  # so far, in λ_min, edges outside move while they are taken as linear
+_BEND = 0.5  # of its straight motion that of an edge outside is expected to bend by at most
 _AWAY = 0.02  # further from where it was expected, in λ_min, no edge outside is found
 
 
@@ -34,7 +35,7 @@ class Astray(Exception):
 
 
 class Stretch:
-    """The window around the fastest edge of a point.
+    """The window around the edge of a point that comes to its fold first, or is fastest.
 
     Parameters
     ----------
@@ -46,41 +47,77 @@ class Stretch:
     def __init__(self, edges: EdgeMechanics, start: Point) -> None:
         self.edges, self.start = edges, start
         count = len(start.gaps)
-        rates = np.abs(start.rate).reshape(-1, 2).max(axis=1)
+        rates = np.abs(start.rate)
+        folds = self._folds()
+        lead = int(np.argmin(np.fmin(_MOVING * edges.wave / rates, folds)))
         half = min(_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
-        self.first = (int(np.argmax(rates)) - half) % count
+        self.first = (lead // 2 - half) % count
         self.inside = (self.first + np.arange(2 * half + 1)) % count
         self.others = np.setdiff1d(np.arange(count), self.inside)
-        self.still = float(rates[self.others].max())
+        outside = np.delete(np.arange(2 * count).reshape(-1, 2), self.inside, axis=0).ravel()
+        still = _STILL * edges.wave / rates[outside].max()
+        # how far the edges outside are near enough to their first state
+        before_fold = _BEFORE_FOLD * folds[outside].min()
+        self.span = float(min(still, max(before_fold, _LEAST_SPAN * still)))
 
-    def goes_on(self, point: Point) -> None:
+    def _folds(self) -> Array:
+        """Distance in d of the fold that the past of each edge tells of; inf for none."""
+        start = self.start
+        out = np.full(start.rate.shape, np.inf)
+        if start.past is not None:
+            ratio = start.past.rate / start.rate
+            way = np.abs(start.at - start.past.at)
+            rising = (ratio > 0) & (ratio < 1) & (way > 0)
+            share = ratio[rising] ** 2
+            out[rising] = way[rising] * share / (1 - share)
+        return out
+
+    def _bent(self, at: float) -> Array:
+        """What the motion of the edges outside is more than straight, by their past."""
+        start = self.start
+        out = np.zeros(start.rate.shape)
+        if start.past is not None:
+            way = start.at - start.past.at
+            known = np.abs(way) > 0
+            on = at - start.at
+            bend = (start.rate - start.past.rate)[known] * on * on / (2 * way[known])
+            most = _BEND * np.abs(start.rate[known] * on)
+            out[known] = np.clip(bend, -most, most)
+        return (outward(start.gaps) * out).reshape(-1, 2)
+
+    def expected(self, local: Array, at: float) -> Array:
+        """All gaps at d = ``at`` where those of the window are ``local``."""
+        gaps = self.window.everywhere(local, self.window.kinds, at)
+        gaps[self.others] += self._bent(at)[self.others]
+        return gaps
+
+    def goes_on(self, point: Point) -> Point:
         """Go on from another point that is solved with all gaps."""
         rates = np.abs(point.rate).reshape(-1, 2).max(axis=1)
-        self.still = max(self.still, float(rates[self.others].max()))
+        still = _STILL * self.edges.wave / float(rates[self.others].max())
+        self.span = min(self.span, still)
+        point = point.after(self.start)
         point.__dict__["stretch"] = self
+        return point
 
     def holds(self, at: float) -> bool:
         """Whether the edges outside are still near their first state at ``at``."""
-        return abs(at - self.start.at) * self.still <= _STILL * self.edges.wave
+        return abs(at - self.start.at) <= self.span
 
     @cached_property
-    def _model(self) -> tuple[Array, NDArray[np.int64], Outside]:
-        """Window with its outside as the last gap, its kinds, and the response of the outside."""
-        gaps, law = self.start.gaps, self.edges.law
-        kinds = choose_kinds(map_gaps(gaps), law.digits, RULES.counts)
-        self.edges.count.fields += 1
-        self.edges.count.derivatives += 1
-        window, *outside = surroundings(
-            gaps, self.start.at, kinds, self.first, len(self.inside), np.inf, law, RULES,
-            self.edges.source.panels,
+    def window(self) -> Window:
+        """The window."""
+        edges, start = self.edges, self.start
+        return Window(
+            start.gaps, edges.about(start), self.first, len(self.inside), edges.law,
+            edges.source.panels,
         )  # fmt: skip
-        return window, np.append(kinds[self.inside], 0), Outside(*outside)
 
     def equilibrium(self, gaps: Array, at: float, reach: float) -> LocalPoint | None:
         """Stable equilibrium at d = ``at`` near these gaps, those outside on their way."""
-        window, kinds, outside = self._model
-        turn = window[:-1] - self.start.gaps[self.inside]  # whole periods
-        local = window.copy()
+        window = self.window
+        turn = window.gaps[:-1] - self.start.gaps[self.inside]  # whole periods
+        local = window.gaps.copy()
         local[:-1] = gaps[self.inside] + np.round(turn / (2 * np.pi)) * 2 * np.pi
         ends = np.append(local.ravel(), local[0, 0] + 2 * np.pi)
         if not np.all(np.diff(ends) > 0):
@@ -88,8 +125,8 @@ class Stretch:
         edges = self.edges
         try:
             found, local, solution, rate, slope, steps = equilibrium(
-                local, at, max(reach, edges.settled), kinds, True, edges.law, RULES,
-                edges.source.panels._replace(outside=outside),
+                local, at, max(reach, edges.settled), window.kinds, True, edges.law, RULES,
+                window.panels,
             )  # fmt: skip
         except np.linalg.LinAlgError:
             return None
@@ -104,7 +141,7 @@ class Stretch:
         rates = self.start.rate.copy().reshape(-1, 2)
         rates[self.inside] = rate[:-2].reshape(-1, 2)
         of = Solution(*solution)
-        return LocalPoint(self, at, gaps, rates.ravel(), slope, of.pressure, of.separation)
+        return LocalPoint(self, at, gaps, local, rates.ravel(), slope, of.pressure, of.separation)
 
 
 class LocalPoint(Point):
@@ -115,14 +152,15 @@ class LocalPoint(Point):
         stretch: Stretch,
         at: float,
         gaps: Array,
+        local: Array,
         rate: Array,
         slope: float,
         pressure: float,
         separation: float,
     ) -> None:
         self.__dict__.update(
-            stretch=stretch, at=at, _gaps=gaps, rate=rate, slope=slope, _pressure=pressure,
-            _separation=separation,
+            stretch=stretch, at=at, _gaps=gaps, _local=local, rate=rate, slope=slope,
+            _pressure=pressure, _separation=separation,
         )  # fmt: skip
 
     @property
@@ -142,9 +180,15 @@ class LocalPoint(Point):
         return float(self.__dict__["_separation"])
 
     @cached_property
+    def _expected(self) -> Array:
+        """Gaps, those outside the window as they follow it."""
+        stretch: Stretch = self.__dict__["stretch"]
+        return stretch.expected(self.__dict__["_local"], self.at)
+
+    @cached_property
     def _full(self) -> Point | None:
         edges: EdgeMechanics = self.__dict__["stretch"].edges
-        return edges.equilibrium(self.gaps, self.at, CORRECTED * edges.wave)
+        return edges.equilibrium(self._expected, self.at, CORRECTED * edges.wave)
 
     def confirmed(self) -> Point:
         """The equilibrium of all edges.
@@ -158,11 +202,10 @@ class LocalPoint(Point):
         full = self._full
         if full is None:
             raise Astray
-        away = float(np.abs(full.gaps - self.gaps)[stretch.others].max())
+        away = float(np.abs(full.gaps - self._expected)[stretch.others].max())
         if away > _AWAY * stretch.edges.wave:
             raise Astray
-        stretch.goes_on(full)
-        return full
+        return stretch.goes_on(full)
 
     @cached_property
     def field(self) -> GapField:
@@ -194,7 +237,10 @@ def advance(edges: EdgeMechanics, course: Course, at: float, windows: bool) -> P
     if stretch is None or not stretch.holds(at) or not windows:
         point = confirmed(point)
         stretch = Stretch(edges, point)
-        if not stretch.holds(at) or not windows:
-            return edges.equilibrium(course.gaps(at), at, reach)
+        if not windows:
+            reached = edges.equilibrium(course.gaps(at), at, reach)
+            return None if reached is None else reached.after(point)
+        if not stretch.holds(at):
+            at = point.at + float(np.copysign(stretch.span, at - point.at))
         point.__dict__["stretch"] = stretch
     return stretch.equilibrium(course.gaps(at), at, reach)

@@ -9,9 +9,10 @@ from solver.profile import Array
 from solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.far import solve_many
-from solver.sharp.field import Kinds, PlainSolution, Rules, choose_kinds, plain
+from solver.sharp.field import Kinds, Rules, choose_kinds
 from solver.sharp.source import Panels
-from solver.sharp.yielding import newton_many
+from solver.sharp.window import About, at_rest
+from solver.sharp.yielding import newton_step, yielding_gaps
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
 
@@ -26,8 +27,11 @@ def equilibrium_many(
     law: Law,
     rules: Rules,
     panels: Panels,
-) -> tuple[bool, Array, PlainSolution, Array, float, int]:
-    """As :func:`solver.sharp.equilibrium.equilibrium`, in work that grows as the number of gaps."""
+) -> tuple[bool, Array, About, Array, float, int]:
+    """As :func:`solver.sharp.equilibrium.equilibrium`, in work that grows as the number of gaps.
+
+    With the solution comes what windows are opened with.
+    """
     at = gaps
     kinds = at_least(choose_kinds(map_gaps(gaps), law.digits, rules.counts), least)
     travelled = np.zeros(gaps.size)
@@ -38,7 +42,8 @@ def equilibrium_many(
         steps += 1
         of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
         residual, drift = imbalance(of, law, panels)
-        step, rate, slope, stable = newton_many(of, parts, residual, drift, law.hold, rules)
+        edges = yielding_gaps(of, parts, residual, drift, rules)
+        step, rate, slope, stable = newton_step(of, parts, edges, law.hold)
         size = np.abs(step).max()
         if not np.isfinite(of.pressure):
             break
@@ -62,8 +67,8 @@ def equilibrium_many(
         expected = size * (size / last) ** 2 if last < np.inf else size * size / law.longest
         if stable and expected <= law.coarse:
             steps += 1
-            of, _ = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
+            of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
             found = np.isfinite(of.pressure)
             break
         last = size
-    return found, at, plain(of), rate, slope, steps
+    return found, at, at_rest(of, parts, edges), rate, slope, steps

@@ -203,11 +203,14 @@ class Nucleation:
         self.clearances.note(field, place, left)
         return float(left.min()), minima
 
-    def located(self, trail: list[Point], resolution: float) -> tuple[Located | None, float]:
+    def located(
+        self, trail: list[Point], resolution: float, clearance: float
+    ) -> tuple[Located | None, float]:
         """First point of a trail at which surfaces touch inside a gap, with the touches.
 
         Else None and the least clearance at the end of the trail. The trail starts at a point known
-        to be clear; between its points the touch is located to ``resolution`` (q0 s).
+        to be clear, by ``clearance`` at least; between its points the touch is located to
+        ``resolution`` (q0 s).
         """
         hit = trail[-1]
         hit_value, hit_minima = self.least(hit.field)
@@ -225,9 +228,14 @@ class Nucleation:
                 high, hit, hit_minima, hit_value = middle, trail[middle], minima, value
         last = trail[low]
         clear = last.at
+        # Of many gaps each aim is dear: those at both ends tell where to begin, and the least
+        # overlap is touch enough.
+        many = len(last.gaps) >= self.edges.many
+        if many and low == 0 and clearance > 0:
+            clear_value = clearance
         cleared = 0  # aims one after the other that were clear
         for _ in range(_MOST_AIMS):
-            near = abs(clear - hit.at) <= resolution
+            near = many or abs(clear - hit.at) <= resolution
             if hit_value == 0 or (near and hit_value > -0.5 * self.overlap):
                 break
             share = 0.5
@@ -238,9 +246,11 @@ class Nucleation:
                 share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
             aim = clear + (hit.at - clear) * share
             point = None
+            reach = CORRECTED * self.edges.wave
+            if many:
+                point = self.edges.equilibrium(last.towards(hit, aim), aim, reach)
             for start in (last, hit) if share < 0.5 else (hit, last):
                 if point is None:
-                    reach = CORRECTED * self.edges.wave
                     point = self.edges.equilibrium(start.predicted(aim), aim, reach)
             if point is None:
                 break

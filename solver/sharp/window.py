@@ -97,9 +97,8 @@ def descend_many(
         width = min(2 * half + 1, count - 2)
         first = (_leading_gap(residual, step, law) - width // 2) % count
         calm = _CALM * law.longest
-        window, outside, outer = open_window(
-            of, parts, edges, first, width, calm, law, rules, panels
-        )
+        about = About(of, parts.w, parts.blocks, parts.inverse, edges)
+        window, outside, outer = open_window(about, first, width, calm, law, rules, panels)
         window_kinds = np.zeros(width + 1, dtype=np.int64)
         for i in range(width):
             window_kinds[i] = kinds[(first + i) % count]
@@ -107,9 +106,7 @@ def descend_many(
         soft = outer.response.negative == 0
         while ended == LOST:
             if not soft:  # with all edges outside held
-                window, outside, outer = open_window(
-                    of, parts, edges, first, width, 0.0, law, rules, panels
-                )
+                window, outside, outer = open_window(about, first, width, 0.0, law, rules, panels)
             moved, ended, some, more, moved_kinds, _, _ = descend(
                 window, prescribed, min(_STEPS, most - fields), window_kinds, equal_speeds, law,
                 rules, with_outside(panels, outside), np.empty((0, window.size)), False,
@@ -120,8 +117,8 @@ def descend_many(
                 return gaps, LOST, fields, tangents, kinds
             soft = False
         progress = np.abs(moved[:width] - window[:width]).max()
-        followed = _following(
-            moved, prescribed, moved_kinds, outer, of, edges, limit, law, rules,
+        followed = following(
+            moved, prescribed, moved_kinds, outer, about, limit, law, rules,
             with_outside(panels, outside),
         )  # fmt: skip
         result = np.empty(gaps.shape)
@@ -146,6 +143,36 @@ def descend_many(
         else:
             half = min(2 * half, _WIDEST)
     return gaps, UNFINISHED, fields, tangents, kinds
+
+
+class About(NamedTuple):
+    """A solved state about which windows are opened.
+
+    Attributes
+    ----------
+    of : Solution
+    w, blocks, inverse : array
+        As in :class:`solver.sharp.far.Gaps`.
+    edges : Yielding
+        How its edges follow.
+    """
+
+    of: Solution
+    w: Array
+    blocks: Array
+    inverse: Array
+    edges: Yielding
+
+
+@compiled
+def at_rest(of: Solution, parts: Gaps, edges: Yielding) -> About:
+    """State whose edges are in equilibrium, but for what is left of an iteration.
+
+    ``edges`` may be those of a state very near.
+    """
+    edges.alone[:, 0] = 0.0
+    edges.motion[:, 0] = 0.0
+    return About(of, parts.w, parts.blocks, parts.inverse, edges)
 
 
 class Outer(NamedTuple):
@@ -178,9 +205,7 @@ class Outer(NamedTuple):
 
 @compiled
 def open_window(
-    of: Solution,
-    parts: Gaps,
-    edges: Yielding,
+    about: About,
     first: int,
     width: int,
     calm: float,
@@ -192,6 +217,7 @@ def open_window(
 
     Edges outside follow if that moves them by less than ``calm``.
     """
+    of, edges = about.of, about.edges
     count = of.kinds.shape[0]
     order = np.arange(first + width, first + count) % count
     soft = np.zeros(order.shape[0], dtype=np.bool_)
@@ -201,9 +227,7 @@ def open_window(
         soft[i] = still and edges.negative[k] == 0
     turned = rolled(of.table, first)
     table = turned[width:].copy()
-    tree, own, alone, potential, offset = _outer_gaps(
-        of, parts, edges.own, edges.alone, order, soft, table, law, rules
-    )
+    tree, own, alone, potential, offset = _outer_gaps(about, order, soft, table, law, rules)
     response = respond(tree, own, np.zeros(order.shape[0], dtype=np.int64))
     window = np.empty((width + 1, 2))
     window[:width] = turned[:width, :2]
@@ -214,34 +238,18 @@ def open_window(
 
 
 @compiled
-def surroundings(
-    gaps: Array,
-    prescribed: float,
-    kinds: Kinds,
-    first: int,
-    width: int,
-    calm: float,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
-) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-    """As :func:`open_window`, for calls from Python: the window and its :class:`Outside`, plain."""
+def known_about(
+    gaps: Array, prescribed: float, kinds: Kinds, law: Law, rules: Rules, panels: Panels
+) -> About:
+    """What windows on these gaps, which are in equilibrium, are opened with."""
     of, parts = solve_many(gaps, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
     residual, drift = imbalance(of, law, panels)
-    edges = yielding_gaps(of, parts, residual, drift, rules)
-    window, outside, _ = open_window(of, parts, edges, first, width, calm, law, rules, panels)
-    return (
-        window, outside.theta, outside.stretch, outside.response, outside.charge, outside.mean,
-        outside.opening,
-    )  # fmt: skip
+    return at_rest(of, parts, yielding_gaps(of, parts, residual, drift, rules))
 
 
 @compiled
 def _outer_gaps(
-    of: Solution,
-    parts: Gaps,
-    soft_own: Array,
-    soft_alone: Array,
+    about: About,
     order: Kinds,
     soft: Array,
     table: Array,
@@ -253,6 +261,7 @@ def _outer_gaps(
     The charges, shape (nodes, 2), are those without potentials and p, and by a unit of p; gaps that
     are ``soft`` follow with their edges.
     """
+    of, soft_own, soft_alone = about.of, about.edges.own, about.edges.alone
     count = order.shape[0]
     offset = np.zeros(count + 1, dtype=np.int64)
     squares = 0
@@ -278,24 +287,24 @@ def _outer_gaps(
         for j in range(m):
             place = offset[i] + j
             theta[place] = of.theta[base + j] + turn
-            stretch[place] = of.weight[base + j] / parts.w[base + j]
+            stretch[place] = of.weight[base + j] / about.w[base + j]
             # A f + w g + S~ + p X = 0
             total = of.rhs[base + j, 0] + of.pressure * of.rhs[base + j, 1]
             for other in range(m):
-                total += parts.blocks[base + j, other] * of.f[base + other]
-            potential[place] = -total / parts.w[base + j]
+                total += about.blocks[base + j, other] * of.f[base + other]
+            potential[place] = -total / about.w[base + j]
         for j in range(m):
             place = offset[i] + j
             by_mean = 0.0
             for other in range(m):
-                inverse = parts.inverse[start[k] + j * m + other]
-                by_mean -= parts.w[base + j] * inverse * of.rhs[base + other, 1]
+                inverse = about.inverse[start[k] + j * m + other]
+                by_mean -= about.w[base + j] * inverse * of.rhs[base + other, 1]
                 if soft[i]:
                     own[at + j * m + other] = soft_own[start[k] + j * m + other]
                 else:
-                    own[at + j * m + other] = parts.w[base + j] * inverse * parts.w[base + other]
+                    own[at + j * m + other] = about.w[base + j] * inverse * about.w[base + other]
             alone[place, 1] = soft_alone[base + j, 1] if soft[i] else by_mean
-            alone[place, 0] = parts.w[base + j] * of.f[base + j] - of.pressure * alone[place, 1]
+            alone[place, 0] = about.w[base + j] * of.f[base + j] - of.pressure * alone[place, 1]
             if soft[i]:
                 alone[place, 0] += soft_alone[base + j, 0]
             for other in range(m):
@@ -331,19 +340,19 @@ def _outside_of(
 
 
 @compiled
-def _following(
+def following(
     window: Array,
     prescribed: float,
     kinds: Kinds,
     outer: Outer,
-    of: Solution,
-    edges: Yielding,
+    about: About,
     limit: Array,
     law: Law,
     rules: Rules,
     panels: Panels,
 ) -> Array:
     """Outward motion of the edges outside, for the window's gaps as they are now."""
+    of, edges = about.of, about.edges
     out = np.zeros(2 * outer.order.shape[0])
     now = solve(window, prescribed, law.hold, kinds, 1, rules, panels)
     rows, _ = reach(now.theta, now.weight, panels.outside)

@@ -9,15 +9,15 @@ from adhesis import HalfSpace, Problem, self_affine_profile
 from solver.loop import run_loop
 from solver.sharp.balance import imbalance, symmetric, tangent_of
 from solver.sharp.coordinate import map_gaps
-from solver.sharp.edges import CORRECTED, EdgeMechanics
+from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
 from solver.sharp.far import solve_many
 from solver.sharp.field import FIXED, RULES, Solution, choose_kinds, derivatives, solve_plain
 from solver.sharp.linear import is_definite
 from solver.sharp.method import SharpMethod
-from solver.sharp.outside import Outside
+from solver.sharp.nearby import Window
 from solver.sharp.source import StressSource
 from solver.sharp.tree import plant
-from solver.sharp.window import surroundings
+from solver.sharp.window import known_about, open_window
 from solver.sharp.yielding import newton_many
 from tests.support import next_to_a_fold
 
@@ -141,8 +141,9 @@ def test_a_window_feels_all_other_gaps(loaded, follow):
     first = count - 2
     inside = (first + np.arange(4)) % count  # across the end of the period
     panels = edges.source.panels
-    window, *outside = surroundings(
-        gaps, separation, kinds, first, 4, np.inf if follow else 0.0, edges.law, RULES, panels
+    about = known_about(gaps, separation, kinds, edges.law, RULES, panels)
+    window, outside, _ = open_window(
+        about, first, 4, np.inf if follow else 0.0, edges.law, RULES, panels
     )
     tree, parts = solve_many(gaps, separation, FIXED, kinds, edges.law.digits, 2, RULES, panels)
     found, _, _, stable = newton_many(
@@ -150,7 +151,7 @@ def test_a_window_feels_all_other_gaps(loaded, follow):
     )
     assert stable
     assert np.abs(found).max() < 1e-3 * edges.wave  # it is an equilibrium for the tree, too
-    panels = panels._replace(outside=Outside(*outside))
+    panels = panels._replace(outside=outside)
     if not follow:
         # exact for whatever the window's edges do
         motion = 0.02 * edges.wave * np.random.default_rng(0).standard_normal((4, 2))
@@ -258,3 +259,52 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
         )
         assert edges.count.fields < 2000
     assert np.abs(found[0].field.gaps - found[1].field.gaps).max() < 0.1 * edges.wave
+
+
+@pytest.fixture
+def in_windows(loaded):
+    """Edges that are moved in windows, and a point of theirs with what windows need."""
+    method, state = loaded
+    edges, before = method.edges, method.edges.many
+    edges.many = 6
+    yield edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)
+    edges.many = before
+
+
+def test_outside_a_window_gaps_follow_to_second_order(in_windows):
+    """Where the window is solved, the others are expected where they are: error as step squared."""
+    edges, point = in_windows
+    lead = int(np.argmax(np.abs(point.rate))) // 2
+    count = len(point.gaps)
+    window = Window(point.gaps, point.about, lead - 2, count - 3, edges.law, edges.source.panels)
+    errors = []
+    for share in (0.0, 1.0, 0.5):
+        at = point.at - share * 0.02 * edges.wave / np.abs(point.rate).max()
+        full = edges.equilibrium(point.predicted(at), at, edges.wave)
+        local = window.gaps.copy()
+        local[:-1] += (full.gaps - point.gaps)[(lead - 2 + np.arange(count - 3)) % count]
+        expected = window.everywhere(local, window.kinds, at)
+        errors.append(np.abs(expected - full.gaps).max() / edges.wave)
+    assert errors[0] < 1e-6
+    assert 3 < errors[1] / errors[2] < 5
+    assert errors[1] < 2e-3
+
+
+def test_a_descent_begun_in_a_window_ends_where_one_of_all_gaps_does(in_windows):
+    """From a seed in the widest gap, and from edges pushed out of balance."""
+    edges, point = in_windows
+    widest = int(np.argmax(np.diff(point.gaps, axis=1)))
+    seeded = with_patches(
+        point.gaps, point.gaps[widest].mean(keepdims=True), np.array([0.3 * edges.wave])
+    )
+    pushed = point.gaps.copy()
+    pushed[widest] += 0.3 * edges.wave * np.array([-1.0, 1.0])
+    for gaps in (seeded, pushed):
+        ends = []
+        for start in (None, edges.start(point)):
+            found = edges.relax(gaps, point.at, edges.wave, start=start)
+            while not isinstance(found, Point):
+                found = edges.relax(found, point.at, edges.wave)
+            ends.append(found.gaps)
+        assert ends[0].shape == ends[1].shape
+        assert np.abs(ends[0] - ends[1]).max() < 0.01 * edges.wave
