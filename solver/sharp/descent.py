@@ -18,7 +18,7 @@ from solver.sharp.balance import (
 )
 from solver.sharp.box import off_saddle, running_step
 from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
-from solver.sharp.field import Kinds, Rules, Solution, choose_kinds, solve
+from solver.sharp.field import Kinds, Rules, Solution, choose_kinds, solve, solve_again
 from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.linear import is_definite
 from solver.sharp.source import Panels
@@ -32,6 +32,9 @@ _UNCHECKED_ALONE = 2.0  # of an edge that runs alone
 _STRIDE = 3.0  # longest of all
 _STRIDE_ALONE = 6.0
 _RUNS = 0.25  # edges that move by this share of the longest motion run
+# While others run an edge stands until it is so far from its place, in longest steps of its own:
+# what belongs to gaps that have not changed is not computed anew.
+_STANDS = 0.01
 _NOISE = 1e-3  # a rise of the energy below this share of the work done both ways is rounding
 _TIE = 1e-3  # two ways off a saddle whose gains differ by less are equal
 _LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
@@ -117,7 +120,10 @@ def descend(
         held = runners > 0 and reuses < (_REUSES_ALONE if runners == 1 else _REUSES)
         table = map_gaps(gaps)
         kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
-        of = solve(gaps, prescribed, law.hold, kinds, 2, rules, panels)
+        if fields == 1:
+            of = solve(gaps, prescribed, law.hold, kinds, 2, rules, panels)
+        else:
+            of = solve_again(gaps, prescribed, law.hold, kinds, rules, panels, of)
         if not np.isfinite(of.pressure):
             return gaps, LOST, fields, tangents, kinds, passed[:count], astray
         residual, drift = imbalance(of, law, panels)
@@ -224,6 +230,9 @@ def descend(
         if size > 0.5 * longest:
             running = np.flatnonzero(np.abs(step) > max(_RUNS * size, 0.5 * longest))
             runners = running.shape[0]
+            for e in range(edges):
+                if abs(step[e]) < _STANDS * limit[e]:
+                    step[e] = 0.0
             if size > unchecked:
                 if np.any(force[running] * step[running] >= 0):  # pulled along by others
                     step *= unchecked / size

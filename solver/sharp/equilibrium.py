@@ -32,6 +32,8 @@ from solver.sharp.linear import is_definite
 from solver.sharp.source import Panels
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+_SHARE = 0.01  # of what an equilibrium may move with the error of the field: so little is nothing
+_KNOWN = 1e-3  # a tangent that changes by less than this share in a last correction serves after it
 
 
 @compiled
@@ -75,6 +77,7 @@ def equilibrium(
     rate: Any = np.empty(0)
     slope = np.nan
     steps = 0
+    settled = max(law.settled, _SHARE * law.coarse)
     while True:
         steps += 1
         of = solve(at, prescribed, law.hold, kinds, 2, rules, panels)
@@ -87,7 +90,7 @@ def equilibrium(
         # The field has steps of the size of its error, where panels or modes change: an iteration
         # to and fro across one of them is at its end.
         stalled = size <= law.coarse and size > 0.3 * last
-        if size <= law.settled or stalled:
+        if size <= settled or stalled:
             _, matrix = symmetric(of, tangent, law.overlapping)
             found = is_definite(matrix) or not patient
             break
@@ -99,11 +102,21 @@ def equilibrium(
         within = size <= reach and size <= 2 * last and np.abs(travelled).max() <= reach
         if not within or steps == _NEWTON_LIMIT:
             break
-        last = size
         moved = moved_gaps(at, step)
         if not narrowest(moved) > 0:
             break
         at = moved
+        # The iteration converges quadratically: the next correction, and by what share the tangent
+        # changes until then, are known beforehand.
+        share = (size / last) ** 2
+        if last < np.inf and size * share <= settled and share <= _KNOWN:
+            _, matrix = symmetric(of, tangent, law.overlapping)
+            if is_definite(matrix) or not patient:
+                steps += 1
+                of = solve(at, prescribed, law.hold, kinds, 2, rules, panels)
+                found = np.isfinite(of.pressure)
+                break
+        last = size
     if found:
         by_prescribed = -2 * np.pi / of.resistance
         unit = np.empty((of.f.shape[0], 1))

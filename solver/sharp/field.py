@@ -115,7 +115,7 @@ def _rules(counts: NDArray[np.int64]) -> Rules:
 
 
 RULES = _rules(
-    np.array([6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128])
+    np.array([4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 24, 28, 32, 40, 48, 64, 96, 128])
 )
 
 
@@ -195,6 +195,11 @@ PlainSolution = tuple[
     float, float, float, Array, Array, Array, Array, float,
 ]  # fmt: skip
 """The fields of :class:`Solution` in order."""
+
+
+Parts = tuple[Array, Array, Array, Array, Array, Array]
+"""θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~') and what the
+higher modes add at the ends: the equations (1)."""
 
 
 class GapField:
@@ -315,22 +320,76 @@ def solve(
     is NaN if the matrix is not positive definite to rounding, or edges are no numbers or cross.
     """
     table = map_gaps(gaps)
-    windowed = panels.outside.theta.shape[0] > 0
-    offset = np.zeros(table.shape[0] + 1, dtype=np.int64)
     if not in_order(table):
-        nothing, none = np.empty(0), np.empty((0, 0))
-        return Solution(
-            table, kinds, offset, nothing, nothing, np.empty((table.shape[0], 2)), none, none, none,
-            none, np.empty((0, 0, 0)), hold.share, np.nan, np.nan, np.nan, np.nan, nothing,
-            np.full(2 * table.shape[0], np.nan), none, nothing, np.nan,
-        )  # fmt: skip
-    for k in range(table.shape[0]):
+        return _without_field(table, kinds, hold)
+    offset = _offsets(kinds, rules, panels)
+    parts = _assemble(table, kinds, offset, fields, rules, panels)
+    return _solved(table, kinds, offset, parts, prescribed, hold, fields, rules, panels)
+
+
+@compiled
+def solve_again(
+    gaps: Array,
+    prescribed: float,
+    hold: Hold,
+    kinds: Kinds,
+    rules: Rules,
+    panels: Panels,
+    before: Solution,
+) -> Solution:
+    """Solve (1) with S and S' when some gaps are as they were in such a solution ``before``.
+
+    What belongs to those gaps is taken over.
+    """
+    table = map_gaps(gaps)
+    if not in_order(table):
+        return _without_field(table, kinds, hold)
+    offset = _offsets(kinds, rules, panels)
+    if panels.outside.theta.shape[0] > 0 or not np.array_equal(kinds, before.kinds):
+        parts = _assemble(table, kinds, offset, 2, rules, panels)
+    else:
+        parts = _assemble_again(table, kinds, offset, rules, panels, before)
+    return _solved(table, kinds, offset, parts, prescribed, hold, 2, rules, panels)
+
+
+@compiled
+def _offsets(kinds: Kinds, rules: Rules, panels: Panels) -> Kinds:
+    """First node of each gap, and the number of all."""
+    offset = np.zeros(kinds.shape[0] + 1, dtype=np.int64)
+    for k in range(kinds.shape[0]):
         offset[k + 1] = offset[k] + rules.counts[kinds[k]]
-    if windowed:
+    if panels.outside.theta.shape[0] > 0:
         offset[-1] = offset[-2]  # the last gap is the outside
-    theta, weight, slope, matrix, rhs, beyond = _assemble(
-        table, kinds, offset, fields, rules, panels
-    )
+    return offset
+
+
+@compiled
+def _without_field(table: Array, kinds: Kinds, hold: Hold) -> Solution:
+    """What is told of edges that are no numbers or cross."""
+    nothing, none = np.empty(0), np.empty((0, 0))
+    return Solution(
+        table, kinds, np.zeros(table.shape[0] + 1, dtype=np.int64), nothing, nothing,
+        np.empty((table.shape[0], 2)), none, none, none, none, np.empty((0, 0, 0)), hold.share,
+        np.nan, np.nan, np.nan, np.nan, nothing, np.full(2 * table.shape[0], np.nan), none, nothing,
+        np.nan,
+    )  # fmt: skip
+
+
+@compiled
+def _solved(
+    table: Array,
+    kinds: Kinds,
+    offset: Kinds,
+    parts: Parts,
+    prescribed: float,
+    hold: Hold,
+    fields: int,
+    rules: Rules,
+    panels: Panels,
+) -> Solution:
+    """Solution of the assembled equations."""
+    theta, weight, slope, matrix, rhs, beyond = parts
+    windowed = panels.outside.theta.shape[0] > 0
     rows, slopes = reach(theta, weight, panels.outside)
     drawn = rows
     if windowed:
@@ -537,12 +596,8 @@ def mapped(alpha: float, x: float) -> float:
 @compiled
 def _assemble(
     table: Array, kinds: Kinds, offset: Kinds, fields: int, rules: Rules, panels: Panels
-) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Matrix and right-hand sides of (1).
-
-    Returns θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~') and what
-    the higher modes add at the ends.
-    """
+) -> Parts:
+    """Matrix and right-hand sides of (1)."""
     gaps = table.shape[0]
     n = offset[gaps]
     theta = np.empty(n)
@@ -562,6 +617,32 @@ def _assemble(
             beyond[k], matrix[own, own],
         )  # fmt: skip
     _between_gaps(theta, weight, offset, matrix)
+    return theta, weight, slope, matrix, rhs, beyond
+
+
+@compiled
+def _assemble_again(
+    table: Array, kinds: Kinds, offset: Kinds, rules: Rules, panels: Panels, before: Solution
+) -> Parts:
+    """As :func:`_assemble`, with what belongs to gaps that are as they were ``before``.
+
+    A gap's own part depends on its row of the table alone.
+    """
+    theta, weight, slope = before.theta.copy(), before.weight.copy(), before.slope.copy()
+    matrix, rhs, beyond = before.matrix.copy(), before.rhs.copy(), before.beyond.copy()
+    changed = np.empty(table.shape[0], dtype=np.int64)
+    count = 0
+    for k in range(table.shape[0]):
+        if np.array_equal(table[k], before.table[k]):
+            continue
+        changed[count] = k
+        count += 1
+        own = slice(offset[k], offset[k + 1])
+        one_gap(
+            table[k], kinds[k], rules, panels, theta[own], weight[own], slope[k], rhs[own],
+            beyond[k], matrix[own, own],
+        )  # fmt: skip
+    _between_gaps_again(theta, weight, offset, changed[:count], matrix)
     return theta, weight, slope, matrix, rhs, beyond
 
 
@@ -655,6 +736,32 @@ def _between_gaps(theta: Array, weight: Array, offset: Kinds, matrix: Array) -> 
             for j in range(offset[k + 1], n):
                 half = si * cosine[j] - ci * sine[j]
                 row[j] = scale * weight[j] / (half * half)
+
+
+@compiled_sums
+def _between_gaps_again(
+    theta: Array, weight: Array, offset: Kinds, changed: Kinds, matrix: Array
+) -> None:
+    """Blocks between the gaps that have ``changed`` and all others."""
+    n = theta.shape[0]
+    sine = np.sin(0.5 * theta)
+    cosine = np.cos(0.5 * theta)
+    for k in changed:
+        for i in range(offset[k], offset[k + 1]):
+            scale = -weight[i] / (4 * np.pi)
+            si = sine[i]
+            ci = cosine[i]
+            row = matrix[i]
+            for j in range(offset[k]):
+                half = si * cosine[j] - ci * sine[j]
+                row[j] = scale * weight[j] / (half * half)
+            for j in range(offset[k + 1], n):
+                half = si * cosine[j] - ci * sine[j]
+                row[j] = scale * weight[j] / (half * half)
+            for j in range(offset[k]):
+                matrix[j, i] = row[j]
+            for j in range(offset[k + 1], n):
+                matrix[j, i] = row[j]
 
 
 @compiled

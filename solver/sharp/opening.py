@@ -12,11 +12,9 @@ which follows from Betti's theorem; the first term is the energy of full contact
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import dst, next_fast_len
 
 from solver.compiled import compiled
 from solver.profile import Array
@@ -30,6 +28,7 @@ from solver.sharp.coordinate import (
     theta_at,
 )
 from solver.sharp.field import RULES, GapField, Kinds, Rules
+from solver.sharp.sine import circle, sine_sums
 from solver.sharp.source import interpolate
 
 ENERGY_NODES = 3.0  # sine nodes per shortest wave: two resolve it, the rest is margin
@@ -37,7 +36,6 @@ SHAPE_NODES = 6.0  # nodes per shortest wave that bracket every local minimum of
 _LEAST = 64
 _MANY_NODES = 500
 
-_ANEW = 64  # rotations of a cosine before it is computed anew
 _PER_UNIT = 32  # entries of the table of exp(y) - 1 for a unit of y
 _EXPM1 = np.expm1(np.arange(20 * _PER_UNIT) / _PER_UNIT)
 
@@ -55,184 +53,162 @@ class Opening:
     modes: Array
 
 
-@dataclass(frozen=True)
-class Sines:
-    """Some gaps of a field at their fine sine nodes, equally many in each; θ falls along a row.
-
-    Attributes
-    ----------
-    gaps : int array, shape (G,)
-        Which they are.
-    theta, span : array, shape (G, nodes)
-        Nodes, and dθ/dt there.
-    modes : array, shape (G, nodes)
-        s_n of every mode that the nodes carry.
-    """
-
-    gaps: Kinds
-    theta: Array
-    span: Array
-    modes: Array
+@compiled
+def fine_nodes_of(gap: Array, top: int, per_wave: float) -> int:
+    """Number of sine nodes of a gap, so that the shortest wave holds ``per_wave`` of them."""
+    widest = 0.0
+    for i in range(1, 24):
+        t = np.pi * i / 24
+        widest = max(widest, theta_at(gap, np.cos(t))[1] * np.sin(t))
+    return fast_size(int(np.ceil(0.5 * per_wave * widest * top)) + _LEAST)
 
 
 @compiled
-def _fewest_nodes(table: Array, top: int, per_wave: float) -> Kinds:
-    """Numbers of sine nodes so close that the shortest wave holds ``per_wave`` of them."""
-    out = np.empty(table.shape[0], dtype=np.int64)
-    for k in range(table.shape[0]):
-        widest = 0.0
-        for i in range(1, 24):
-            t = np.pi * i / 24
-            widest = max(widest, theta_at(table[k], np.cos(t))[1] * np.sin(t))
-        out[k] = int(np.ceil(0.5 * per_wave * widest * top)) + _LEAST
-    return out
-
-
-@compiled
-def _sizes(fewest: Kinds) -> Kinds:
-    """Numbers of nodes, no fewer, for which the transform is fast and which many gaps share.
+def fast_size(fewest: int) -> int:
+    """Number of nodes, no fewer, for which the transform is fast and which many gaps share.
 
     That is so where one more than the number of nodes has small factors.
     """
-    out = np.empty(fewest.shape[0], dtype=np.int64)
-    for k in range(fewest.shape[0]):
-        wanted = fewest[k] + 1
-        eighth = 1
-        while 16 * eighth <= wanted:
-            eighth *= 2
-        # wide gaps are few, and it is their nodes that cost
-        steps = (9, 10, 12, 15, 16) if fewest[k] > _MANY_NODES else (12, 12, 12, 16, 16)
-        for step in steps:
-            out[k] = step * eighth - 1
-            if out[k] >= fewest[k]:
-                break
-    return out
+    eighth = 1
+    while 16 * eighth <= fewest + 1:
+        eighth *= 2
+    # wide gaps are few, and it is their nodes that cost
+    steps = (9, 10, 12, 15, 16) if fewest > _MANY_NODES else (12, 12, 12, 16, 16)
+    for step in steps:
+        if step * eighth - 1 >= fewest:
+            return step * eighth - 1
+    return 32 * eighth - 1
 
 
 @compiled
-def _fine_nodes(table: Array, count: int) -> tuple[Array, Array]:
-    """``count`` sine nodes of each gap: θ, falling, and dθ/dt, shape (gaps, count).
+def _fine_nodes(gap: Array, cosine: Array, sine: Array, theta: Array, span: Array) -> None:
+    """Sine nodes of a gap, as many as ``theta`` holds: θ, falling, and dθ/dt.
 
-    As :func:`theta_at`, many at a time: cosines by rotation, computed anew every so many nodes, and
-    exp(y) - 1 from a table.
+    As :func:`theta_at`, many at a time, with exp(y) - 1 from a table.
     """
-    theta = np.empty((table.shape[0], count))
-    span = np.empty((table.shape[0], count))
-    turn = np.pi / (count + 1)
-    turned = np.cos(turn), np.sin(turn)
-    for k in range(table.shape[0]):
-        left, right = table[k, LEFT], table[k, RIGHT]
-        alpha = 2 * table[k, ALPHA]
-        c = 0.0
-        s = 0.0
-        for i in range(count):
-            if i % _ANEW == 0:
-                c = np.cos(turn * (i + 1))
-                s = np.sin(turn * (i + 1))
-            from_left = c < 0
-            own = table[k, LEFT_PATCH] if from_left else table[k, RIGHT_PATCH]
-            other = table[k, RIGHT_PATCH] if from_left else table[k, LEFT_PATCH]
-            far = right - left + other
-            y = alpha * (1 + c if from_left else 1 - c)
-            place = int(y * _PER_UNIT)
-            if place < _EXPM1.shape[0]:
-                x = y - place / _PER_UNIT
-                grown = 1 / 24 + x * (1 / 120 + x * (1 / 720 + x / 5040))
-                grown = x * (1 + x * (0.5 + x * (1 / 6 + x * grown)))
-                grown = _EXPM1[place] + grown * (1 + _EXPM1[place])
-            else:
-                grown = np.expm1(y)
-            r = grown * own * far / (far + (1 + grown) * own)
-            span[k, i] = alpha * (own + r) * (far - r) / (own + far) * s
-            theta[k, i] = left + r if from_left else right - r
-            c, s = c * turned[0] - s * turned[1], s * turned[0] + c * turned[1]
-    return theta, span
+    left, right = gap[LEFT], gap[RIGHT]
+    alpha = 2 * gap[ALPHA]
+    for i in range(theta.shape[0]):
+        c = cosine[i + 1]
+        from_left = c < 0
+        own = gap[LEFT_PATCH] if from_left else gap[RIGHT_PATCH]
+        other = gap[RIGHT_PATCH] if from_left else gap[LEFT_PATCH]
+        far = right - left + other
+        y = alpha * (1 + c if from_left else 1 - c)
+        place = int(y * _PER_UNIT)
+        if place < _EXPM1.shape[0]:
+            x = y - place / _PER_UNIT
+            grown = 1 / 24 + x * (1 / 120 + x * (1 / 720 + x / 5040))
+            grown = x * (1 + x * (0.5 + x * (1 / 6 + x * grown)))
+            grown = _EXPM1[place] + grown * (1 + _EXPM1[place])
+        else:
+            grown = np.expm1(y)
+        r = grown * own * far / (far + (1 + grown) * own)
+        span[i] = alpha * (own + r) * (far - r) / (own + far) * sine[i + 1]
+        theta[i] = left + r if from_left else right - r
 
 
 @compiled
-def _sampled(theta: Array, span: Array, width: float, stress: Array) -> Array:
-    """S dθ/dt at nodes."""
-    out = np.empty(theta.shape)
-    for k in range(theta.shape[0]):
-        values = interpolate(theta[k], width, stress)
-        for i in range(theta.shape[1]):
-            out[k, i] = values[i] * span[k, i]
-    return out
-
-
-def sines(field: GapField, per_wave: float, gaps: Kinds | None = None) -> Iterator[Sines]:
-    """The fine nodes of gaps (all by default), those of equally many together."""
-    source, table = field.source, field.solution.table
-    gaps = np.arange(len(table)) if gaps is None else gaps
-    sizes = _sizes(_fewest_nodes(table[gaps], source.top, per_wave))
-    for size in sorted(set(sizes.tolist())):
-        some = gaps[sizes == size]
-        theta, span = _fine_nodes(table[some], size)
-        load = _sampled(theta, span, source.panels.width, source.panels.stress)
-        yield Sines(some, theta, span, dst(load, type=1) / (size + 1))
+def _moments(
+    gap: Array,
+    width: float,
+    stress: Array,
+    cosine: Array,
+    sine: Array,
+    theta: Array,
+    span: Array,
+    modes: Array,
+) -> None:
+    """Fine nodes of a gap (:func:`_fine_nodes`), and s_n of every mode that they carry."""
+    _fine_nodes(gap, cosine, sine, theta, span)
+    load = interpolate(theta, width, stress)
+    count = theta.shape[0]
+    for i in range(count):
+        load[i] *= span[i]
+    sine_sums(load, cosine, sine, modes)
+    for n in range(count):
+        modes[n] *= 2 / (count + 1)
 
 
 @compiled
-def _high_work(gaps: Kinds, modes: Array, kinds: Kinds, counts: Kinds) -> float:
-    """Σ s_n²/(n+1) over the modes of gaps above those of f."""
+def _high_work(
+    table: Array, kinds: Kinds, counts: Kinds, top: int, width: float, stress: Array
+) -> float:
+    """π/2 Σ s_n²/(n+1) over the modes of all gaps above those of f."""
     total = 0.0
-    for i in range(gaps.shape[0]):
-        for n in range(counts[kinds[gaps[i]]], modes.shape[1]):
-            total += modes[i, n] * modes[i, n] / (n + 1)
-    return total
+    last = 0
+    cosine, sine = circle(4)
+    for k in range(table.shape[0]):
+        count = fine_nodes_of(table[k], top, ENERGY_NODES)
+        if count != last:
+            cosine, sine = circle(count + 1)
+            last = count
+        theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
+        _moments(table[k], width, stress, cosine, sine, theta, span, modes)
+        for n in range(counts[kinds[k]], count):
+            total += modes[n] * modes[n] / (n + 1)
+    return np.pi / 2 * total
 
 
 def work_of_gaps(field: GapField) -> float:
     """∫_gaps S_full T dθ."""
-    of = field.solution
-    total = float(of.rhs[:, 0] @ of.f)
-    for part in sines(field, ENERGY_NODES):
-        total -= np.pi / 2 * _high_work(part.gaps, part.modes, of.kinds, RULES.counts)
-    return total
+    of, source = field.solution, field.source
+    high = _high_work(
+        of.table, of.kinds, RULES.counts, source.top, source.panels.width, source.panels.stress
+    )
+    return float(of.rhs[:, 0] @ of.f) - high
 
 
 @compiled
-def _modes_of(
-    gaps: Kinds, modes: Array, kinds: Kinds, offset: Kinds, f: Array, rules: Rules
-) -> Array:
-    """b_n of gaps from their s_n and from f."""
-    out = np.empty(modes.shape)
-    for i in range(gaps.shape[0]):
-        kind = kinds[gaps[i]]
-        m = rules.counts[kind]
-        for n in range(m, modes.shape[1]):
-            out[i, n] = -modes[i, n] / (n + 1)
-        for n in range(m):
-            total = 0.0
-            for j in range(m):
-                w = rules.w[rules.start[kind] + j]
-                total += w * f[offset[gaps[i]] + j] * rules.modes[rules.square[kind] + j * m + n]
-            out[i, n] = 2 / np.pi * total
-    return out
-
-
-def opened(field: GapField, part: Sines) -> tuple[Array, Array]:
-    """Openings T of gaps at their fine nodes, and their b_n, both of shape (G, nodes)."""
-    of = field.solution
-    modes = _modes_of(part.gaps, part.modes, of.kinds, of.offset, of.f, RULES)
-    return dst(modes, type=1) / 2, modes
+def opened(
+    gap: Array,
+    count: int,
+    kind: int,
+    f: Array,
+    rules: Rules,
+    width: float,
+    stress: Array,
+    cosine: Array,
+    sine: Array,
+) -> tuple[Array, Array, Array, Array]:
+    """θ, falling, dθ/dt and T of a gap at ``count`` fine nodes, and its b_n, from its f."""
+    theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
+    _moments(gap, width, stress, cosine, sine, theta, span, modes)
+    m = rules.counts[kind]
+    for n in range(m, count):
+        modes[n] = -modes[n] / (n + 1)
+    for n in range(m):
+        total = 0.0
+        for j in range(m):
+            w = rules.w[rules.start[kind] + j]
+            total += w * f[j] * rules.modes[rules.square[kind] + j * m + n]
+        modes[n] = 2 / np.pi * total
+    opening = np.empty(count)
+    sine_sums(modes, cosine, sine, opening)
+    return theta, span, opening, modes
 
 
 def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> Opening:
     """Opening T of gap k at fine nodes."""
-    (part,) = sines(field, per_wave, np.array([k]))
-    opening, modes = opened(field, part)
-    count = part.theta.shape[1]
-    weight = part.span[0] * np.pi / (count + 1)
-    return Opening(part.theta[0, ::-1], opening[0, ::-1], weight[::-1], modes[0])
+    of, panels = field.solution, field.source.panels
+    count = fine_nodes_of(of.table[k], field.source.top, per_wave)
+    theta, span, opening, modes = opened(
+        of.table[k], count, of.kinds[k], of.f[of.offset[k] : of.offset[k + 1]], RULES,
+        panels.width, panels.stress, *circle(count + 1),
+    )  # fmt: skip
+    weight = span * np.pi / (count + 1)
+    return Opening(theta[::-1], opening[::-1], weight[::-1], modes)
 
 
 def finer_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]:
     """θ, increasing, and T at about ``factor`` times as many sine nodes as there are modes b_n."""
-    count = next_fast_len(factor * (len(modes) + 1), real=True) - 1
-    more = np.zeros(count)
+    count = fast_size(factor * (len(modes) + 1) - 1)
+    cosine, sine = circle(count + 1)
+    more, theta, span, opening = np.zeros(count), np.empty(count), np.empty(count), np.empty(count)
     more[: len(modes)] = modes
-    return _fine_nodes(gap[None], count)[0][0, ::-1], dst(more, type=1)[::-1] / 2
+    _fine_nodes(gap, cosine, sine, theta, span)
+    sine_sums(more, cosine, sine, opening)
+    return theta[::-1], opening[::-1]
 
 
 @compiled

@@ -14,23 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.compiled import compiled
 from solver.method import PathError
 from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
+from solver.sharp.bottom import bottoms_of
 from solver.sharp.clearance import Clearances
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
-from solver.sharp.field import GapField, Kinds
-from solver.sharp.opening import SHAPE_NODES, opened, sines, sum_modes
+from solver.sharp.field import RULES, GapField, Kinds
 
 _OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
-# A minimum below this (of what its curvature makes over a node's distance, or of what the parabola
-# through the nodes may be wrong by) is found from the whole series, by parabolas that get narrower
-# so many times.
-_CLOSE = 0.1
-_DOUBT = 3.0
-_NARROWER = 3
-_FLAT = 1e-100  # half the curvature, where none is seen
 _MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
 _MOST_CLEAR = 2  # aims by a secant that are clear, one after the other, before a halving
 
@@ -62,69 +54,6 @@ class Located:
     late: float
 
 
-def _bottom(
-    field: GapField, k: int, modes: Array, at: float, width: float
-) -> tuple[float, float, float]:
-    """Place, opening and half the curvature of a minimum, by parabolas that get narrower."""
-    half = 0.0
-    table = field.solution.table[k]
-    low = np.inf
-    for _ in range(_NARROWER):
-        width /= 8
-        x = np.array([at - width, at, at + width])
-        y = sum_modes(table, x, modes)
-        half = (y[2] - 2 * y[1] + y[0]) / (2 * width**2)
-        slope = (y[2] - y[0]) / (2 * width)
-        if not half > 0:
-            return at, float(y[1]), max(half, _FLAT)
-        step = float(np.clip(-slope / (2 * half), -4 * width, 4 * width))
-        at, low = at + step, float(y[1] + slope * step + half * step**2)
-    return at, low, half
-
-
-@compiled
-def _bottoms(theta: Array, opening: Array) -> tuple[Kinds, Array, Array, Array, Array, Array]:
-    """Local minima along rows in which θ falls: row, place, value, half of κ, width, doubt.
-
-    By the parabola through three nodes, Newton's form; ``width`` is the distance of the outer two,
-    ``doubt`` what the value may be wrong by, from the cubics through a fourth node on either side.
-    """
-    most = theta.size // 2 + 1
-    row = np.empty(most, dtype=np.int64)
-    out = np.empty((5, most))
-    count = 0
-    for k in range(theta.shape[0]):
-        y = opening[k]
-        x = theta[k]
-        for i in range(y.shape[0] - 2, 0, -1):
-            if y[i] <= y[i + 1] and y[i] < y[i - 1]:
-                first = (y[i] - y[i + 1]) / (x[i] - x[i + 1])
-                second = (y[i - 1] - y[i]) / (x[i - 1] - x[i])
-                width = x[i - 1] - x[i + 1]
-                half = (second - first) / width
-                slope = first + half * (x[i] - x[i + 1])
-                cubic = 0.0
-                for j in (i - 2, i + 2):
-                    if 0 <= j < y.shape[0]:
-                        beside = i - 1 if j < i else i + 1
-                        far = i + 1 if j < i else i - 1
-                        outer = (y[j] - y[beside]) / (x[j] - x[beside])
-                        inner = second if j < i else first
-                        other = (outer - inner) / (x[j] - x[i])
-                        cubic = max(cubic, abs((other - half) / (x[j] - x[far])))
-                row[count] = k
-                out[0, count] = x[i] - slope / (2 * half)
-                out[1, count] = y[i] - slope * slope / (4 * half)
-                out[2, count] = half
-                out[3, count] = width
-                out[4, count] = 0.05 * cubic * width**3
-                count += 1
-    return (
-        row[:count], out[0, :count].copy(), out[1, :count].copy(), out[2, :count].copy(),
-        out[3, :count].copy(), out[4, :count].copy(),
-    )  # fmt: skip
-
-
 class Nucleation:
     """Finds touching points and puts seeds there."""
 
@@ -150,24 +79,12 @@ class Nucleation:
     def minima(self, field: GapField, gaps: Kinds) -> tuple[Minima, Kinds]:
         """Local minima of the opening inside some gaps, and in which of them each lies."""
         self.edges.count.openings += len(gaps)
-        found = [np.empty((3, 0))]
-        where = [np.empty(0, dtype=np.int64)]
-        for part in sines(field, SHAPE_NODES, gaps):
-            opening, modes = opened(field, part)
-            row, at, low, half, width, doubt = _bottoms(part.theta, opening)
-            for j in np.flatnonzero(low < np.maximum(_CLOSE * half * width**2, _DOUBT * doubt)):
-                k = row[j]
-                at[j], low[j], half[j] = _bottom(
-                    field, part.gaps[k], modes[k], at[j], 0.5 * width[j]
-                )
-            found.append(np.stack([at, low, 2 * half]))
-            where.append(part.gaps[row])
-        theta, depth, curvature = np.concatenate(found, axis=1)
-        order = np.argsort(theta, kind="stable")
-        return (
-            Minima(theta[order], depth[order], curvature[order]),
-            np.concatenate(where)[order],
-        )
+        of, source = field.solution, field.source
+        theta, opening, curvature, where = bottoms_of(
+            gaps, of.table, of.kinds, of.offset, of.f, RULES, source.top, source.panels.width,
+            source.panels.stress,
+        )  # fmt: skip
+        return Minima(theta, opening, curvature), where
 
     def clearance(self, opening: Array, curvature: Array) -> Array:
         """Opening left at minima before a patch is put there; not positive when it is time."""

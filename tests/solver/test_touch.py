@@ -7,8 +7,9 @@ import pytest
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from solver.references.single_wave import SingleWave
+from solver.sharp.bottom import bottoms
 from solver.sharp.method import SharpMethod
-from solver.sharp.touch import Minima, Nucleation, Touch, _bottoms
+from solver.sharp.touch import Minima, Nucleation, Touch
 from tests.support.scenes import HALF_SPACE
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3
@@ -51,7 +52,7 @@ def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None
         nodes = np.linspace(1, -1, 12) + rng.uniform(-0.01, 0.01, 12)
         at, half, third = rng.uniform(-0.5, 0.5), rng.uniform(0.2, 1), rng.uniform(-0.6, 0.6)
         opening = 1 + half * (nodes - at) ** 2 + third * (nodes - at) ** 3
-        _, place, low, _, _, doubt = _bottoms(nodes[None], opening[None])
+        place, low, _, _, doubt = bottoms(nodes, opening)
         if len(place) == 1 and abs(place[0] - at) < 0.3:
             assert abs(low[0] - 1) <= 1.5 * doubt[0]
 
