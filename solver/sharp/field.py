@@ -54,6 +54,10 @@ from solver.sharp.linear import cholesky, factor_rows, solve_column, solve_facto
 from solver.sharp.outside import Outside, add_outside, moving_load, reach
 from solver.sharp.source import Panels, StressSource, gap_moments
 
+# Below these arguments the own gap's kernels are taken as series.
+_PERIODIC_SERIES = 0.2
+_MAPPED_SERIES = 0.3
+
 Kinds = NDArray[np.int64]
 """One whole number a gap: its kind of rule, or its first node."""
 
@@ -574,7 +578,7 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
 @compiled
 def periodic(x: float) -> float:
     """1/sin²(x/2) - 4/x², x = Δθ: what the own gap feels of its periodic images."""
-    if abs(x) < 0.2:
+    if abs(x) < _PERIODIC_SERIES:
         y = x * x
         return 1 / 3 + y * (1 / 60 + y * (1 / 1512 + y * (1 / 43200 + y / 1330560)))
     half: float = np.sin(0.5 * x)
@@ -585,7 +589,7 @@ def periodic(x: float) -> float:
 def mapped(alpha: float, x: float) -> float:
     """4 [α²/sinh²(αx) - 1/x²], x = Δη: the own gap's kernel beyond a straight crack in η."""
     y = alpha * x
-    if abs(y) < 0.3:
+    if abs(y) < _MAPPED_SERIES:
         y *= y
         series = -1 / 3 + y * (1 / 15 + y * (-2 / 189 + y * (1 / 675 - y * 2 / 10395)))
         return 4 * alpha * alpha * series
@@ -710,11 +714,33 @@ def _own_gap(
             for j in range(m):
                 total += modes[i, j] * s[j, field]
             rhs[i, 2 * field] = w[i] * total
+    # sines of differences from those of the nodes: of small ones the kernels are series
+    sine = np.empty(m)
+    cosine = np.empty(m)
+    power = np.empty(m)
+    middle = 0.5 * (gap[LEFT] + gap[RIGHT])
+    for i in range(m):
+        sine[i] = np.sin(0.5 * (theta[i] - middle))
+        cosine[i] = np.cos(0.5 * (theta[i] - middle))
+        power[i] = np.exp(gap[ALPHA] * eta[i])
+    alpha = gap[ALPHA]
     for i in range(m):
         for j in range(i + 1):
-            far = weight[i] * weight[j] * periodic(theta[i] - theta[j])
-            near = w[i] * w[j] * mapped(gap[ALPHA], eta[i] - eta[j])
-            matrix[i, j] = b[i, j] - (near + far) / (4 * np.pi)
+            x = theta[i] - theta[j]
+            if abs(x) < _PERIODIC_SERIES:
+                far = periodic(x)
+            else:
+                half = sine[i] * cosine[j] - cosine[i] * sine[j]
+                far = 1 / (half * half) - 4 / (x * x)
+            y = eta[i] - eta[j]
+            if abs(alpha * y) < _MAPPED_SERIES:
+                near = mapped(alpha, y)
+            else:
+                ratio = power[i] / power[j]
+                twice = ratio - 1 / ratio  # twice the hyperbolic sine
+                near = 4 * (4 * alpha * alpha / (twice * twice) - 1 / (y * y))
+            both = weight[i] * weight[j] * far + w[i] * w[j] * near
+            matrix[i, j] = b[i, j] - both / (4 * np.pi)
             matrix[j, i] = matrix[i, j]
 
 

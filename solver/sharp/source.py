@@ -48,6 +48,7 @@ _PIECES_BY_SLOPE = 4.0
 
 _SHORT_GAP = 4  # gaps shorter than so many finest panels are integrated directly
 _PHASE = 3.0  # radians of the highest Chebyshev mode that one panel may span
+_LARGEST = 0.36  # z up to which artanh z is a short series
 _SAFE = 2.0  # modes·length/distance of a panel up to which it surely spans less
 
 
@@ -182,15 +183,9 @@ class StressSource:
 
     def measure_between(self, left: Array, right: Array) -> float:
         """Sum over the intervals of ∫ sqrt(1 + h'²) dθ from ``left`` to ``right``."""
-        return float((self._measure_to(right) - self._measure_to(left)).sum())
-
-    def _measure_to(self, theta: Array) -> Array:
-        width, count = self.panels.width, self.panels.finest
-        turns, rest = np.divmod(theta, 2 * np.pi)
-        k = np.minimum((rest / width).astype(int), count - 1)
-        share = np.clip(rest / width - k, 0, 1)
-        part = _lengths(k, share, self.panels.tilt, self._piece_x, self._piece_w) * width
-        return np.asarray(turns * self._measure_before[-1] + self._measure_before[k] + part)
+        return _measure_between(
+            left, right, self._measure_before, self.panels.tilt, self._piece_x, self._piece_w
+        )
 
 
 def _to_chebyshev(nodes: Array) -> Array:
@@ -234,19 +229,6 @@ def _value(coefficients: Array, place: float) -> float:
     k = int(np.floor(place))
     # the number of panels is a power of two
     return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
-
-
-@compiled
-def _both_values(panels: Panels, place: float) -> tuple[float, float]:
-    """S and S' at θ = place · panel width: two recurrences side by side."""
-    k = int(np.floor(place))
-    x = 2 * (place - k) - 1
-    k &= panels.finest - 1
-    b1 = b2 = e1 = e2 = 0.0
-    for j in range(panels.stress.shape[1] - 1, 0, -1):
-        b1, b2 = 2 * x * b1 - b2 + panels.stress[k, j], b1
-        e1, e2 = 2 * x * e1 - e2 + panels.slope[k, j], e1
-    return x * b1 - b2 + panels.stress[k, 0], x * e1 - e2 + panels.slope[k, 0]
 
 
 @compiled_for_both
@@ -307,6 +289,29 @@ def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, 
     return out
 
 
+@compiled
+def _measure_between(
+    left: Array, right: Array, before: Array, tilt: Array, nodes: Array, w: Array
+) -> float:
+    """As :meth:`StressSource.measure_between`; ``before`` is the measure before each panel."""
+    count = tilt.shape[0]
+    width = 2 * np.pi / count
+    panel = np.empty(2, dtype=np.int64)
+    share = np.empty(2)
+    total = 0.0
+    for i in range(left.shape[0]):
+        for end in range(2):
+            theta = left[i] if end == 0 else right[i]
+            turns = np.floor(theta / (2 * np.pi))
+            place = (theta - turns * 2 * np.pi) / width
+            panel[end] = min(max(int(place), 0), count - 1)
+            share[end] = min(max(place - panel[end], 0.0), 1.0)
+            total += (2 * end - 1) * (turns * before[count] + before[panel[end]])
+        part = _lengths(panel, share, tilt, nodes, w)
+        total += (part[1] - part[0]) * width
+    return total
+
+
 # Nodes of a gap's moments: rows 1 - η, 1 + η, ∫S dθ and ∫S' dθ of each.
 _MINUS, _PLUS, _STRESS, _SLOPE = 0, 1, 2, 3
 
@@ -322,39 +327,109 @@ def _room(nodes: Array, count: int, more: int) -> Array:
 
 
 @compiled
+def _artanh_over(y: float) -> float:
+    """The quotient artanh z/z, y = z², where |z| is hardly above 1/3."""
+    series = 1 / 15 + y * (1 / 17 + y * (1 / 19 + y * (1 / 21 + y / 23)))
+    series = 1 / 7 + y * (1 / 9 + y * (1 / 11 + y * (1 / 13 + y * series)))
+    return 1 + y * (1 / 3 + y * (1 / 5 + y * series))
+
+
+@compiled
+def _room_for_ends(left: float, right: float, panels: Panels, nodes: Array) -> Array:
+    """``nodes`` with room for two end pieces beyond patches of these widths."""
+    cells = 2
+    for beyond in (left, right):
+        at = beyond
+        while at < 2 * panels.width:
+            at *= 2
+            cells += 1
+    return _room(nodes, 0, cells * max(panels.x.shape[0], panels.end_x.shape[0]))
+
+
+@compiled_sums
 def _end_piece(
     gap: Array, side: int, length: float, panels: Panels, nodes: Array, count: int
-) -> tuple[Array, int]:
-    """Nodes from the end of a gap inwards, in cells graded to the patch beyond that end."""
-    beyond = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
+) -> int:
+    """Nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
+
+    ``nodes`` must have room for them; returns how many there are then.
+    """
+    own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
+    far = gap[RIGHT] - gap[LEFT] + (gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH])
+    scale = 1 / gap[ALPHA]
+    nearer = nodes[_PLUS - side]
+    farther = nodes[_MINUS + side]
+    origin = (gap[LEFT] if side == 0 else gap[RIGHT]) / panels.width
+    per = (1 if side == 0 else -1) / panels.width
+    last = panels.finest - 1
+    both = nodes.shape[0] > _SLOPE
     at = 0.0
-    stop = min(length, beyond)
+    stop = min(length, own)
     while at < length:
         first = at == 0.0
         rule = panels.end_x.shape[0] if first else panels.x.shape[0]
-        nodes = _room(nodes, count, rule)
-        for i in range(rule):
-            if first:
+        # distances from the end, and from where the logarithm of the map is known
+        if first:
+            # the square root at the end becomes smooth in y
+            known, near = 0.0, 0.0
+            for i in range(rule):
                 y = panels.end_x[i]
-                r = y * y * stop  # the square root at the end becomes smooth in y
-                weight = 2 * y * panels.end_w[i] * stop
+                farther[count + i] = y * y * stop
+                nodes[_STRESS, count + i] = 2 * y * panels.end_w[i] * stop
+        else:
+            known, half = 0.5 * (at + stop), 0.5 * (stop - at)
+            near = 0.5 * scale * np.log1p(known * (1 / own + 1 / far) / (1 - known / far))
+            for i in range(rule):
+                farther[count + i] = known + half * panels.x[i]
+                nodes[_STRESS, count + i] = half * panels.w[i]
+        a = own + known
+        b = far - known
+        d = stop - known
+        if d * (a + b) < _LARGEST * (2 * a * b + d * (b - a)):
+            for i in range(count, count + rule):
+                d = farther[i] - known
+                z = d * (a + b) / (2 * a * b + d * (b - a))
+                nearer[i] = near + scale * z * _artanh_over(z * z)
+        else:
+            for i in range(count, count + rule):
+                r = farther[i]
+                nearer[i] = 0.5 * scale * np.log1p(r * (1 / own + 1 / far) / (1 - r / far))
+        for i in range(count, count + rule, 2):  # recurrences side by side, as each waits
+            place = origin + per * farther[i]
+            other_place = origin + per * farther[i + 1]
+            k = int(np.floor(place))
+            other_k = int(np.floor(other_place))
+            x = 2 * (place - k) - 1
+            y = 2 * (other_place - other_k) - 1
+            c = panels.stress[k & last]
+            e = panels.stress[other_k & last]
+            b1 = b2 = e1 = e2 = 0.0
+            if both:
+                f = panels.slope[k & last]
+                g = panels.slope[other_k & last]
+                f1 = f2 = g1 = g2 = 0.0
+                for j in range(c.shape[0] - 1, 0, -1):
+                    b1, b2 = 2 * x * b1 - b2 + c[j], b1
+                    e1, e2 = 2 * y * e1 - e2 + e[j], e1
+                    f1, f2 = 2 * x * f1 - f2 + f[j], f1
+                    g1, g2 = 2 * y * g1 - g2 + g[j], g1
+                weight, other_weight = nodes[_STRESS, i], nodes[_STRESS, i + 1]
+                nodes[_SLOPE, i] = weight * (x * f1 - f2 + f[0])
+                nodes[_SLOPE, i + 1] = other_weight * (y * g1 - g2 + g[0])
             else:
-                r = at + (stop - at) * (panels.x[i] + 1) / 2
-                weight = panels.w[i] * (stop - at) / 2
-            place = (gap[LEFT] + r if side == 0 else gap[RIGHT] - r) / panels.width
-            nodes[_MINUS, count], nodes[_PLUS, count] = one_minus_plus(gap, r, side)
-            if nodes.shape[0] > _SLOPE:
-                stress, slope = _both_values(panels, place)
-                nodes[_STRESS, count] = weight * stress
-                nodes[_SLOPE, count] = weight * slope
-            else:
-                nodes[_STRESS, count] = weight * _value(panels.stress, place)
-            count += 1
+                for j in range(c.shape[0] - 1, 0, -1):
+                    b1, b2 = 2 * x * b1 - b2 + c[j], b1
+                    e1, e2 = 2 * y * e1 - e2 + e[j], e1
+            nodes[_STRESS, i] *= x * b1 - b2 + c[0]
+            nodes[_STRESS, i + 1] *= y * e1 - e2 + e[0]
+        for i in range(count, count + rule):
+            farther[i] = 2 - nearer[i]
+        count += rule
         at = stop
         stop = min(2 * at, length)
         if length - stop < 0.25 * at:
             stop = length
-    return nodes, count
+    return count
 
 
 @compiled_sums
@@ -375,10 +450,12 @@ def _panel_nodes(
     """
     p = x.shape[0]
     length = gap[RIGHT] - gap[LEFT]
+    scale = 1 / (2 * gap[ALPHA])
+    above = np.empty(tiled * p)
+    below = np.empty(tiled * p)
     for tile in range(tiled):
         centre = (tiles[0, tile] + 0.5 * tiles[1, tile]) * width - gap[LEFT]
         half = 0.5 * tiles[1, tile] * width
-        row = tiles[2, tile]
         side = 0 if centre < length - centre else 1
         own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
         far = length + (gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH])
@@ -386,23 +463,33 @@ def _panel_nodes(
             centre, half = length - centre, -half
         a = own + centre
         b = far - centre
-        near = np.log1p(centre * (1 / own + 1 / far) / (1 - centre / far))
-        scale = 1 / (2 * gap[ALPHA])
+        for i in range(p):
+            d = half * x[i]
+            above[tile * p + i] = d * (a + b)
+            below[tile * p + i] = 2 * a * b + d * (b - a)
+    # what costs, over all panels at once: the processor's vectors are wider than a panel's loop
+    for i in range(tiled * p):
+        z = above[i] / below[i]
+        above[i] = 2 * z * _artanh_over(z * z) * scale
+    for tile in range(tiled):
+        centre = (tiles[0, tile] + 0.5 * tiles[1, tile]) * width - gap[LEFT]
+        row = tiles[2, tile]
+        side = 0 if centre < length - centre else 1
+        own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
+        far = length + (gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH])
+        if side == 1:
+            centre = length - centre
+        near = np.log1p(centre * (1 / own + 1 / far) / (1 - centre / far)) * scale
         nearer = nodes[_PLUS - side]
         farther = nodes[_MINUS + side]
         for i in range(p):
-            d = half * x[i]
-            z = d * (a + b) / (2 * a * b + d * (b - a))
-            y = z * z
-            series = 1 / 15 + y * (1 / 17 + y * (1 / 19 + y * (1 / 21 + y / 23)))
-            series = 1 / 7 + y * (1 / 9 + y * (1 / 11 + y * (1 / 13 + y * series)))
-            series = 1 + y * (1 / 3 + y * (1 / 5 + y * series))
-            nearer[count + i] = (near + 2 * z * series) * scale
-        for i in range(p):
-            farther[count + i] = 2 - nearer[count + i]
-        for field in range(nodes.shape[0] - _STRESS):
+            value = near + above[tile * p + i]
+            nearer[count + i] = value
+            farther[count + i] = 2 - value
+            nodes[_STRESS, count + i] = weights[0, row, i]
+        if nodes.shape[0] > _SLOPE:
             for i in range(p):
-                nodes[_STRESS + field, count + i] = weights[field, row, i]
+                nodes[_SLOPE, count + i] = weights[1, row, i]
         count += p
     return count
 
@@ -435,8 +522,9 @@ def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Arra
         return _short_gap(gap, modes, panels, nodes)
     first = int(np.floor(left / width)) + 2  # an end piece is one to two finest panels long
     last = int(np.ceil(right / width)) - 2
-    nodes, count = _end_piece(gap, 0, first * width - left, panels, nodes, 0)
-    nodes, count = _end_piece(gap, 1, right - last * width, panels, nodes, count)
+    nodes = _room_for_ends(gap[LEFT_PATCH], gap[RIGHT_PATCH], panels, nodes)
+    count = _end_piece(gap, 0, first * width - left, panels, nodes, 0)
+    count = _end_piece(gap, 1, right - last * width, panels, nodes, count)
     levels = panels.level_start.shape[0]
     tiles = np.empty((3, max(0, last - first)), dtype=np.int64)
     tiled = 0

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.compiled import compiled
 from solver.method import PathError
 from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
@@ -54,12 +55,38 @@ class Located:
     late: float
 
 
+@compiled
+def seed_width(curvature: float, surface: float, narrowest: float, widest: float) -> float:
+    """Width of the patch that is put where surfaces with the energy Γ touch with this curvature."""
+    first = (16 * surface / (np.pi * curvature**2)) ** (1 / 3)
+    width: float = min(max(0.5 * first, narrowest), widest)
+    return width
+
+
+@compiled
+def clearances(
+    opening: Array, curvature: Array, surface: float, narrowest: float, widest: float
+) -> Array:
+    """As :meth:`Nucleation.clearance`."""
+    out = np.empty(opening.shape[0])
+    for i in range(opening.shape[0]):
+        width = seed_width(curvature[i], surface, narrowest, widest)
+        out[i] = opening[i]
+        # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
+        # the surface follows it, 10 to 20 here.
+        if width <= narrowest:
+            out[i] += 4 * curvature[i] * width**2
+    return out
+
+
 class Nucleation:
     """Finds touching points and puts seeds there."""
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
         self.clearances = Clearances(edges.wave, edges.critical)
+        surface = math.pi * edges.critical**2 / 8  # Γ
+        self._seed = surface, 3 * edges.smallest, edges.longest_step
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
         self.overlap = _OVERLAP * problem.profile.h_max * problem.profile.q0
 
@@ -88,11 +115,7 @@ class Nucleation:
 
     def clearance(self, opening: Array, curvature: Array) -> Array:
         """Opening left at minima before a patch is put there; not positive when it is time."""
-        width = self._width(curvature)
-        narrowest = 3 * self.edges.smallest
-        # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
-        # the surface follows it, 10 to 20 here.
-        return np.asarray(opening + np.where(width <= narrowest, 4 * curvature * width**2, 0.0))
+        return clearances(opening, curvature, *self._seed)
 
     def ready(self, minima: Minima) -> list[Touch]:
         """Where to put patches: the place of largest overlap, and those that equal it."""
@@ -214,11 +237,5 @@ class Nucleation:
         return with_patches(
             gaps,
             np.array([t.theta for t in touches]),
-            self._width(np.array([t.curvature for t in touches])),
+            np.array([seed_width(t.curvature, *self._seed) for t in touches]),
         )
-
-    def _width(self, curvature: Array) -> Array:
-        """Width of the patch that is put where the surfaces touch with this curvature."""
-        surface = math.pi * self.edges.critical**2 / 8  # Γ
-        first = (16 * surface / (math.pi * curvature**2)) ** (1 / 3)
-        return np.clip(0.5 * first, 3 * self.edges.smallest, self.edges.longest_step)
