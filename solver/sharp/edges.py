@@ -166,9 +166,7 @@ class Point:
             near = np.abs(self.at - at) < _SHORT * np.abs(self.at - earlier.past.at)
             at = np.where(near, earlier.past.at, at)
             rate = np.where(near, earlier.past.rate, rate)
-        point = copy(self)
-        object.__setattr__(point, "past", Past(at, rate))
-        return point
+        return self._with("past", Past(at, rate))
 
     def heir(self, earlier: Point, near: float) -> Point:
         """Return this point, which a jump led to from ``earlier``, with the past of its edges.
@@ -185,9 +183,7 @@ class Point:
             same = (moved < near) & ~other
             past.at[same] = earlier.past.at[edge[same]]
             past.rate[same] = earlier.past.rate[edge[same]]
-        point = copy(self)
-        object.__setattr__(point, "past", past)
-        return point
+        return self._with("past", past)
 
     def towards(self, other: Point, at: float) -> Array:
         """Gaps at d = ``at`` between this point and another of the same branch, by a cubic."""
