@@ -79,20 +79,24 @@ def _singular_load(of: Solution, e: int, rules: Rules) -> tuple[Array, float]:
 
 
 @compiled
-def openings_along(of: Solution, way: Array, wanted: Kinds, rules: Rules) -> Array:
-    """C_e dC_e/dt of the edges ``wanted`` while every edge f moves outwards by way_f dt.
+def forces_on(of: Solution, wanted: Kinds, rules: Rules, rows: Array, known: Kinds) -> None:
+    """C_e ∂C_e/∂n_f of the edges ``wanted``, n outwards, into their ``rows``, one for each edge e.
 
-    The solution must be one with S and S'.
+    Those that are ``known``, which is not zero, are left. The solution must be one with S and S'.
     """
-    edges = way.shape[0]
-    out = np.zeros(wanted.shape[0])
+    edges = of.opening.shape[0]
+    missing = 0
+    for e in wanted:
+        missing += 1 if known[e] == 0 else 0
+    if missing == 0:
+        return
     if of.felt_area.shape[0] > 0:  # of a window, whose outside follows
         tangent, _ = derivatives(of, rules)
-        for i in range(wanted.shape[0]):
-            e = wanted[i]
+        for e in range(edges):
             for f in range(edges):
-                out[i] += of.opening[e] * tangent[e, f] * way[f] * (1 - 2 * (f % 2))
-        return out
+                rows[e, f] = of.opening[e] * tangent[e, f] * (1 - 2 * (f % 2))
+        known[:] = 1
+        return
     # translation: all edges together against the profile
     n = of.theta.shape[0]
     drift = 0.0
@@ -103,8 +107,9 @@ def openings_along(of: Solution, way: Array, wanted: Kinds, rules: Rules) -> Arr
     for i in range(n):
         column[i, 0] = -of.solved[i, 2] - drift * of.solved[i, 1]
     moved = edge_openings(column, of.slope, of.kinds, of.offset, rules.start, rules.ends)
-    for i in range(wanted.shape[0]):
-        e = wanted[i]
+    for e in wanted:
+        if known[e] != 0:
+            continue
         k = e // 2
         side = e % 2
         outwards = 1 - 2 * side
@@ -122,12 +127,12 @@ def openings_along(of: Solution, way: Array, wanted: Kinds, rules: Rules) -> Arr
         felt[e ^ 1, 0] += 0.5 * np.sqrt(2 * of.slope[k, 1 - side])
         strength = -outwards * of.opening[e] * np.sqrt(of.slope[k, side] / 8)
         own = moved[e, 0] - np.sqrt(2 * of.slope[k, side]) * of.beyond[k, side, 1]
-        total = of.opening[e] * own * outwards * way[e]
+        alone = of.opening[e] * own * outwards
         for f in range(edges):
             if f != e:
                 # C_e ∂C_e/∂n_f = C_f ∂C_f/∂n_e, both n outwards
                 by = of.opening[f] * felt[f, 0] * strength * outwards
-                sign = outwards * (1 - 2 * (f % 2))
-                total += by * (way[f] - sign * way[e])
-        out[i] = total
-    return out
+                rows[e, f] = by
+                alone -= by * outwards * (1 - 2 * (f % 2))
+        rows[e, e] = alone
+        known[e] = 1

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp.along import first_fall, openings_along
+from solver.sharp.along import first_fall, forces_on
 from solver.sharp.balance import (
     Law,
     at_least,
@@ -110,6 +110,8 @@ def descend(
     stride = 0.0
     checked = np.empty(0, dtype=np.int64)  # edges that ran far in the last step
     departed = np.empty(0)  # how their forces changed at its start
+    rows = np.empty((edges, edges))  # how forces change with the edges, of those edges
+    known = np.zeros(edges, dtype=np.int64)  # that are not zero here
     passed = np.empty((64, edges))
     passed[0] = gaps.ravel()
     count = 1
@@ -127,6 +129,7 @@ def descend(
         if not np.isfinite(of.pressure):
             return gaps, LOST, fields, tangents, kinds, passed[:count], astray
         residual, drift = imbalance(of, law, panels)
+        known[:] = 0
         # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²; where the
         # surfaces overlap, C < 0, contact grows all the same
         rise = 0.0
@@ -139,7 +142,8 @@ def descend(
             rise += work
             fall += abs(work)
         if checked.shape[0] > 0:
-            arrived = _rates(of, residual, drift, last, checked, rules)
+            forces_on(of, checked, rules, rows, known)
+            arrived = _rates(of, residual, drift, last, checked, rows)
             clear = 1.0
             for i in range(checked.shape[0]):
                 e = checked[i]
@@ -187,6 +191,11 @@ def descend(
             tangents += 1
             reuses = 0
             tangent, _ = tangent_of(of, drift, rules)
+            for e in range(edges):
+                for f in range(edges):
+                    rows[e, f] = of.opening[e] * tangent[e, f]
+                rows[e, e] += of.opening[e] * drift[e] * (1 - 2 * (e % 2))
+            known[:] = 1
             if equal_speeds:
                 d, matrix = symmetric(of, tangent, law.overlapping)
             else:
@@ -238,7 +247,8 @@ def descend(
                     step *= unchecked / size
                 else:
                     checked = running
-                    departed = _rates(of, residual, drift, step, checked, rules)
+                    forces_on(of, checked, rules, rows, known)
+                    departed = _rates(of, residual, drift, step, checked, rows)
         before = gaps
         gaps = moved_gaps(gaps, step)
         last = step
@@ -257,14 +267,20 @@ def descend(
 
 @compiled
 def _rates(
-    of: Solution, residual: Array, drift: Array, way: Array, edges: Kinds, rules: Rules
+    of: Solution, residual: Array, drift: Array, way: Array, edges: Kinds, rows: Array
 ) -> Array:
-    """How the force on each of ``edges``, along its own way, changes along the way of all."""
-    rates = openings_along(of, way, edges, rules)
+    """How the force on each of ``edges``, along its own way, changes along the way of all.
+
+    ``rows`` are those of :func:`forces_on`.
+    """
+    rates = np.empty(edges.shape[0])
     for i in range(edges.shape[0]):
         e = edges[i]
+        total = 0.0
+        for f in range(way.shape[0]):
+            total += rows[e, f] * way[f]
         critical = of.opening[e] - residual[e]
-        rate = critical * drift[e] * (1 - 2 * (e % 2)) * way[e] - np.sign(of.opening[e]) * rates[i]
+        rate = critical * drift[e] * (1 - 2 * (e % 2)) * way[e] - np.sign(of.opening[e]) * total
         rates[i] = 2 * rate * np.sign(way[e])
     return rates
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
+from solver.compiled import compiled, compiled_sums
 from solver.profile import Array
 
 _CLOSE = 0.97  # a step is long enough at this share of the limit
@@ -58,6 +58,16 @@ def _progress(values: Array, parts: Array, time: float) -> Array:
     return out
 
 
+@compiled_sums
+def _combine(vectors: Array, modes: Array, step: Array) -> None:
+    """Motion of every edge from that of the modes."""
+    for e in range(step.shape[0]):
+        total = 0.0
+        for i in range(modes.shape[0]):
+            total += vectors[e, i] * modes[i]
+        step[e] = total
+
+
 @compiled
 def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: float) -> Array:
     """Motion of the edges until one is at its limit, or all have come to rest.
@@ -71,9 +81,10 @@ def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: 
     total = 0.0
     for e in range(n):
         total += force[e] * force[e]
-    for i in range(n):
-        for e in range(n):
+    for e in range(n):
+        for i in range(n):
             parts[i] += vectors[e, i] * force[e]
+    for i in range(n):
         if values[i] < 0 and abs(parts[i]) < max(noise, _FAINT * np.sqrt(total)):
             parts[i] = 0.0
     fastest = 0.0
@@ -88,14 +99,10 @@ def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: 
     above = np.inf
     time = _AIM / fastest
     for _ in range(_TRIES):
-        modes = _progress(values, parts, time)
+        _combine(vectors, _progress(values, parts, time), step)
         worst = 0.0
         for e in range(n):
-            total = 0.0
-            for i in range(n):
-                total += vectors[e, i] * modes[i]
-            step[e] = total
-            worst = max(worst, abs(total) / limit[e])
+            worst = max(worst, abs(step[e]) / limit[e])
         if worst > 1 or not np.isfinite(worst):
             high = time
             above = worst

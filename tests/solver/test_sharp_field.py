@@ -7,8 +7,18 @@ import pytest
 
 from adhesis import Problem, self_affine_profile, single_wave
 from solver.grid.method import GridMethod
+from solver.sharp.along import forces_on
 from solver.sharp.coordinate import map_gaps, theta_at
-from solver.sharp.field import FIXED, GapField, Hold
+from solver.sharp.field import (
+    FIXED,
+    RULES,
+    GapField,
+    Hold,
+    choose_kinds,
+    derivatives,
+    solve,
+    solve_again,
+)
 from solver.sharp.opening import fine_opening, sum_modes, work_of_gaps
 from solver.sharp.source import StressSource, gap_moments
 from tests.support.explicit_solution import explicit_openings, explicit_solution
@@ -256,3 +266,28 @@ def test_hundreds_of_patches_in_one_period():
     pressure = waves * amplitude * y
     assert abs(field.pressure / pressure - 1) < 1e-9
     assert np.abs(field.opening).max() < 1e-8 * amplitude * waves
+
+
+def test_gaps_that_stay_may_be_taken_over_from_another_field(source, separation):
+    """One edge has moved: its gap, and those beside its patches, are solved anew."""
+    kinds = choose_kinds(map_gaps(GAPS), 25.0, RULES.counts)
+    before = solve(GAPS, separation, FIXED, kinds, 2, RULES, source.panels)
+    moved = GAPS.copy()
+    moved[2, 1] += 0.01
+    whole = solve(moved, separation, FIXED, kinds, 2, RULES, source.panels)
+    again = solve_again(moved, separation, FIXED, kinds, RULES, source.panels, before)
+    np.testing.assert_allclose(again.matrix, whole.matrix, rtol=1e-13)
+    np.testing.assert_allclose(again.opening, whole.opening, rtol=1e-11)
+    assert np.abs(again.opening / before.opening - 1).min() > 1e-9  # all feel it
+
+
+def test_forces_on_single_edges_are_rows_of_the_tangent(source, separation):
+    kinds = choose_kinds(map_gaps(GAPS), 25.0, RULES.counts)
+    of = solve(GAPS, separation, FIXED, kinds, 2, RULES, source.panels)
+    tangent = derivatives(of, RULES)[0] * of.opening[:, None] * np.tile([1, -1], 5)
+    rows, known = np.full((10, 10), np.nan), np.zeros(10, dtype=np.int64)
+    known[4] = 1
+    forces_on(of, np.array([1, 4, 6]), RULES, rows, known)
+    np.testing.assert_array_equal(np.flatnonzero(known), [1, 4, 6])
+    np.testing.assert_allclose(rows[[1, 6]], tangent[[1, 6]], atol=1e-9 * np.abs(tangent).max())
+    assert np.isnan(rows[4]).all()  # was known
