@@ -20,9 +20,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.profile import Array
 from solver.state import ContactState
+
+Indices = NDArray[np.int64]
 
 Branch = Literal["loading", "unloading"]
 BRANCHES: tuple[Branch, ...] = get_args(Branch)
@@ -133,44 +136,45 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     if len(after) == 0:
         longest = float((before[:, 1] - before[:, 0]).max()) if len(before) else 0.0
         return "pull-off", longest
-    touches = _overlapping(before, after, period)
-    touched = _overlapping(after, before, period)
-    moved = [
-        b - a
-        for mine, other, hits in ((before, after, touches), (after, before, touched))
-        for (a, b), hit in zip(mine, hits, strict=True)
-        if len(hit) != 1 or not _same((a, b), other[hit[0]], period)
-    ]
-    length = float(max(moved, default=0.0))
-    if any(len(hit) == 0 for hit in touched):
+    touches, one = _overlapping(before, after, period)
+    touched, other = _overlapping(after, before, period)
+    length = 0.0
+    for mine, others, hits, hit in ((before, after, touches, one), (after, before, touched, other)):
+        moved = hits != 1
+        single = np.flatnonzero(~moved)
+        moved[single] = ~_same(mine[single], others[hit[single]], period)
+        length = float((mine[moved, 1] - mine[moved, 0]).max(initial=length))
+    if (touched == 0).any():
         return "snap-in", length
-    if any(len(hit) > 1 for hit in touched):
+    if (touched > 1).any():
         return "merging", length
-    if any(len(hit) == 0 for hit in touches):
+    if (touches == 0).any():
         return "vanishing", length
-    if any(len(hit) > 1 for hit in touches):
+    if (touches > 1).any():
         return "splitting", length
     grown = (after[:, 1] - after[:, 0]).sum() - (before[:, 1] - before[:, 0]).sum()
     return ("spreading" if grown >= 0 else "receding"), length
 
 
-def _overlapping(patches: Array, others: Array, period: float) -> list[list[int]]:
-    """For each patch the indices of ``others`` that share a point with it on the circle.
+def _overlapping(patches: Array, others: Array, period: float) -> tuple[Indices, Indices]:
+    """How many of ``others`` share a point with each patch on the circle, and the first of them.
 
     Patches of one state do not overlap, so their left and their right edges come in one order.
     """
+    if len(others) == 0:
+        return np.zeros(len(patches), dtype=np.int64), np.zeros(len(patches), dtype=np.int64)
     order = np.argsort(others[:, 0])
     turns = period * np.arange(-1, 2)
     left = np.add.outer(turns, others[order, 0]).ravel()
     right = np.add.outer(turns, others[order, 1]).ravel()
     first = np.searchsorted(right, patches[:, 0], side="right")
     stop = np.searchsorted(left, patches[:, 1], side="left")
-    hits = (np.arange(i, j) % len(others) for i, j in zip(first, stop, strict=True))
-    return [sorted({int(order[k]) for k in hit}) for hit in hits]
+    return np.clip(stop - first, 0, len(others)), order[first % len(others)]
 
 
-def _same(one: tuple[float, float], two: Array, period: float) -> bool:
-    """Whether two patches have the same edges on the circle."""
-    offset = (one[0] - two[0] + period / 2) % period - period / 2
-    change = (one[1] - one[0]) - (two[1] - two[0])
-    return bool(max(abs(offset), abs(change)) < 1e-12 * period)
+def _same(one: Array, two: Array, period: float) -> NDArray[np.bool_]:
+    """Whether patches have the same edges on the circle as others."""
+    offset = (one[:, 0] - two[:, 0] + period / 2) % period - period / 2
+    change = (one[:, 1] - one[:, 0]) - (two[:, 1] - two[:, 0])
+    same: NDArray[np.bool_] = np.maximum(np.abs(offset), np.abs(change)) < 1e-12 * period
+    return same
