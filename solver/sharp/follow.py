@@ -20,7 +20,8 @@ _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation ste
 # A gap closes locally at most so many times faster than gaps on average; where there are many, a
 # look for touches costs more than to go back to one that was passed.
 _FASTEST_CLOSING = 4.0
-_CLOSING_OF_MANY = 2.0
+_CLOSING_OF_MANY = 1.0
+_ADVANCING = 4.0  # so many times the motion of one gap's edges closes others, where there are many
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten the trapezoidal rule
 
 
@@ -280,7 +281,9 @@ class Follower:
         if branch == "loading":
             return abs(reached.at - point.at) * self._closing(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
-        moved = float(np.abs(reached.gaps - point.gaps).sum())
+        each = np.abs(reached.gaps - point.gaps).sum(axis=1)
+        many = len(each) >= self.edges.many
+        moved = float(_ADVANCING * each.max() if many else np.abs(reached.gaps - point.gaps).sum())
         return float(self.edges.critical / np.sqrt(self.edges.wave) * moved)
 
     def _closing(self, point: Point) -> float:

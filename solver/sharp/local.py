@@ -26,6 +26,7 @@ _MOVING = 0.15  # motion of an edge, in λ_min, that ends a stretch as a fold do
 _BEFORE_FOLD = 0.5  # share of the way to its fold that an edge outside may go
 _LEAST_SPAN = 0.1  # of the way that the motion of the edges outside allows, whatever their folds
 _STILL = 0.05  # so far, in λ_min, edges outside move while they are taken as linear
+_FAR = 4.0  # a fold is not believed beyond so many times the way that tells of it
 _BEND = 0.5  # of its straight motion that of an edge outside is expected to bend by at most
 _AWAY = 0.02  # further from where it was expected, in λ_min, no edge outside is found
 
@@ -48,7 +49,7 @@ class Stretch:
         self.edges, self.start = edges, start
         count = len(start.gaps)
         rates = np.abs(start.rate)
-        folds = self._folds()
+        folds = self._folds
         lead = int(np.argmin(np.fmin(_MOVING * edges.wave / rates, folds)))
         half = min(_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
         self.first = (lead // 2 - half) % count
@@ -60,6 +61,7 @@ class Stretch:
         before_fold = _BEFORE_FOLD * folds[outside].min()
         self.span = float(min(still, max(before_fold, _LEAST_SPAN * still)))
 
+    @cached_property
     def _folds(self) -> Array:
         """Distance in d of the fold that the past of each edge tells of; inf for none."""
         start = self.start
@@ -73,14 +75,24 @@ class Stretch:
         return out
 
     def _bent(self, at: float) -> Array:
-        """What the motion of the edges outside is more than straight, by their past."""
+        """What the motion of the edges outside is more than straight, by their past.
+
+        As :class:`solver.sharp.course.Course` has it: towards a fold like a root, else a parabola.
+        """
         start = self.start
         out = np.zeros(start.rate.shape)
         if start.past is not None:
             way = start.at - start.past.at
-            known = np.abs(way) > 0
             on = at - start.at
-            bend = (start.rate - start.past.rate)[known] * on * on / (2 * way[known])
+            known = way * on > 0
+            change = (start.rate - start.past.rate)[known]
+            bend = change * on * on / (2 * way[known])
+            fold, way = self._folds[known], np.abs(way[known])
+            near = fold < _FAR * way
+            root, first = np.sqrt(fold[near]), np.sqrt(fold[near] + way[near])
+            last = np.sqrt(np.maximum(fold[near] - abs(on), 0.0))
+            b = change[near] / (1 / root - 1 / first)
+            bend[near] = np.sign(on) * b * (2 * (root - last) - abs(on) / root)
             most = _BEND * np.abs(start.rate[known] * on)
             out[known] = np.clip(bend, -most, most)
         return (outward(start.gaps) * out).reshape(-1, 2)

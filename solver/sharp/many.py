@@ -67,7 +67,7 @@ def equilibrium_many(
         expected = size * (size / last) ** 2 if last < np.inf else size * size / law.longest
         if stable and expected <= law.coarse:
             steps += 1
-            of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
+            of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 1, rules, panels)
             found = np.isfinite(of.pressure)
             break
         last = size

@@ -114,6 +114,7 @@ class Start:
 
     def __init__(self, known: Array, about: About, leads: int) -> None:
         self._known, self._about, self._leads = known, about, leads
+        self._windows: dict[tuple[int, int], Window] = {}  # two descents begin in one
 
     def window(self, gaps: Array, law: Law, panels: Panels) -> Window | None:
         """Window around what is different in ``gaps``; None if that lies in many places."""
@@ -130,7 +131,10 @@ class Start:
         width = count - int(apart[widest]) + 1 + 2 * _BESIDE
         if width > min(_WIDEST, count - 2):
             return None
-        return Window(known, self._about, (begin - _BESIDE) % count, width, law, panels)
+        place_of = (begin - _BESIDE) % count, width
+        if place_of not in self._windows:
+            self._windows[place_of] = Window(known, self._about, *place_of, law, panels)
+        return self._windows[place_of]
 
     def descend(
         self, edges: EdgeMechanics, gaps: Array, at: float, *, equal_speeds: bool
