@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from solver.profile import Array
-from solver.sharp.edges import Point, outward
+from solver.sharp.edges import Point
+from solver.sharp.gaps import outward
 
 _FAR = 4.0  # a course is not believed beyond so many times the way between its points
 

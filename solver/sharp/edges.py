@@ -19,10 +19,12 @@ from solver.method import PathError
 from solver.profile import Array
 from solver.sharp.balance import Law, imbalance, narrowest
 from solver.sharp.coordinate import map_gaps
+from solver.sharp.counters import Counters
 from solver.sharp.descent import LOST, MET, NARROW, RESTING, descend
 from solver.sharp.equilibrium import equilibrium
 from solver.sharp.far import solve_many_plain
 from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution, choose_kinds
+from solver.sharp.gaps import outward, widths, without_small
 from solver.sharp.many import equilibrium_many
 from solver.sharp.nearby import Start
 from solver.sharp.source import StressSource
@@ -39,18 +41,6 @@ _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
 _SHORT = 0.3  # share of the way to an earlier point below which a nearer one tells less of a branch
 _CHANGED = 0.3  # share by which the rate of an edge may change in a jump that does not concern it
 _ALIKE = 0.01  # edges of two descents that come to rest so near to each other, in λ_min, have met
-
-
-@dataclass
-class Counters:
-    """What the work cost: field solutions, derivative solutions, fine openings and energies."""
-
-    fields: int = 0
-    derivatives: int = 0
-    energies: int = 0
-    openings: int = 0
-    newton_steps: int = 0
-    descent_steps: int = 0
 
 
 @dataclass
@@ -284,13 +274,6 @@ class EdgeMechanics:
             )  # fmt: skip
         return np.asarray(by_edge * outward(gaps)[edges])
 
-    def widths(self, gaps: Array) -> tuple[Array, Array]:
-        """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
-        patch = np.empty(len(gaps))
-        patch[:-1] = gaps[1:, 0]
-        patch[-1] = gaps[0, 0] + 2 * np.pi
-        return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
-
     def equilibrium(
         self,
         gaps: Array,
@@ -349,7 +332,10 @@ class EdgeMechanics:
         track: Track,
     ) -> Point | Array | None:  # fmt: skip
         """As :meth:`relax`, in a window on a known state; gaps to go on from if that is no end."""
-        rest = start.descend(self, gaps, prescribed, equal_speeds=equal_speeds)
+        rest = start.descend(
+            gaps, prescribed, self.law, self.source.panels, self.count, self.smallest,
+            equal_speeds=equal_speeds,
+        )  # fmt: skip
         if rest is None:
             return None
         if rest.ended == RESTING:
@@ -406,7 +392,7 @@ class EdgeMechanics:
                 return np.empty((0, 2))
             if begun is not None:
                 gaps = begun
-                rest = self.without_small(gaps)
+                rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
         while left > 0:
@@ -432,11 +418,11 @@ class EdgeMechanics:
             if ended == LOST:
                 raise PathError(f"there is no field of these edges at q0 s = {prescribed:.9g}")
             if ended == NARROW:
-                rest = self.without_small(gaps)
+                rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
                 if len(gaps) == 1:
-                    length, _ = self.widths(gaps)
+                    length, _ = widths(gaps)
                     if length[0] < self.smallest and law.hold.give > 0:
                         raise FullContact
                     # at fixed separation the last gap never closes, however narrow it gets
@@ -463,61 +449,9 @@ class EdgeMechanics:
         """
         residual, _ = imbalance(self.field(gaps, prescribed).solution, self.law, self.source.panels)
         e = int(np.argmax(np.abs(residual)))
-        length, patch = self.widths(gaps)
+        length, patch = widths(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
         step[e] = min(0.5 * times * self.law.longest, 0.25 * length[e // 2], 0.25 * beside)
         onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
         return onwards
-
-    def without_small(self, gaps: Array) -> Array | None:
-        """Gaps without closed gaps or vanished patches, or None if there are none."""
-        length, patch = self.widths(gaps)
-        if length.min() < self.smallest and len(gaps) > 1:
-            keep = length >= self.smallest
-            keep[int(np.argmax(length))] = True  # the last gap never closes
-            return without_gaps(gaps, keep)
-        if patch.min() < self.smallest:
-            return without_patches(gaps, patch >= self.smallest)
-        return None
-
-
-def outward(gaps: Array) -> Array:
-    """+1 at left gap ends, where contact grows to the right, -1 at right ones, shape (2L,)."""
-    sign = np.ones(2 * len(gaps))
-    sign[1::2] = -1.0
-    return sign
-
-
-def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:
-    """Drop the closed gaps: their patches merge."""
-    return gaps[keep]
-
-
-def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
-    """Drop patches, ``keep`` telling of the patch to the right of each gap: their gaps join."""
-    if not keep.any():
-        return np.empty((0, 2))
-    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
-    lefts = gaps[np.roll(keep, 1), 0]
-    rights = gaps[keep, 1]
-    first = lefts[0]
-    rights = np.sort(np.where(rights <= first, rights + 2 * np.pi, rights))
-    return np.stack([lefts, rights], axis=1)
-
-
-def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
-    """Put patches of the given widths into gaps (no gaps at all: into the open surface)."""
-    if len(gaps) == 0:
-        order = np.argsort(centres)
-        left, right = (centres + widths / 2)[order], (centres - widths / 2)[order]
-        return np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1)
-    cuts = []
-    for left, right in gaps:
-        marks = [left]
-        for centre, width in sorted(zip(centres, widths, strict=True)):
-            if left < centre < right:
-                marks += [centre - width / 2, centre + width / 2]
-        marks.append(right)
-        cuts += [marks[i : i + 2] for i in range(0, len(marks), 2)]
-    return np.array(cuts)

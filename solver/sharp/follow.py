@@ -11,6 +11,7 @@ from solver.method import ContactState
 from solver.sharp.clearance import NOT_SEEN
 from solver.sharp.course import Course
 from solver.sharp.edges import CORRECTED, Before, EdgeMechanics, Point
+from solver.sharp.gaps import without_small
 from solver.sharp.jump import Jumps
 from solver.sharp.local import Astray, LocalPoint, advance, confirmed
 from solver.sharp.states import Memory, States, Trace
@@ -181,7 +182,7 @@ class Follower:
                     error = self._trapezoid_error(shown, reached)
                     closed = self._closed(point, reached, target.branch)
                     there = reached.at == target.at
-                    small = self.edges.without_small(reached.gaps)
+                    small = without_small(reached.gaps, self.edges.smallest)
                     looks = walk.closed + closed >= walk.clearance or small is not None
                     coarse = error > 4 and abs(step) > finest
                     if not coarse and (error > 1 or there or looks):

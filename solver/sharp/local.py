@@ -16,9 +16,10 @@ import numpy as np
 
 from solver.profile import Array
 from solver.sharp.course import Course
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, outward
+from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.equilibrium import equilibrium
 from solver.sharp.field import RULES, GapField, Solution
+from solver.sharp.gaps import outward
 from solver.sharp.nearby import Window
 
 _HALF_WIDTH = 3  # gaps of a window on each side of the edge that leads

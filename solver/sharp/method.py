@@ -62,7 +62,7 @@ class SharpReport(MethodReport):
     jump_resolution : float
         Separation to which a jump is located, over h_max.
     fields, derivatives, energies, openings, newton_steps, descent_steps : int
-        See :class:`~solver.sharp.edges.Counters`.
+        See :class:`~solver.sharp.counters.Counters`.
     """
 
     accuracy: float

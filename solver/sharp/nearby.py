@@ -9,20 +9,18 @@ vanishing patches inside it. Where it comes to rest all gaps are solved once mor
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.profile import Array
 from solver.sharp.balance import Law
+from solver.sharp.counters import Counters
 from solver.sharp.descent import LOST, NARROW, descend, limits
 from solver.sharp.field import RULES
+from solver.sharp.gaps import without_small
 from solver.sharp.source import Panels
 from solver.sharp.window import About, following, open_window
-
-if TYPE_CHECKING:
-    from solver.sharp.edges import EdgeMechanics
 
 _BESIDE = 4  # gaps of a window on each side of what has changed
 _WIDEST = 24  # changes further apart are not those of one window
@@ -137,11 +135,21 @@ class Start:
         return self._windows[place_of]
 
     def descend(
-        self, edges: EdgeMechanics, gaps: Array, at: float, *, equal_speeds: bool
+        self,
+        gaps: Array,
+        at: float,
+        law: Law,
+        panels: Panels,
+        count: Counters,
+        smallest: float,
+        *,
+        equal_speeds: bool,
     ) -> Rest | None:
-        """Descend at d = ``at`` in a window from ``gaps``; None if there is none, or no field."""
-        law = edges.law
-        window = self.window(gaps, law, edges.source.panels)
+        """Descend at d = ``at`` in a window from ``gaps``; None if there is none, or no field.
+
+        Gaps and patches shorter than ``smallest`` are left out on the way; the work is counted.
+        """
+        window = self.window(gaps, law, panels)
         if window is None or not window.sound:
             return None
         local, kinds = window.rows(gaps), window.kinds
@@ -152,10 +160,10 @@ class Start:
                 local, at, _STEPS, kinds, equal_speeds, law, RULES, window.panels,
                 np.empty((0, local.size)), False,
             )  # fmt: skip
-            edges.count.fields += fields
-            edges.count.descent_steps += fields
-            edges.count.derivatives += tangents
-            rest = edges.without_small(local) if ended == NARROW else None
+            count.fields += fields
+            count.descent_steps += fields
+            count.derivatives += tangents
+            rest = without_small(local, smallest) if ended == NARROW else None
             if rest is None or len(rest) < 3 or (rest[-1] != local[-1]).any():
                 break
             local = rest

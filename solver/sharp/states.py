@@ -11,7 +11,8 @@ from solver.method import ContactState
 from solver.problem import Problem
 from solver.profile import Array
 from solver.sharp.clearance import NOT_SEEN, Seen
-from solver.sharp.edges import Counters, Point
+from solver.sharp.counters import Counters
+from solver.sharp.edges import Point
 from solver.sharp.field import GapField, Hold
 from solver.sharp.opening import work_of_gaps
 from solver.sharp.source import StressSource

@@ -20,8 +20,9 @@ from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
 from solver.sharp.bottom import bottoms_of
 from solver.sharp.clearance import Clearances
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point, with_patches
+from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.field import RULES, GapField, Kinds
+from solver.sharp.gaps import with_patches
 
 _OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
 _MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
