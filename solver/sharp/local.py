@@ -10,6 +10,7 @@ way from the last confirmed point on is gone once more, with all gaps.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -47,7 +48,9 @@ class Stretch:
     """
 
     def __init__(self, edges: EdgeMechanics, start: Point) -> None:
-        self.edges, self.start = edges, start
+        # A copy that knows no stretch: points hold theirs, and a circle would not be let go.
+        self.edges, self.start = edges, copy(start)
+        self.start.__dict__.pop("stretch", None)
         count = len(start.gaps)
         rates = np.abs(start.rate)
         folds = self._folds

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import pytest
 
@@ -309,3 +311,18 @@ def test_a_descent_begun_in_a_window_ends_where_one_of_all_gaps_does(in_windows)
             ends.append(found.gaps)
         assert ends[0].shape == ends[1].shape
         assert np.abs(ends[0] - ends[1]).max() < 0.01 * edges.wave
+
+
+def test_windows_are_let_go_without_a_search_for_circles(profile):
+    """What windows hold of many gaps is large: it goes with the points that need it."""
+    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 3e-3))
+    method.edges.many = 6
+    gc.collect()
+    gc.disable()
+    try:
+        loop = run_loop(method, max_penetration=0.5, load_steps=4)
+        alive = sum(isinstance(thing, Window) for thing in gc.get_objects())
+    finally:
+        gc.enable()
+    assert loop.patches.max() > 6
+    assert alive <= 2
