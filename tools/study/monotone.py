@@ -15,13 +15,14 @@ from tools.study.data import Array, Study, aligned
 LEVEL = 0.05
 # The campaigns that were decided on first, and those of two hundred realisations beside them.
 FIRST = ("turns", "slope", "between", "weak")
-HUNDREDS = ("cells", "cells001")
+HUNDREDS = ("cells", "wide", "cells001")
+QUANTITIES = ("loss_dimensionless", "loss")
 # (γ, turning point, quantity)
 ROWS = (
-    *((0.04, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
-    *((0.07, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
-    *((0.025, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
-    *((0.01, turn, name) for turn in (0.6, 0.8) for name in ("loss_dimensionless", "loss")),
+    *((0.04, turn, name) for turn in (0.6, 0.8) for name in QUANTITIES),
+    *((0.07, turn, name) for turn in (0.6, 0.8) for name in QUANTITIES),
+    *((0.025, turn, name) for turn in (0.6, 0.8) for name in QUANTITIES),
+    *((0.01, turn, name) for turn in (0.6, 0.8) for name in QUANTITIES),
 )
 
 
@@ -83,14 +84,10 @@ def series(
     campaigns: Sequence[str] = (*FIRST, *HUNDREDS),
 ) -> dict[float, dict[int, float]]:
     """A column by H, each by realisation."""
-    found: dict[float, dict[int, float]] = {}
-    for campaign in campaigns:
-        rows = study.loops.where(campaign=campaign, work_of_adhesion=gamma, max_penetration=turn)
-        for hurst in rows.values("hurst"):
-            one = rows.where(hurst=hurst)
-            more = zip(one["realisation"].astype(int).tolist(), one[name].tolist(), strict=True)
-            found[hurst] = {**dict(more), **found.get(hurst, {})}
-    return found
+    place = {"work_of_adhesion": gamma, "max_penetration": turn}
+    hursts = study.loops.where(**place).values("hurst")
+    found = {hurst: study.joined(name, campaigns, hurst=hurst, **place) for hurst in hursts}
+    return {hurst: losses for hurst, losses in found.items() if losses}
 
 
 def rows(study: Study) -> Iterator[Row]:
@@ -100,12 +97,25 @@ def rows(study: Study) -> Iterator[Row]:
         many = series(study, gamma, turn, name, HUNDREDS)
         slopes = series(study, gamma, turn, "m2")
         if len(first) > 1 and not set(first) <= set(many):
-            yield _row(gamma, turn, name, first, slopes)
+            yield row_of(gamma, turn, name, first, slopes)
         if len(many) > 1:
-            yield _row(gamma, turn, name, many, slopes)
+            yield row_of(gamma, turn, name, many, slopes)
 
 
-def _row(
+AROUND = (0.9, 0.7, 0.5)  # H on both sides of where the sign of the change turns
+NEW = ("fresh",)  # other phases than those that suggested it
+
+
+def around(study: Study, name: str, campaigns: Sequence[str]) -> Row | None:
+    """Two long steps at γ = 0.04 and Δ~max = 0.6; None if they were not computed."""
+    losses = series(study, 0.04, 0.6, name, campaigns)
+    if not set(AROUND) <= set(losses):
+        return None
+    slopes = series(study, 0.04, 0.6, "m2", campaigns)
+    return row_of(0.04, 0.6, name, {hurst: losses[hurst] for hurst in AROUND}, slopes)
+
+
+def row_of(
     gamma: float,
     turn: float,
     name: str,

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from tools.study.data import Study
 from tools.study.findings import findings
-from tools.study.tables import TABLES, Table, all_readings
+from tools.study.table1 import all_readings
+from tools.study.tables import TABLES
+from tools.study.text import Table
 
 ALL = {"findings": findings, **TABLES}
 

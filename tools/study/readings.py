@@ -21,6 +21,8 @@ LEAST = 1e-3  # eigenvalue of a correlation matrix from cells of different reali
 BEYOND = 1.5  # works of adhesion are extrapolated by no larger factor
 COMPATIBLE, EXCLUDED = 0.05, 0.001
 AT_100 = {0.01: ("weak", "cells001"), 0.025: ("between",)}
+AT_200 = ("waves", "waves001")
+RAYLEIGH = ("rayleigh", "rayleigh001")
 Cell = tuple[float, float]
 Series = dict[int, float]
 
@@ -121,7 +123,7 @@ class Losses:
     def direct(self, name: str, hurst: float, gamma: float, turn: float, ratio: int) -> Series:
         """A column at what was computed; empty if nothing was."""
         return self._study.joined(
-            *(name, ("waves",) if ratio == 200 else AT_100.get(gamma, ("turns", "cells"))),
+            *(name, AT_200 if ratio == 200 else AT_100.get(gamma, ("turns", "cells"))),
             hurst=hurst,
             work_of_adhesion=gamma,
             max_penetration=turn,
@@ -134,7 +136,7 @@ class Losses:
 
         A profile c times as high has at γ the W~ of the profile at γ/c².
         """
-        known = [0.04, 0.07] if ratio == 200 else [0.01, 0.025, 0.04, 0.07]
+        known = (0.01, 0.025, 0.04, 0.07)
         series = {g: self.direct(name, hurst, g, turn, ratio) for g in known}
         series = {g: one for g, one in series.items() if one}
         wanted = gamma / square
@@ -227,8 +229,6 @@ def readings(study: Study) -> Iterator[Reading]:
                         column: str = column,
                         heights: str = heights,
                     ) -> Series:
-                        if ratio == 200 and gamma == 0.01:
-                            return {}
                         factor = _height_factor(study, heights, hurst, ratio)
                         if normalisation == "h_rms" and not (turn == 0.65 and gamma != 0.01):
                             found = losses.direct(column, hurst, gamma, turn, ratio)
@@ -302,9 +302,10 @@ def _others(study: Study) -> Iterator[Reading]:
     for turn in TURNS:
 
         def rayleigh(hurst: float, gamma: float, turn: float = turn) -> Series:
-            return study.by_realisation(
-                "loss_dimensionless",
-                **{"campaign": "rayleigh", "hurst": hurst, "work_of_adhesion": gamma},
+            return study.joined(
+                *("loss_dimensionless", RAYLEIGH),
+                hurst=hurst,
+                work_of_adhesion=gamma,
                 max_penetration=turn,
             )
 

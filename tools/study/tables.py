@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from ensemble.interval import interval
-from ensemble.report.paper import TABLE_1
 from tools.study import jumps, monotone
-from tools.study.data import Array, Study, aligned
-from tools.study.readings import Reading, readings
-
-Table = tuple[list[str], list[list[str]]]
-
-
-def _mean(values: Array, unit: float = 1.0) -> str:
-    """Mean and half of its 95 % interval."""
-    values = np.asarray(values) / unit
-    low, high = (float(end) for end in interval(values))
-    half = f" ± {(high - low) / 2:.2g}" if values.size > 1 else ""
-    return f"{values.mean():.3g}{half}"
-
-
-def _ratio(above: Array, below: Array) -> str:
-    """Ratio of two means of paired values, with Fieller's spirit: relative differences."""
-    scale = below.mean()
-    low, high = (float(end) for end in interval((above - below) / scale))
-    return f"{100 * (above.mean() / scale - 1):+.0f} % ({100 * low:+.0f} … {100 * high:+.0f})"
+from tools.study.data import Study, aligned
+from tools.study.table1 import cells, main_readings, stress, tens, under_load, without
+from tools.study.text import Table, mean_text, ratio_text
 
 
 def campaigns(study: Study) -> Table:
@@ -59,74 +42,25 @@ def campaigns(study: Study) -> Table:
     return header, rows
 
 
-def _reading_row(reading: Reading) -> list[str]:
-    means = dict(zip(reading.cells, reading.means, strict=True))
-    told = [f"{means[cell]:.3g}" if cell in means else "" for cell in TABLE_1]
-    p = "< 1e-5" if reading.p < 1e-5 else f"{reading.p:.2g}"
-    hurst, gamma = reading.worst
-    return [
-        *(reading.name, f"{reading.realisations}", *told),
-        *(f"{np.abs(reading.z).max():.1f} at {hurst:g}, {gamma:g}", p),
-        *(f"{reading.log_likelihood:.0f}", reading.verdict),
-    ]
-
-
-READING_HEADER = [
-    *("reading", "n", *(f"{h:g}, {g:g}" for h, g in TABLE_1)),
-    *("largest \\|z\\|", "p", "ln L", "verdict"),
-]
-
-
-@cache
-def every_reading(study: Study) -> tuple[Reading, ...]:
-    """All readings, worked out once."""
-    return tuple(readings(study))
-
-
-def all_readings(study: Study) -> Table:
-    """Every reading."""
-    rows = [_reading_row(reading) for reading in every_reading(study)]
-    paper = ["paper", "10", *(f"{value:g}" for value in TABLE_1.values()), "", "", "", ""]
-    return READING_HEADER, [paper, *rows]
-
-
-def main_readings(study: Study) -> Table:
-    """Those of the whole loop with own h_max."""
-    header, rows = all_readings(study)
-    return header, [row for row in rows if "≥" not in row[0] and " h_max" not in row[0]]
-
-
-STRONG = tuple(cell for cell in TABLE_1 if cell[1] >= 0.04)
-
-
-def without(study: Study) -> Table:
-    """Compatible readings when values of the paper are left out (seen afterwards)."""
-    every = [r for r in every_reading(study) if set(STRONG) <= set(r.cells)]
-    left_out: list[tuple[tuple[float, float], ...]] = [(), *((cell,) for cell in STRONG)]
-    left_out.append(((0.8, 0.07), (0.7, 0.07)))
-    rows = []
-    for cells in left_out:
-        kept = tuple(cell for cell in STRONG if cell not in cells)
-        cut = [Reading(r.name, kept, r.losses[[r.cells.index(c) for c in kept]]) for r in every]
-        best = max(cut, key=lambda r: (r.p, -np.abs(r.z).max()))
-        count = sum(r.verdict == "compatible" for r in cut)
-        rows.append(
-            [
-                " and ".join(f"{TABLE_1[c]:g} (H = {c[0]:g}, γ = {c[1]:g})" for c in cells)
-                or "none of them",
-                f"{count} of {len(cut)}",
-                best.name,
-                "< 1e-5" if best.p < 1e-5 else f"{best.p:.2g}",
-                f"{np.abs(best.z).max():.1f}",
-            ]
-        )
-    return ["left out", "compatible", "best", "its p", "its largest \\|z\\|"], rows
-
-
 def monotony(study: Study) -> Table:
     """Paired differences between neighbouring H."""
+    return _told(monotone.rows(study))
+
+
+def around(study: Study) -> Table:
+    """Long steps on both sides of H = 0.7: seen afterwards, and tested on new phases."""
+    both = (("those that suggested it", monotone.HUNDREDS), ("new ones", monotone.NEW))
+    header, rows = [], []
+    for profiles, campaigns in both:
+        found = [monotone.around(study, name, campaigns) for name in monotone.QUANTITIES]
+        header, told = _told([row for row in found if row is not None])
+        rows += [[profiles, *row[2:]] for row in told]
+    return ["profiles", *header[2:]], rows
+
+
+def _told(found: Iterable[monotone.Row]) -> Table:
     rows = []
-    for row in monotone.rows(study):
+    for row in found:
         steps = [
             f"{step.hursts[0]:g} → {step.hursts[1]:g}: {100 * step.difference:+.0f} % "
             f"({100 * step.low:+.0f} … {100 * step.high:+.0f})"
@@ -164,63 +98,12 @@ def mechanisms(study: Study) -> Table:
                     f"{hurst:g}",
                     f"{next(iter(slopes[hurst].values())):.3g}",
                     f"{len(losses[hurst])}",
-                    _mean(np.array(list(losses[hurst].values()))),
-                    _mean(np.array(list(whole[hurst].values())), 1e-3),
-                    _mean(share[0] / share[1], 0.01),
+                    mean_text(np.array(list(losses[hurst].values()))),
+                    mean_text(np.array(list(whole[hurst].values())), 1e-3),
+                    mean_text(share[0] / share[1], 0.01),
                 ]
             )
     return ["γ (J/m²)", "H", "m2", "n", "W~", "loss (mJ/m²)", "small scale (%)"], rows
-
-
-def _cells(study: Study) -> list[tuple[str, float, float]]:
-    return [
-        *(("turns", h, g) for g in (0.04, 0.07) for h in (0.7, 0.8, 0.9)),
-        *(("weak", h, 0.01) for h in (0.8, 0.9)),
-    ]
-
-
-def stress(study: Study) -> Table:
-    """Mean stress at the turning point, which is no coordinate of the loading branch."""
-    rows = []
-    for campaign, hurst, gamma in _cells(study):
-        place = {"campaign": campaign, "hurst": hurst, "work_of_adhesion": gamma}
-        found = {
-            turn: study.by_realisation("stress_at_turn", max_penetration=turn, **place)
-            for turn in (0.6, 0.8, 0.9)
-        }
-        if not all(found.values()):
-            continue
-        both = aligned(*found.values())
-        lower = int(np.sum(both[2] < both[0]))
-        rows.append(
-            [
-                *(f"{gamma:g}", f"{hurst:g}"),
-                *(_mean(values, 1e3) for values in both),
-                f"{lower} of {both.shape[1]}",
-            ]
-        )
-    header = ["γ (J/m²)", "H", *(f"p̄ at {turn} (kPa)" for turn in (0.6, 0.8, 0.9))]
-    return [*header, "lower at 0.9 than at 0.6"], rows
-
-
-def under_load(study: Study) -> Table:
-    """Loops under a load of 500 Pa."""
-    rows = []
-    for gamma in (0.01, 0.04, 0.07):
-        for hurst in (0.7, 0.8, 0.9):
-            place = {"campaign": "load", "hurst": hurst, "work_of_adhesion": gamma}
-            done, failed = study.loops.where(**place), study.failed.where(**place)
-            if len(done) + len(failed) == 0:
-                continue
-            mean = _mean(done["loss_dimensionless"]) if len(done) > 1 else ""
-            contact = f"{done['largest_contact_fraction'].mean():.2f}" if len(done) else ""
-            paper = TABLE_1.get((hurst, gamma))
-            told = "–" if paper is None else f"{paper:g}"
-            rows.append(
-                [f"{gamma:g}", f"{hurst:g}", f"{len(done)}", f"{len(failed)}", mean, contact, told]
-            )
-    header = ["γ (J/m²)", "H", "loops", "into full contact", "W~", "largest A/A0", "paper"]
-    return header, rows
 
 
 def turning_point(study: Study) -> Table:
@@ -249,14 +132,14 @@ def turning_point(study: Study) -> Table:
         ("loss per contact", per_contact),
     )
     rows = []
-    for campaign, hurst, gamma in _cells(study):
+    for campaign, hurst, gamma in cells(study):
         told = []
         for _, of in quantities:
             below, above = of(campaign, hurst, gamma, 0.6), of(campaign, hurst, gamma, 0.9)
             if not below or not above:
                 break
             low, high = aligned(below, above)
-            told.append(_ratio(high, low))
+            told.append(ratio_text(high, low))
         else:
             rows.append([f"{gamma:g}", f"{hurst:g}", f"{low.size}", *told])
     return ["γ (J/m²)", "H", "n", *(name for name, _ in quantities)], rows
@@ -336,13 +219,15 @@ def kinds(study: Study) -> Table:
     return header, rows
 
 
-CUTOFFS = (3, 10, 30, 100)
+CUTOFFS = (3, 10, 30, 100, 300)
 
 
 def cutoff_place(hurst: float, ratio: int) -> dict[str, Any]:
     """Where the loops of a cut-off are: at H = 0.8 and 100 among those of `turns`."""
     if ratio < 100:
         return {"campaign": "cutoff", "hurst": hurst, "ratio": ratio}
+    if ratio > 100:
+        return {"campaign": "cutoff300", "hurst": hurst}
     if hurst < 0.5:
         return {"campaign": "cutoff100", "hurst": hurst}
     return {
@@ -367,16 +252,16 @@ def cutoff(study: Study) -> Table:
                             study.by_realisation("loss", **place))  # fmt: skip
             change = ""
             if before and len(shared := aligned(before, loss)[0]) > 1:
-                change = _ratio(*aligned(before, loss)[::-1])
+                change = ratio_text(*aligned(before, loss)[::-1])
                 assert shared.size
             slope = next(iter(study.by_realisation("m2", **place).values()))
             pull = np.array(list(study.by_realisation("pull_off_stress", **place).values()))
             rows.append(
                 [
                     *(f"{hurst:g}", f"{ratio}", f"{slope:.2g}", f"{len(loss)}"),
-                    _mean(np.array(list(loss.values()))),
+                    mean_text(np.array(list(loss.values()))),
                     change,
-                    _mean(pull, 1e3),
+                    mean_text(pull, 1e3),
                     f"{100 * (share[0] / share[1]).mean():.1f}",
                 ]
             )
@@ -403,12 +288,17 @@ def machine(study: Study) -> Table:
                 rows.append([f"{turn:g}", f"{stiffness:.0e}", "0", f"{failed}", "", ""])
                 continue
             both = aligned(fixed, loss)
-            change = "" if np.isinf(stiffness) else _ratio(both[1], both[0])
+            change = "" if np.isinf(stiffness) else ratio_text(both[1], both[0])
             rows.append(
                 [
                     f"{turn:g}",
                     "fixed" if np.isinf(stiffness) else f"{stiffness:.0e}",
-                    *(f"{len(loss)}", f"{failed}", _mean(np.array(list(loss.values()))), change),
+                    *(
+                        f"{len(loss)}",
+                        f"{failed}",
+                        mean_text(np.array(list(loss.values()))),
+                        change,
+                    ),
                 ]
             )
     return ["u_tot/h_max", "k (Pa/m)", "n", "ran away", "W~", "against fixed separation"], rows
@@ -451,9 +341,11 @@ TABLES: dict[str, Callable[[Study], Table]] = {
     "campaigns": campaigns,
     "readings": main_readings,
     "without": without,
+    "tens": tens,
     "stress": stress,
     "load": under_load,
     "monotony": monotony,
+    "around": around,
     "mechanisms": mechanisms,
     "turning_point": turning_point,
     "power_laws": power_laws,
