@@ -745,49 +745,45 @@ def _own_gap(
 
 
 @compiled_sums
+def _row_of_others(
+    i: int, first: int, behind: int, sine: Array, cosine: Array, weight: Array, row: Array
+) -> None:
+    """Into its ``row``: node i of a gap from node ``first`` to ``behind``, and those of others."""
+    scale = -weight[i] / (4 * np.pi)
+    si = sine[i]
+    ci = cosine[i]
+    for j in range(first):
+        half = si * cosine[j] - ci * sine[j]
+        row[j] = scale * weight[j] / (half * half)
+    for j in range(behind, row.shape[0]):
+        half = si * cosine[j] - ci * sine[j]
+        row[j] = scale * weight[j] / (half * half)
+
+
+@compiled
 def _between_gaps(theta: Array, weight: Array, offset: Kinds, matrix: Array) -> None:
     """Blocks of different gaps."""
-    n = theta.shape[0]
     sine = np.sin(0.5 * theta)
     cosine = np.cos(0.5 * theta)
     for k in range(offset.shape[0] - 1):
         for i in range(offset[k], offset[k + 1]):
-            scale = -weight[i] / (4 * np.pi)
-            si = sine[i]
-            ci = cosine[i]
-            row = matrix[i]
-            for j in range(offset[k]):
-                half = si * cosine[j] - ci * sine[j]
-                row[j] = scale * weight[j] / (half * half)
-            for j in range(offset[k + 1], n):
-                half = si * cosine[j] - ci * sine[j]
-                row[j] = scale * weight[j] / (half * half)
+            _row_of_others(i, offset[k], offset[k + 1], sine, cosine, weight, matrix[i])
 
 
-@compiled_sums
+@compiled
 def _between_gaps_again(
     theta: Array, weight: Array, offset: Kinds, changed: Kinds, matrix: Array
 ) -> None:
     """Blocks between the gaps that have ``changed`` and all others."""
-    n = theta.shape[0]
     sine = np.sin(0.5 * theta)
     cosine = np.cos(0.5 * theta)
     for k in changed:
         for i in range(offset[k], offset[k + 1]):
-            scale = -weight[i] / (4 * np.pi)
-            si = sine[i]
-            ci = cosine[i]
-            row = matrix[i]
+            _row_of_others(i, offset[k], offset[k + 1], sine, cosine, weight, matrix[i])
             for j in range(offset[k]):
-                half = si * cosine[j] - ci * sine[j]
-                row[j] = scale * weight[j] / (half * half)
-            for j in range(offset[k + 1], n):
-                half = si * cosine[j] - ci * sine[j]
-                row[j] = scale * weight[j] / (half * half)
-            for j in range(offset[k]):
-                matrix[j, i] = row[j]
-            for j in range(offset[k + 1], n):
-                matrix[j, i] = row[j]
+                matrix[j, i] = matrix[i, j]
+            for j in range(offset[k + 1], matrix.shape[0]):
+                matrix[j, i] = matrix[i, j]
 
 
 @compiled
