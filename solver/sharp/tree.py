@@ -247,32 +247,6 @@ def _lift(row: Array, theta: Array, stretch: Array, rank: int, out: Array) -> No
 
 
 @compiled_sums
-def _multiply(a: Array, b: Array, out: Array) -> None:
-    """Into ``out``: a b."""
-    for i in range(a.shape[0]):
-        row = out[i]
-        row[:] = 0.0
-        for k in range(a.shape[1]):
-            value = a[i, k]
-            other = b[k]
-            for j in range(b.shape[1]):
-                row[j] += value * other[j]
-
-
-@compiled_sums
-def _multiply_transposed(a: Array, b: Array, out: Array) -> None:
-    """Into ``out``: aᵀ b."""
-    out[:] = 0.0
-    for k in range(a.shape[0]):
-        other = b[k]
-        for i in range(a.shape[1]):
-            value = a[k, i]
-            row = out[i]
-            for j in range(b.shape[1]):
-                row[j] += value * other[j]
-
-
-@compiled_sums
 def eliminate(a: Array, x: Array) -> bool:
     """Solve a y = x for the columns of x, both overwritten; whether det a is negative."""
     n = a.shape[0]
@@ -336,12 +310,9 @@ def respond(tree: Tree, gaps_own: Array, gaps_negative: Integers) -> Response:
         kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]].reshape(n, m)
         w = pair[tree.inner[run] : tree.inner[run + 1]].reshape(n, n)
         # W = (R1⁻¹ - H)⁻¹ = (1 - R1 H)⁻¹ R1, H = K12 R2 K21
-        half = np.empty((n, m))
-        _multiply(kernel, second, half)
-        felt_back = np.empty((n, n))
-        _multiply(half, np.ascontiguousarray(kernel.T), felt_back)
-        matrix = np.empty((n, n))
-        _multiply(first, felt_back, matrix)
+        half = np.dot(kernel, second)
+        felt_back = np.dot(half, kernel.T)
+        matrix = np.dot(first, felt_back)
         for i in range(n):
             for j in range(n):
                 w[i, j] = first[i, j]
@@ -357,22 +328,18 @@ def respond(tree: Tree, gaps_own: Array, gaps_negative: Integers) -> Response:
         lifted = tree.lifted[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
         charges = felt[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
         # q1 = W (E1 + K12 R2 E2), q2 = R2 (E2 + K21 q1)
-        by_second = np.empty((m, r))
-        _multiply(second, lifted[n:], by_second)
-        drive = np.empty((n, r))
-        _multiply(kernel, by_second, drive)
+        drive = np.dot(half, lifted[n:])
         for i in range(n):
             for j in range(r):
                 drive[i, j] += lifted[i, j]
-        _multiply(w, drive, charges[:n])
-        more = np.empty((m, r))
-        _multiply_transposed(kernel, charges[:n], more)
-        _multiply(second, more, charges[n:])
+        np.dot(w, drive, charges[:n])
+        more = np.dot(kernel.T, charges[:n])
         for i in range(m):
             for j in range(r):
-                charges[n + i, j] += by_second[i, j]
+                more[i, j] += lifted[n + i, j]
+        np.dot(second, more, charges[n:])
         response = own[tree.square[run] : tree.square[run + 1]].reshape(r, r)
-        _multiply_transposed(lifted, charges, response)
+        np.dot(lifted.T, charges, response)
         for i in range(r):
             for j in range(i):
                 mean = 0.5 * (response[i, j] + response[j, i])
