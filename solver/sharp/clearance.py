@@ -22,6 +22,7 @@ from solver.sharp.field import RULES, GapField, Kinds, Rules
 _NEAR = 0.3  # edges that moved by less than this, in λ_min, leave a gap comparable
 _SAFETY = 1.5  # on what the nodes tell
 _LEFT = 0.3  # share of a clearance that must surely be left
+_INSIDE = 0.12  # in λ_min: nearer to its ends no minimum appears in a gap that has none
 
 
 class Seen(NamedTuple):
@@ -35,6 +36,7 @@ class Seen(NamedTuple):
     theta, opening : array, shape (nodes,)
         Nodes, and the opening of the lower modes there.
     clearance : array, shape (L,)
+        Infinite where there is no minimum.
     """
 
     gaps: Array
@@ -99,6 +101,22 @@ def _low_opening(f: float, kind: int, node: int, rules: Rules) -> float:
 
 
 @compiled
+def _to_any_minimum(seen: Seen, gap: int, nodes: int, inside: float) -> float:
+    """How far a gap without a minimum has to close before it can touch in one that appears.
+
+    That is its opening at the nodes further than ``inside`` from its ends; of a shorter gap the
+    largest opening.
+    """
+    least = np.inf
+    most = 0.0
+    for i in range(seen.offset[gap], seen.offset[gap] + nodes):
+        most = max(most, seen.opening[i])
+        if min(seen.theta[i] - seen.gaps[gap, 0], seen.gaps[gap, 1] - seen.theta[i]) > inside:
+            least = min(least, seen.opening[i])
+    return min(least, most)
+
+
+@compiled
 def clearance_left(
     gaps: Array,
     kinds: Kinds,
@@ -145,9 +163,12 @@ def clearance_left(
         if not comparable:
             continue
         grown = max(begin, 0.0) + max(-end, 0.0)
-        rest = seen.clearance[j] - _SAFETY * closed - beside * grown
-        if rest > _LEFT * seen.clearance[j]:
-            left[k] = rest
+        clearance = seen.clearance[j]
+        if clearance == np.inf:
+            clearance = _to_any_minimum(seen, j, m, _INSIDE / _NEAR * near)
+        rest = clearance - _SAFETY * closed - beside * grown
+        if rest > _LEFT * clearance:
+            left[k] = rest if seen.clearance[j] < np.inf else np.inf
             place[k] = j
     return left, place
 
