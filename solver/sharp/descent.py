@@ -73,7 +73,7 @@ def descend(
     panels: Panels,
     track: Array,
     astray: bool,
-) -> tuple[Array, int, int, int, Kinds, Array, bool]:
+) -> tuple[Array, int, int, int, Kinds, Array, bool, Array]:
     """Descend in energy, d being ``prescribed``, for at most ``most`` steps.
 
     Edges move in proportion to their excess energy release rates, by no more than the longest step
@@ -89,10 +89,11 @@ def descend(
 
     Returns
     -------
-    gaps, how it ended, fields, tangents, kinds, passed, astray
+    gaps, how it ended, fields, tangents, kinds, passed, astray, taken
         RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
         length, UNFINISHED after the last step, LOST where the edges have no field, MET where they
-        are on the track again. ``passed`` is the way of this descent, as ``track``.
+        are on the track again. ``passed`` is the way of this descent, as ``track``; ``taken`` the
+        force that the outward motion of each edge (columns) took from every edge (rows).
     """
     edges = 2 * gaps.shape[0]
     fields = 0
@@ -110,13 +111,14 @@ def descend(
     stride = 0.0
     checked = np.empty(0, dtype=np.int64)  # edges that ran far in the last step
     departed = np.empty(0)  # how their forces changed at its start
-    rows = np.empty((edges, edges))  # how forces change with the edges, of those edges
+    rows = np.zeros((edges, edges))  # how forces change with the edges, of those edges
     known = np.zeros(edges, dtype=np.int64)  # that are not zero here
     passed = np.empty((64, edges))
     passed[0] = gaps.ravel()
     count = 1
     looks = 0
     turned = 0
+    taken = np.zeros((edges, edges))
     while fields < most:
         fields += 1
         held = runners > 0 and reuses < (_REUSES_ALONE if runners == 1 else _REUSES)
@@ -127,7 +129,7 @@ def descend(
         else:
             of = solve_again(gaps, prescribed, law.hold, kinds, rules, panels, of)
         if not np.isfinite(of.pressure):
-            return gaps, LOST, fields, tangents, kinds, passed[:count], astray
+            return gaps, LOST, fields, tangents, kinds, passed[:count], astray, taken
         residual, drift = imbalance(of, law, panels)
         known[:] = 0
         # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²; where the
@@ -155,6 +157,7 @@ def descend(
             checked = np.empty(0, dtype=np.int64)
             if clear < 1:
                 gaps = moved_gaps(before, clear * last)
+                _take(rows, clear * last, taken)
                 passed[count - 1] = gaps.ravel()
                 stride = 0.0
                 runners = 0
@@ -169,6 +172,7 @@ def descend(
             continue
         if fall > 0:
             share = min(1.0, 2 * share)
+        _take(rows, last, taken)
         force = fresh
         pace = _SHORTENED ** max(turned - _TO_AND_FRO, 0)
         longest = share * max(pace, _LEAST_SHARE) * law.longest
@@ -184,7 +188,7 @@ def descend(
             astray = astray or off
             looks = looks + 1 if astray and not off else 0
             if looks == _LOOKS:
-                return gaps, MET, fields, tangents, kinds, passed[:count], astray
+                return gaps, MET, fields, tangents, kinds, passed[:count], astray, taken
         if held:
             reuses += 1
         else:
@@ -234,7 +238,7 @@ def descend(
                     step = way if onwards >= backwards * (1 - _TIE) else -way
             size = np.abs(step).max()
         if not size < np.inf:
-            return gaps, LOST, fields, tangents, kinds, passed[:count], astray
+            return gaps, LOST, fields, tangents, kinds, passed[:count], astray, taken
         runners = 0
         if size > 0.5 * longest:
             running = np.flatnonzero(np.abs(step) > max(_RUNS * size, 0.5 * longest))
@@ -259,10 +263,19 @@ def descend(
         passed[count] = gaps.ravel()
         count += 1
         if narrowest(gaps) < law.smallest:
-            return gaps, NARROW, fields, tangents, kinds, passed[:count], astray
+            _take(rows, last, taken)
+            return gaps, NARROW, fields, tangents, kinds, passed[:count], astray, taken
         if size < law.near:
-            return gaps, RESTING, fields, tangents, kinds, passed[:count], astray
-    return gaps, UNFINISHED, fields, tangents, kinds, passed[:count], astray
+            return gaps, RESTING, fields, tangents, kinds, passed[:count], astray, taken
+    return gaps, UNFINISHED, fields, tangents, kinds, passed[:count], astray, taken
+
+
+@compiled
+def _take(rows: Array, step: Array, taken: Array) -> None:
+    """Add the force that the motion of each edge takes from every edge; ``rows`` as above."""
+    for e in range(step.shape[0]):
+        for f in range(step.shape[0]):
+            taken[e, f] += 2 * rows[e, f] * step[f]
 
 
 @compiled

@@ -43,6 +43,21 @@ _CHANGED = 0.3  # share by which the rate of an edge may change in a jump that d
 _ALIKE = 0.01  # edges of two descents that come to rest so near to each other, in λ_min, have met
 
 
+class Stage(NamedTuple):
+    """Part of a descent with one set of gaps.
+
+    Attributes
+    ----------
+    way : array, shape (2L,)
+        Outward motion of every edge.
+    taken : array, shape (2L, 2L)
+        Force, as C², that the motion of each edge (columns) took from every edge (rows).
+    """
+
+    way: Array
+    taken: Array
+
+
 @dataclass
 class Track:
     """Edges that a descent went through, for another one to be compared with.
@@ -55,12 +70,18 @@ class Track:
         Whether the other descent has left the track, and come back to it.
     rest : array, optional
         Gaps of a window in which the descent first came to rest.
+    stages : list of Stage
+        What the edges did, one for every set of gaps on the way.
+    whole : bool
+        Whether the stages are known.
     """
 
     ways: list[Array] = field(default_factory=list)
     astray: bool = False
     met: bool = False
     rest: Array | None = None
+    stages: list[Stage] = field(default_factory=list)
+    whole: bool = True
 
     def of(self, edges: int) -> Array:
         """The track where there are so many edges."""
@@ -385,6 +406,7 @@ class EdgeMechanics:
         track = track or Track()
         other = track.of(gaps.size if equal_speeds else 0)
         if start is not None and len(gaps) >= self.many:
+            track.whole = False
             begun = self._begun(start, gaps, prescribed, reach, equal_speeds, track)
             if isinstance(begun, Point):
                 return begun
@@ -398,13 +420,17 @@ class EdgeMechanics:
         while left > 0:
             panels = self.source.panels
             if len(gaps) < self.many:
-                gaps, ended, fields, tangents, kinds, way, track.astray = descend(
+                begin = gaps
+                gaps, ended, fields, tangents, kinds, way, track.astray, taken = descend(
                     gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels, other,
                     track.astray,
                 )  # fmt: skip
                 if not equal_speeds:
                     track.ways.append(way)
+                    moved = outward(gaps) * (gaps - begin).ravel()
+                    track.stages.append(Stage(moved, taken))
             else:
+                track.whole = False
                 gaps, ended, fields, tangents, kinds = descend_many(
                     gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels
                 )

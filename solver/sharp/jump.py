@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.jumps import Branch
 from solver.method import ContactState, PathError
@@ -160,7 +161,7 @@ class Jumps:
         track = Track()
         start = self.edges.start(known)
         point = self._relax(gaps, at, track=track, start=start)
-        if not rivals and self._may_have_raced(gaps, point):
+        if not rivals and self._may_have_raced(gaps, point, track):
             try:
                 rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
             except FullContact as full:
@@ -189,28 +190,39 @@ class Jumps:
             gaps, start = found, None
         return None
 
-    def _may_have_raced(self, start: Array, end: Point | None) -> bool:
+    def _may_have_raced(self, start: Array, end: Point | None, track: Track) -> bool:
         """Whether the order in which edges ran from ``start`` can have decided where they ended.
 
         It can where they hold each other back: edges that only help each other on reach the same
-        minimum in any order. So the force is asked for that the runners took from each other, to
-        first order in their ways and with the tangent at the end. Where patches or gaps went, that
-        cannot be asked.
+        minimum in any order. So the force is asked for that the runners took from each other: to
+        first order in their ways and with the tangent at the end or, where patches or gaps went,
+        along the ``track``, for every set of gaps on it. Of many gaps that is not known.
         """
-        if end is None:
-            return len(start) > 1
+        if end is None and len(start) == 1:
+            return False
+        if end is None or end.field.gaps.shape != start.shape:
+            return not track.whole or any(
+                self._hold_back(stage.way, stage.taken) for stage in track.stages
+            )
         gaps = end.field.gaps
-        if gaps.shape != start.shape:
-            return True
-        side = outward(gaps)
-        way = side * (gaps - start).ravel()
-        runners = np.flatnonzero(np.abs(way) > _RAN * self.edges.wave)
+        way = outward(gaps) * (gaps - start).ravel()
+        runners = self._runners(way)
         if len(runners) < 2:
             return False
         opening = end.field.solution.opening[runners]
-        way = way[runners]
-        stiffness = opening[:, None] * self.edges.stiffness(end, runners)
-        taken = (stiffness + stiffness.T) * np.sign(way)[:, None] * way
+        stiffness = np.zeros((way.size, way.size))
+        stiffness[np.ix_(runners, runners)] = opening[:, None] * self.edges.stiffness(end, runners)
+        return self._hold_back(way, (stiffness + stiffness.T) * way)
+
+    def _runners(self, way: Array) -> NDArray[np.int64]:
+        return np.flatnonzero(np.abs(way) > _RAN * self.edges.wave)
+
+    def _hold_back(self, way: Array, taken: Array) -> bool:
+        """Whether the motion of runners (columns) took so much force from others (rows)."""
+        runners = self._runners(way)
+        if len(runners) < 2:
+            return False
+        taken = taken[np.ix_(runners, runners)] * np.sign(way[runners])[:, None]
         np.fill_diagonal(taken, 0.0)
         held_back = np.maximum(taken, 0.0).sum(axis=1)
         return bool(held_back.max() > _HELD_BACK * self.edges.critical**2)

@@ -156,7 +156,7 @@ class Start:
         while True:
             if len(local) != len(kinds):
                 kinds = np.zeros(len(local), dtype=np.int64)
-            local, ended, fields, tangents, kinds, _, _ = descend(
+            local, ended, fields, tangents, kinds, _, _, _ = descend(
                 local, at, _STEPS, kinds, equal_speeds, law, RULES, window.panels,
                 np.empty((0, local.size)), False,
             )  # fmt: skip

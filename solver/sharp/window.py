@@ -107,7 +107,7 @@ def descend_many(
         while ended == LOST:
             if not soft:  # with all edges outside held
                 window, outside, outer = open_window(about, first, width, 0.0, law, rules, panels)
-            moved, ended, some, more, moved_kinds, _, _ = descend(
+            moved, ended, some, more, moved_kinds, _, _, _ = descend(
                 window, prescribed, min(_STEPS, most - fields), window_kinds, equal_speeds, law,
                 rules, with_outside(panels, outside), np.empty((0, window.size)), False,
             )  # fmt: skip
