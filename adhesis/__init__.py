@@ -11,7 +11,8 @@ from ensemble.trace.prepare import prepare_trace
 from ensemble.trace.read import read_trace
 from solver.control import Control
 from solver.jumps import Jump
-from solver.loop import LoopResult, run_loop
+from solver.loop import run_loop
+from solver.loop_result import LoopResult
 from solver.material import HalfSpace
 from solver.method import ContactState, Fields, Method, Opening, Path
 from solver.path import MinorLoop, PathResult, run_path

@@ -15,7 +15,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from solver.loop import LoopResult, run_loop
+from solver.loop import run_loop
+from solver.loop_result import LoopResult
 from solver.material import HalfSpace
 from solver.problem import Problem
 from solver.profile import self_affine_profile

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.jumps import Branch, Jump
-from solver.loop import Progress, check_cycle, estimated_error
+from solver.loop import Progress, check_cycle
+from solver.loop_result import estimated_error
 from solver.method import ContactState, Method, MethodReport, PathError
 from solver.problem import Problem
 from solver.profile import Array

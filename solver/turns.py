@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from time import process_time
 
 from solver.jumps import Branch
-from solver.loop import LoopResult, Progress, check_cycle, result_of, turning_of, unload
+from solver.loop import Progress, check_cycle, turning_of, unload
+from solver.loop_result import LoopResult, result_of
 from solver.method import ContactState, Method, PathError
 from solver.record import Axis, Record
 

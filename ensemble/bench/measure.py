@@ -21,7 +21,8 @@ from typing import Literal
 from ensemble.bench.scenes import WARM_UP, Scene
 from ensemble.bench.tamaas import tamaas_loop
 from ensemble.run.launch import ONE_THREAD
-from solver.loop import LoopResult, run_loop
+from solver.loop import run_loop
+from solver.loop_result import LoopResult
 from solver.registry import MethodName, make_method
 from solver.warm import warm, watch_compilation
 

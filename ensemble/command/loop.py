@@ -37,7 +37,8 @@ from ensemble.trace.options import (
     what_was_read,
 )
 from ensemble.warm import warm_missing
-from solver.loop import LoopResult, Progress, run_loop
+from solver.loop import Progress, run_loop
+from solver.loop_result import LoopResult
 from solver.material import HalfSpace
 from solver.method import Branch, ContactState, Method, PathError
 from solver.path import PathResult, run_path

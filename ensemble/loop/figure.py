@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ensemble.report.figures.style import LINE_OF_BRANCH, LOOKS, MM, TWO_COLUMNS, new_figure, style
-from solver.loop import LoopResult
+from solver.loop_result import LoopResult
 from solver.path import PathResult
 
 

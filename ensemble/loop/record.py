@@ -19,7 +19,7 @@ import numpy as np
 
 from ensemble.errors import InputError
 from solver.jumps import Jump
-from solver.loop import LoopResult
+from solver.loop_result import LoopResult
 from solver.method import BRANCHES, Branch, ContactState, Fields, Method
 from solver.path import PathResult
 from solver.problem import Problem

@@ -16,7 +16,7 @@ from ensemble.campaign.tables import Campaign
 from ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
 from ensemble.task.fields import FIELD_DATASETS, field_plan, field_scales
 from solver.jumps import BRANCHES, JUMP_KINDS, Jump
-from solver.loop import LoopResult
+from solver.loop_result import LoopResult
 from solver.method import Branch
 from solver.profile import Array
 
@@ -246,8 +246,8 @@ def row_of(
         where their axis ends; of more jumps than the catalogue holds those with the largest drops
         are kept, in the order of the path.
     axes : mapping of arrays, optional
-        Penetrations (:meth:`solver.loop.LoopResult.at`) of the curves of each branch, where these
-        are not the loop's load steps.
+        Penetrations (:meth:`solver.loop_result.LoopResult.at`) of the curves of each branch, where
+        these are not the loop's load steps.
     """
     row: Row = {d.name: d.value(loop) for d in (*NUMBERS, JUMP_COUNT) if d.value is not None}
     for branch, curves in CURVES.items():

@@ -51,8 +51,9 @@ from solver.sharp.coordinate import (
     theta_at,
 )
 from solver.sharp.linear import cholesky, factor_rows, solve_column, solve_factored
+from solver.sharp.moments import gap_moments
 from solver.sharp.outside import Outside, add_outside, moving_load, reach
-from solver.sharp.source import Panels, StressSource, gap_moments
+from solver.sharp.source import Panels, StressSource
 
 # Below these arguments the own gap's kernels are taken as series.
 _PERIODIC_SERIES = 0.2

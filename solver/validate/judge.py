@@ -17,7 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.loop import LoopResult, run_loop
+from solver.loop import run_loop
+from solver.loop_result import LoopResult
 from solver.material import HalfSpace
 from solver.method import Method
 from solver.problem import Problem

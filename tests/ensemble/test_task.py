@@ -12,7 +12,8 @@ from ensemble.task.dataset import KEPT, row_shape, sizes_of
 from ensemble.task.doubt import doubtful
 from ensemble.task.row import RESULT_DATASETS, row_of, row_scales
 from solver.jumps import JUMP_KINDS, Jump
-from solver.loop import LoopResult, run_loop
+from solver.loop import run_loop
+from solver.loop_result import LoopResult
 from solver.method import MethodReport, PathError
 from solver.registry import make_method
 from tests.support.campaign_support import campaign_text

@@ -67,6 +67,7 @@ SOLVER_FOR_ENSEMBLE = {
     "solver.fields",
     "solver.jumps",
     "solver.loop",
+    "solver.loop_result",
     "solver.material",
     "solver.method",
     "solver.path",

@@ -7,7 +7,7 @@ import pytest
 
 from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile, single_wave
 from solver.control import Control
-from solver.loop import LoopResult
+from solver.loop_result import LoopResult
 from solver.method import PathError
 from solver.profile import Profile
 from solver.references.single_wave import SingleWave

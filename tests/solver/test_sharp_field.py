@@ -19,8 +19,9 @@ from solver.sharp.field import (
     solve,
     solve_again,
 )
+from solver.sharp.moments import gap_moments
 from solver.sharp.opening import fine_opening, sum_modes, work_of_gaps
-from solver.sharp.source import StressSource, gap_moments
+from solver.sharp.source import StressSource
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.scenes import HALF_SPACE
 
