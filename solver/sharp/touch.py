@@ -18,6 +18,7 @@ from solver.compiled import compiled
 from solver.method import PathError
 from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
+from solver.sharp.aim import Closing
 from solver.sharp.bottom import bottoms_of
 from solver.sharp.clearance import Clearances
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
@@ -27,6 +28,7 @@ from solver.sharp.gaps import with_patches
 _OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
 _MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
 _MOST_CLEAR = 2  # aims by a secant that are clear, one after the other, before a halving
+_HALVED = 5  # of many gaps, which are aimed at one by one, one in so many aims is a halving
 
 
 @dataclass(frozen=True)
@@ -174,14 +176,17 @@ class Nucleation:
         many = len(last.gaps) >= self.edges.many
         if many and low == 0 and clearance > 0:
             clear_value = clearance
+        closing, closed = self._closing(last, hit) if many else (None, None)
         cleared = 0  # aims one after the other that were clear
-        for _ in range(_MOST_AIMS):
+        for aims in range(1, _MOST_AIMS + 1):
             near = many or abs(clear - hit.at) <= resolution
             if hit_value == 0 or (near and hit_value > -0.5 * self.overlap):
                 break
             share = 0.5
+            if closing is not None and aims % _HALVED:
+                share = closing.aim(clear, hit.at, -0.2 * self.overlap)
             # The least clearance may be another gap's than the overlap: then a secant creeps.
-            if np.isfinite(clear_value) and cleared < _MOST_CLEAR:
+            elif closing is None and np.isfinite(clear_value) and cleared < _MOST_CLEAR:
                 # secant to half of the overlap that is allowed, kept off the ends
                 aimed = clear_value + 0.2 * self.overlap
                 share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
@@ -196,6 +201,8 @@ class Nucleation:
             if point is None:
                 break
             value, minima = self.least(point.field)
+            if closing is not None and closed is not None:
+                closing.note(aim, self._clearance_of(point.field, closed))
             cleared = cleared + 1 if value > 0 else 0
             if value > 0:
                 last, clear, clear_value = point, aim, value
@@ -208,6 +215,24 @@ class Nucleation:
         if clear_value > hit_value:
             late *= -hit_value / (clear_value - hit_value)
         return Located(hit, self.ready(hit_minima), late), 0.0
+
+    def _clearance_of(self, field: GapField, gaps: Kinds) -> Array:
+        """Clearance of each of some gaps."""
+        minima, where = self.minima(field, gaps)
+        out = np.full(len(field.gaps), np.inf)
+        np.minimum.at(out, where, self.clearance(minima.opening, minima.curvature))
+        return out[gaps]
+
+    def _closing(self, clear: Point, hit: Point) -> tuple[Closing | None, Kinds]:
+        """How the gaps close that are open at one point and overlap at another, and which."""
+        left, _ = self.clearances.left(hit.field)
+        closed = np.flatnonzero(left <= 0)
+        after = self._clearance_of(hit.field, closed)
+        closed, after = closed[after < 0], after[after < 0]
+        if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:
+            return None, closed
+        before = self._clearance_of(clear.field, closed)
+        return Closing(clear.at, hit.at, before, after), closed
 
     def located_held(self, point: Point, clearance: float, end: float) -> Located | None:
         """Where surfaces touch between a point with this clearance and ``end``, edges held."""

@@ -103,6 +103,7 @@ def descend_many(
         for i in range(width):
             window_kinds[i] = kinds[(first + i) % count]
         moved, ended, moved_kinds = window, LOST, window_kinds
+        followed = np.empty(0)
         soft = outer.response.negative == 0
         while ended == LOST:
             if not soft:  # with all edges outside held
@@ -113,14 +114,17 @@ def descend_many(
             )  # fmt: skip
             fields += some
             tangents += more
+            if ended != LOST:
+                followed = following(
+                    moved, prescribed, moved_kinds, outer, about, limit, law, rules,
+                    with_outside(panels, outside),
+                )  # fmt: skip
+                if not np.all(np.isfinite(followed)):  # where the window came to has no field
+                    ended = LOST
             if ended == LOST and not soft:
                 return gaps, LOST, fields, tangents, kinds
             soft = False
         progress = np.abs(moved[:width] - window[:width]).max()
-        followed = following(
-            moved, prescribed, moved_kinds, outer, about, limit, law, rules,
-            with_outside(panels, outside),
-        )  # fmt: skip
         result = np.empty(gaps.shape)
         for i in range(count):
             k = (first + i) % count

@@ -7,6 +7,7 @@ import pytest
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from solver.references.single_wave import SingleWave
+from solver.sharp.aim import Closing
 from solver.sharp.bottom import bottoms
 from solver.sharp.method import SharpMethod
 from solver.sharp.touch import Minima, Nucleation, Touch
@@ -73,3 +74,21 @@ def test_every_touch_of_paper_scale_is_located(hurst: float, seed: int) -> None:
     method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.04))
     loop = run_loop(method, max_penetration=0.6, load_steps=20)
     assert abs(loop.audit_residual) < 1e-4
+
+
+def test_the_first_of_several_gaps_that_close_is_aimed_at_by_itself() -> None:
+    """Their least clearance has kinks; each by itself is smooth, and few aims reach its touch."""
+
+    def clearances(at: float) -> np.ndarray:
+        return np.array([0.3 - at - 0.2 * at**2, 0.05 - 0.15 * at + 0.02 * at**3, 1.0 - 1.1 * at])
+
+    closing = Closing(0.0, 1.0, clearances(0.0), clearances(1.0))
+    clear, hit = 0.0, 1.0
+    wanted = -1e-7
+    for _ in range(4):
+        at = clear + (hit - clear) * closing.aim(clear, hit, wanted)
+        least = float(clearances(at).min())
+        closing.note(at, clearances(at))
+        clear, hit = (at, hit) if least > 0 else (clear, at)
+    assert abs(least - wanted) < 1e-8
+    assert int(np.argmin(clearances(hit))) == 0
