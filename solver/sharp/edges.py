@@ -102,10 +102,11 @@ class Past(NamedTuple):
 
 
 class Before(NamedTuple):
-    """d, and the rate of every edge, at an earlier point of a branch; see :class:`Point`."""
+    """d, and rate and place of every edge, at an earlier point of a branch; see :class:`Point`."""
 
     at: float
     rate: Array
+    gaps: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from solver.sharp.local import Astray, LocalPoint, advance, confirmed
 from solver.sharp.states import Memory, States, Trace
 from solver.sharp.touch import Located, Nucleation
 
+_BEGUN = 0.05  # longest first step of an edge after a jump, in λ_min: there its course is straight
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
 # A gap closes locally at most so many times faster than gaps on average; where there are many, a
 # look for touches costs more than to go back to one that was passed.
@@ -184,7 +185,7 @@ class Follower:
                     there = reached.at == target.at
                     small = without_small(reached.gaps, self.edges.smallest)
                     looks = walk.closed + closed >= walk.clearance or small is not None
-                    coarse = error > 4 and abs(step) > finest
+                    coarse = error > 4 and abs(step) > 2 * self.resolution.finest
                     if not coarse and (error > 1 or there or looks):
                         reached = confirmed(reached)
             except Astray:
@@ -219,10 +220,11 @@ class Follower:
                     wanted = finest = better
                     continue
                 return at, after
-            if coarse:
+            if coarse:  # also where a branch bends more sharply than jumps are located
                 wanted = 0.5 * abs(step)
+                finest = min(finest, wanted)
                 continue
-            reached = reached.behind(Before(point.at, point.rate))
+            reached = reached.behind(Before(point.at, point.rate, point.gaps))
             walk.add(reached, closed)
             if error > 1 or there:
                 exact = None
@@ -370,10 +372,13 @@ class Follower:
 
         Nor is a place where no equilibrium was found, ``lost`` ahead.
         """
-        size = min(wanted, course.reach(_PREDICTED * self.edges.wave, finest))
+        many = len(course.point.gaps) >= self.edges.many
+        most = _PREDICTED if course.way != 0 or many else _BEGUN
+        size = min(wanted, course.reach(most * self.edges.wave, finest))
         if 0 < lost <= size:
             size = 0.5 * lost
-        size = max(size, 0.999 * finest)
+        if not course.ahead < finest:
+            size = max(size, 0.999 * finest)
         left = target - course.point.at
         return left if size >= abs(left) else float(np.copysign(size, left))
 

