@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from solver.jumps import Branch
+from solver.memory import keep_freed
 from solver.method import (
     ContactState,
     Fields,
@@ -106,6 +107,7 @@ class SharpMethod(Method):
         self, problem: Problem, *, accuracy: float = 1e-3, chosen: str | None = None
     ) -> None:
         super().__init__(problem, chosen=chosen)
+        keep_freed()
         profile, modulus = problem.profile, problem.half_space.modulus
         self.accuracy = accuracy
         self.q0 = profile.q0
