@@ -30,4 +30,4 @@ def keep_freed() -> bool:
         (_TRIM_THRESHOLD, _KEPT),
         (_TOP_PAD, _AHEAD),
     )
-    return sum(set_option(name, value) for name, value in options) == len(options)
+    return bool(sum(set_option(name, value) for name, value in options) == len(options))
