@@ -133,7 +133,7 @@ class Course:
         if np.isinf(self.ahead):
             return straight
         if self.ahead < 0.8 * finest:
-            return (1 + _NEAR) * self.ahead + _ACROSS * finest
+            return self.across(finest)
         most = most / abs(self._gone)
         if most < self._fold and self._way_by_lead is not None:
             here, square, cube = self._way_by_lead
@@ -141,3 +141,7 @@ class Course:
         else:
             straight = self.ahead
         return float(min(straight, self.ahead - max(_NEAR * self.ahead, _BESIDE * finest)))
+
+    def across(self, finest: float) -> float:
+        """Step across the fold that is seen."""
+        return (1 + _NEAR) * self.ahead + _ACROSS * finest

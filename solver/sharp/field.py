@@ -50,7 +50,7 @@ from solver.sharp.coordinate import (
     map_gaps,
     theta_at,
 )
-from solver.sharp.linear import cholesky, factor_rows, solve_column, solve_factored
+from solver.sharp.linear import cholesky, solve_column, solve_factored, wide
 from solver.sharp.moments import gap_moments
 from solver.sharp.outside import Outside, add_outside, moving_load, reach
 from solver.sharp.source import Panels, StressSource
@@ -151,7 +151,7 @@ class Solution(NamedTuple):
     slope : array, shape (L, 2)
         dη/dθ at the gap ends.
     matrix, factor : array, shape (N, N)
-        B + G and its lower Cholesky factor.
+        B + G and its factor (:func:`solver.sharp.linear.cholesky`).
     rhs, solved : array, shape (N, 2 or 3)
         Loads S~, X and, if asked for, S~', and (B + G)⁻¹ of them.
     beyond : array, shape (L, 2, 1 or 2)
@@ -402,11 +402,7 @@ def _solved(
     felt_load = np.empty((0, 0))
     felt_area = np.empty(0)
     felt_shift = 0.0
-    if windowed:  # where edges follow outside, the matrix need not be positive definite
-        factor = matrix.copy()
-        definite = factor_rows(factor, 0.0)
-    else:
-        factor, definite = cholesky(matrix)
+    factor, definite = cholesky(matrix)
     solved = rhs.copy()
     opening = np.full(2 * table.shape[0], np.nan)
     pressure = np.nan
@@ -523,7 +519,7 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
     load, area = _singular_loads(of, rules)
     windowed = of.felt_area.shape[0] > 0
     if windowed:
-        load += of.felt_load
+        load[:, :edges] += of.felt_load
         area += of.felt_area
     solve_factored(of.factor, load)
     p = area
@@ -537,7 +533,8 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
         for i in range(load.shape[0]):
             for e in range(edges):
                 load[i, e] -= of.solved[i, 1] * p[e]
-    by_edge = edge_openings(load, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+    openings = edge_openings(load, of.slope, of.kinds, of.offset, rules.start, rules.ends)
+    by_edge = openings[:, :edges].copy()
     # Translation: all edges together against the profile.
     drift = 0.0
     for i in range(load.shape[0]):
@@ -831,6 +828,8 @@ def _singular_load(
 def _singular_loads(of: Solution, rules: Rules) -> tuple[Array, Array]:
     """Right-hand sides of the regular part of the solution singular at each edge, and its area.
 
+    There are more columns than edges, for :mod:`solver.sharp.linear`; those are zero.
+
     The opening sqrt((1∓η)/(1±η)) of the own gap has the density 1/(1±η) at the nodes and, as the
     rule is exact for polynomials only, a further weight π/(M+1) at the edge itself.
     """
@@ -840,7 +839,7 @@ def _singular_loads(of: Solution, rules: Rules) -> tuple[Array, Array]:
     eta, b, w = rules.eta, rules.b, rules.w
     n = theta.shape[0]
     gaps = table.shape[0]
-    load = np.empty((n, 2 * gaps))
+    load = np.zeros((n, wide(2 * gaps)))
     area = np.empty(2 * gaps)
     sine = np.sin(0.5 * theta)
     cosine = np.cos(0.5 * theta)

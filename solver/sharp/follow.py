@@ -168,16 +168,17 @@ class Follower:
         wanted = np.inf
         finest = self.resolution.jump
         lost = np.inf  # distance of the nearest d at which no equilibrium was found
+        across = False  # whether to step across the fold that is seen, after a failure short of it
         course = Course(point)  # straight at first: short steps there keep the integral exact
         walk = _Walk(point)
         shown = point
         windows = len(point.gaps) >= self.edges.many
         while point.at != target.at:
-            step = self._next_step(course, target.at, wanted, finest, lost)
+            step = self._next_step(course, target.at, wanted, finest, lost, across)
             reached = None
             try:
                 reached = self._advance(course, step, target.at, windows)
-                if reached is None and abs(step) <= finest and windows:
+                if reached is None and (across or abs(step) <= finest) and windows:
                     point = walk.confirm()
                 if reached is not None:
                     error = self._trapezoid_error(shown, reached)
@@ -195,9 +196,12 @@ class Follower:
                 wanted = 0.5 * abs(far - point.at)
                 continue
             if reached is None:
-                if abs(step) > finest:
+                if abs(step) > finest and not across:
                     lost = abs(step)
                     wanted = max(0.25 * abs(step), 0.999 * finest)
+                    continue
+                across = not across and abs(step) < course.ahead < 2 * finest
+                if across:
                     continue
                 touched = self._look(trace, walk, target.branch)
                 if touched is not None:
@@ -245,7 +249,7 @@ class Follower:
                 after = self.jumps.run(trace, last, small, reached.at, target.branch, known=reached)
                 return reached.at, after
             course = Course(reached)
-            point, wanted = reached, 2 * abs(step)
+            point, wanted, across = reached, 2 * abs(step), False
             # only before a fold is a failure more than that of a prediction
             lost = lost - abs(step) if np.isfinite(course.ahead) else np.inf
             windows = len(point.gaps) >= self.edges.many
@@ -366,11 +370,18 @@ class Follower:
         return self.states.work(before, after, late)
 
     def _next_step(
-        self, course: Course, target: float, wanted: float, finest: float, lost: float
+        self,
+        course: Course,
+        target: float,
+        wanted: float,
+        finest: float,
+        lost: float,
+        across: bool,
     ) -> float:
         """Next step in q0 s: no edge moves too far by prediction, the target is not passed.
 
-        Nor is a place where no equilibrium was found, ``lost`` ahead.
+        Nor is a place where no equilibrium was found, ``lost`` ahead, unless it is to lead
+        ``across`` the fold that is seen.
         """
         many = len(course.point.gaps) >= self.edges.many
         most = _PREDICTED if course.way != 0 or many else _BEGUN
@@ -379,6 +390,8 @@ class Follower:
             size = 0.5 * lost
         if not course.ahead < finest:
             size = max(size, 0.999 * finest)
+        if across:
+            size = course.across(finest)
         left = target - course.point.at
         return left if size >= abs(left) else float(np.copysign(size, left))
 
