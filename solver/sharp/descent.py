@@ -18,6 +18,7 @@ from solver.sharp.balance import (
 )
 from solver.sharp.box import off_saddle, running_step
 from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
+from solver.sharp.eigen import symmetric_modes
 from solver.sharp.field import Kinds, Rules, Solution, choose_kinds, solve, solve_again
 from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.linear import is_definite
@@ -26,7 +27,7 @@ from solver.sharp.source import Panels
 # Further running steps with one tangent: of an edge that runs alone only the size of its step
 # depends on it, of several the direction, too.
 _REUSES_ALONE = 8
-_REUSES = 1
+_REUSES = 2
 # Longer steps, in longest unchecked ones, are looked at for a minimum that they leap over.
 _UNCHECKED_ALONE = 2.0  # of an edge that runs alone
 _STRIDE = 3.0  # longest of all
@@ -81,8 +82,8 @@ def descend(
     ``equal_speeds``: edges out of equilibrium run, all at the same speed (their limit, twice as
     long for one that runs alone), and edges near equilibrium follow them by Newton's step.
 
-    While edges run, a tangent serves several steps, of several edges two, unless an edge turns; the
-    openings are always fresh. A step that raised the energy is taken back and halved.
+    While edges run, a tangent serves several steps, of several edges three, unless an edge turns;
+    the openings are always fresh. A step that raised the energy is taken back and halved.
 
     ``track``, shape (n, 2L), holds the edges that another descent went through. One that has been
     away from it (``astray``) and comes back to it has met it.
@@ -203,7 +204,7 @@ def descend(
             if equal_speeds:
                 d, matrix = symmetric(of, tangent, law.overlapping)
             else:
-                values, matrix = np.linalg.eigh(
+                values, matrix = symmetric_modes(
                     hessian(np.maximum(of.opening, 0.0), residual, drift, tangent)
                 )
         if equal_speeds:
