@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.memory import keep_freed
 from solver.profile import Array, self_affine_profile
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.far import solve_many
@@ -51,6 +52,7 @@ def main() -> None:
     parser.add_argument("--dense", type=int, default=300, help="most gaps for the dense factor")
     parser.add_argument("--repetitions", type=int, default=5)
     given = parser.parse_args()
+    keep_freed()  # as in a loop
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
     source = StressSource(profile, given.tolerance)
     separation, digits = 0.5 * profile.h_max * profile.q0, -np.log(given.tolerance)
