@@ -192,16 +192,18 @@ class _Descent:
                 self.solver.solve(self.current, self.rules.tight)
                 continue
             if self._paid(energy):
+                if self.abort is not None and self.abort(energy, self.current):
+                    if not self._unsolved():
+                        return None
+                    # Energy and mean stress of a stress solved so loosely may both mislead. What
+                    # was tried in vain stays so until it is known that this paid, or two moves that
+                    # both seem to pay are tried in turn for ever.
+                    self.solver.solve(self.current, self.rules.tight)
+                    continue
                 if self.moves:
                     self.blocked.clear()
                     self.caution = 0
                     self.alone = False
-                if self.abort is not None and self.abort(energy, self.current):
-                    if not self._unsolved():
-                        return None
-                    # Energy and mean stress of a stress solved so loosely may both mislead.
-                    self.solver.solve(self.current, self.rules.tight)
-                    continue
                 self.anchor = self.current.copy()
                 self.anchor_energy = energy
             else:

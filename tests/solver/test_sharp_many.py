@@ -321,7 +321,7 @@ def test_windows_are_let_go_without_a_search_for_circles(profile):
     gc.disable()
     try:
         loop = run_loop(method, max_penetration=0.5, load_steps=4)
-        alive = sum(isinstance(thing, Window) for thing in gc.get_objects())
+        alive = sum(type(thing) is Window for thing in gc.get_objects())
     finally:
         gc.enable()
     assert loop.patches.max() > 6
