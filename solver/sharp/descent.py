@@ -18,7 +18,6 @@ from solver.sharp.balance import (
 )
 from solver.sharp.box import off_saddle, running_step
 from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
-from solver.sharp.eigen import symmetric_modes
 from solver.sharp.field import Kinds, Rules, Solution, choose_kinds, solve, solve_again
 from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.linear import is_definite
@@ -204,7 +203,7 @@ def descend(
             if equal_speeds:
                 d, matrix = symmetric(of, tangent, law.overlapping)
             else:
-                values, matrix = symmetric_modes(
+                values, matrix = np.linalg.eigh(
                     hessian(np.maximum(of.opening, 0.0), residual, drift, tangent)
                 )
         if equal_speeds:
