@@ -4,10 +4,11 @@
     python benchmarks/growth.py --work-of-adhesion 0.0006 --periods 8.4     # about 1,000 patches
 
 Self-affine profiles of the paper's scale (H = 0.8, m = 10 ratio, h_rms = 1 µm) on ``periods`` times
-its period, with as many times more wave numbers: the same surface, and more of it. Prints a table
-in Markdown as the loops end: CPU seconds, patches at most, jumps, fields, CPU time of a field of
-the loop, audit residual, estimated error of the loss, and the most memory of the process. The last
-column is the exponent of the CPU time in the patches from one row to the next.
+its period, with as many times more wave numbers: the same surface, and more of it. By ``sharp``,
+or by ``grid`` if its ``--nodes-per-wave`` are given. Prints a table in Markdown as the loops end:
+CPU seconds, patches at most, jumps, elastic solutions, CPU time of the loop for each of them, audit
+residual, estimated error of the loss, and the most memory of the process. The last column is the
+exponent of the CPU time in the patches from one row to the next.
 """
 
 from __future__ import annotations
@@ -16,15 +17,17 @@ import argparse
 import resource
 import subprocess
 import sys
+from dataclasses import asdict
 from time import process_time
 
 import numpy as np
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
+from solver.registry import MethodName, make_method
 from solver.sharp.method import SharpMethod
 
 _COLUMNS = (
-    "γ (J/m²)", "m to", "periods", "CPU s", "patches", "jumps", "fields", "ms a field", "W~",
+    "γ (J/m²)", "m to", "periods", "CPU s", "patches", "jumps", "solutions", "ms each", "W~",
     "audit", "error told", "MB", "exponent",
 )  # fmt: skip
 
@@ -40,16 +43,21 @@ def measure(gamma: float, ratio: float, periods: float, given: argparse.Namespac
         method = SharpMethod(Problem(warm, HalfSpace(1e6, 0.5), 0.004))
         method.edges.many = many
         run_loop(method, max_penetration=0.5, load_steps=5)
-    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), gamma))
+    nodes = given.nodes_per_wave
+    problem = Problem(profile, HalfSpace(1e6, 0.5), gamma)
+    name: MethodName = "sharp" if nodes is None else "grid"
+    method = make_method(name, problem, nodes_per_wave=nodes)
     started = process_time()
     loop = run_loop(method, max_penetration=given.max_penetration, load_steps=given.load_steps)
     seconds = process_time() - started
-    fields = method.edges.count.fields
+    counted = asdict(loop.method)
+    solutions = counted["fields" if nodes is None else "solves"]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return [
         f"{gamma:g}", f"{round(ratio * count)}", f"{periods:g}", f"{seconds:.3g}",
-        f"{loop.patches.max()}", f"{len(loop.jumps)}", f"{fields}", f"{1e3 * seconds / fields:.3f}",
-        f"{loop.loss_dimensionless:.6g}", f"{loop.audit_residual:+.0e}",
+        f"{loop.patches.max()}", f"{len(loop.jumps)}", f"{solutions}",
+        f"{1e3 * seconds / solutions:.3f}", f"{loop.loss_dimensionless:.6g}",
+        f"{loop.audit_residual:+.0e}",
         f"{loop.loss_error / abs(loop.loss):.0e}", f"{memory:.0f}",
     ]  # fmt: skip
 
@@ -62,6 +70,7 @@ def main() -> None:
     parser.add_argument("--periods", type=float, nargs="+", default=[1.0])
     parser.add_argument("--max-penetration", type=float, default=0.9)
     parser.add_argument("--load-steps", type=int, default=40)
+    parser.add_argument("--nodes-per-wave", type=int, help="follow the loops with grid")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--alone", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -84,6 +93,8 @@ def main() -> None:
             "--max-penetration", str(given.max_penetration),
             "--load-steps", str(given.load_steps),
         ]  # fmt: skip
+        if given.nodes_per_wave is not None:
+            command += ["--nodes-per-wave", str(given.nodes_per_wave)]
         row = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout.strip()
         cells = row.split(" | ")
         now = float(cells[3]), float(cells[4])
