@@ -249,6 +249,9 @@ class FieldStates:
         """Take note of one state of the path; hand this to ``run_loop`` as ``on_state``."""
         here = self.method.problem.penetration(state.separation)
         for wanted in self.penetrations:
+            if state.patches and state.separation == self.method.problem.separation(wanted):
+                self._before[branch, wanted] = state  # the very state, not one followed anew
+                continue
             reached = here >= wanted if branch == "loading" else here <= wanted
             if reached and (branch, wanted) not in self._before:
                 self._before[branch, wanted] = self._last.get(branch, state)

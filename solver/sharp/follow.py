@@ -24,6 +24,7 @@ _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation ste
 _FASTEST_CLOSING = 4.0
 _CLOSING_OF_MANY = 1.0
 _ADVANCING = 4.0  # so many times the motion of one gap's edges closes others, where there are many
+_SAME = 1e-3  # edges that a jump moves by less than this, in λ_min, have not left their branch
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten the trapezoidal rule
 
 
@@ -223,6 +224,13 @@ class Follower:
                 if better < finest:
                     wanted = finest = better
                     continue
+                if at != target.at and not windows and after and self._same(point, after):
+                    # Newton's iteration failed where there was no fold: the branch goes on.
+                    del trace.states[known[0] :], trace.jumps[known[1] :]
+                    trace.late = known[2]
+                    walk.add(after, self._closed(point, after, target.branch))
+                    point, course, across, lost = after, Course(after), False, np.inf
+                    continue
                 return at, after
             if coarse:  # also where a branch bends more sharply than jumps are located
                 wanted = 0.5 * abs(step)
@@ -358,6 +366,12 @@ class Follower:
             return None, max(share * min(abs(at - point.at), finest), self.resolution.finest)
         trace.late += late
         return after, finest
+
+    def _same(self, point: Point, after: Point) -> bool:
+        """Whether a descent from ``point`` led hardly anywhere: to its own branch."""
+        if after.gaps.shape != point.gaps.shape:
+            return False
+        return bool(np.abs(after.gaps - point.gaps).max() < _SAME * self.edges.wave)
 
     def _nearby(self, point: Point, after: Point | None) -> bool:
         """Whether a descent from ``point`` led no further than a step along a branch."""
