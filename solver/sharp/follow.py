@@ -187,7 +187,8 @@ class Follower:
                     there = reached.at == target.at
                     small = without_small(reached.gaps, self.edges.smallest)
                     looks = walk.closed + closed >= walk.clearance or small is not None
-                    coarse = error > 4 and abs(step) > 2 * self.resolution.finest
+                    # What was stepped across for want of a nearer point cannot be halved.
+                    coarse = error > 4 and abs(step) > 2 * self.resolution.finest and not across
                     if not coarse and (error > 1 or there or looks):
                         reached = confirmed(reached)
             except Astray:

@@ -16,6 +16,8 @@ from adhesis import (
 )
 from solver.method import ContactState, PathError
 from solver.references.single_wave import SingleWave
+from solver.sharp import follow
+from solver.sharp.course import Course
 from solver.sharp.method import SharpMethod
 from tests.support.explicit_solution import explicit_openings
 
@@ -247,3 +249,36 @@ def test_the_error_told_covers_the_error_made_on_random_scenes():
         assert min(jump.energy_drop for jump in result.jumps) > 0
         told.append(result.loss_error / error)
     assert np.median(told) < 10
+
+
+def test_a_step_across_a_fold_that_is_none_is_taken_once(monkeypatch):
+    """Newton's iteration fails short of a fold that is seen, and beyond it the branch goes on.
+
+    So it was with 200 patches and accuracy 4e-3: what lay beyond bent sharply, steps across were to
+    be halved, and could not be.
+    """
+    method = SharpMethod(Problem(single_wave(1e-6, PERIOD), SOLID, 0.01), accuracy=0.03)
+    finest = method.follower.resolution.jump
+    real = follow.advance
+    calls, feigned = [], []
+
+    def advance(edges, course, at, windows):
+        calls.append(course)
+        assert len(calls) < 2000, "the same step is taken for ever"
+        if not feigned and course.way and course.ahead > 20 * finest:
+            feigned.append(course)
+        if course in feigned:
+            course.ahead = 1.5 * finest
+            if not 1 < abs(at - course.point.at) / course.ahead < 1.5:
+                return None
+            course = Course(course.point)
+        return real(edges, course, at, windows)
+
+    def bends(follower, shown, point):
+        return 5.0 if calls[-1] in feigned else 0.0
+
+    monkeypatch.setattr(follow, "advance", advance)
+    monkeypatch.setattr(follow.Follower, "_trapezoid_error", bends)
+    result = run_loop(method, max_penetration=0.5, load_steps=10)
+    assert feigned
+    assert result.pull_off_penetration < 0
