@@ -20,7 +20,9 @@ from solver.memory import keep_freed
 from solver.profile import Array, self_affine_profile
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.far import solve_many
-from solver.sharp.field import FIXED, RULES, Solution, choose_kinds, solve_plain
+from solver.sharp.field import solve_plain
+from solver.sharp.rules import RULES, choose_kinds
+from solver.sharp.solution import FIXED, Solution
 from solver.sharp.source import StressSource
 from solver.sharp.yielding import newton_many
 

@@ -12,8 +12,11 @@ import numpy as np
 from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp.coordinate import ALPHA, LEFT
-from solver.sharp.field import Kinds, Rules, Solution, derivatives, edge_openings, mapped, periodic
+from solver.sharp.derivatives import derivatives
+from solver.sharp.equations import mapped, periodic
 from solver.sharp.linear import solve_column
+from solver.sharp.rules import Kinds, Rules
+from solver.sharp.solution import Solution, edge_openings
 
 _PLACES = 16  # at which a force is looked at on its way
 _ERROR = 1 / 24  # of a cubic, in its twist: of a wave over almost half its length
@@ -42,7 +45,7 @@ def first_fall(departing: float, departing_rate: float, arriving: float, rate: f
 
 @compiled
 def _singular_load(of: Solution, e: int, rules: Rules) -> tuple[Array, float]:
-    """Column ``e`` of :func:`solver.sharp.field._singular_loads`, and its area."""
+    """Column ``e`` of :func:`solver.sharp.derivatives._singular_loads`, and its area."""
     k = e // 2
     side = e % 2
     kind = of.kinds[k]

@@ -9,7 +9,9 @@ import numpy as np
 from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp.coordinate import LEFT, RIGHT, RIGHT_PATCH, map_gaps
-from solver.sharp.field import Hold, Kinds, Rules, Solution, derivatives
+from solver.sharp.derivatives import derivatives
+from solver.sharp.rules import Kinds, Rules
+from solver.sharp.solution import Hold, Solution
 from solver.sharp.source import Panels, measure_at
 
 

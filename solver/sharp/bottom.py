@@ -6,8 +6,8 @@ import numpy as np
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp.field import Kinds, Rules
 from solver.sharp.opening import SHAPE_NODES, fine_nodes_of, opened, sum_modes
+from solver.sharp.rules import Kinds, Rules
 from solver.sharp.sine import circle
 
 # A minimum below this (of what its curvature makes over a node's distance, or of what the parabola

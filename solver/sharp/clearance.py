@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp.field import RULES, GapField, Kinds, Rules
+from solver.sharp.field import GapField
+from solver.sharp.rules import RULES, Kinds, Rules
 
 _NEAR = 0.3  # edges that moved by less than this, in λ_min, leave a gap comparable
 _SAFETY = 1.5  # on what the nodes tell

@@ -45,6 +45,17 @@ def map_gaps(gaps: Array) -> Array:
 
 
 @compiled
+def in_order(table: Array) -> bool:
+    """Whether every gap and patch has a length; not so where an edge is no number."""
+    for k in range(table.shape[0]):
+        # not written as <= : a length that is no number is a failure, too
+        length = table[k, RIGHT] - table[k, LEFT]
+        if not (length > 0 and table[k, LEFT_PATCH] > 0 and table[k, RIGHT_PATCH] > 0):
+            return False
+    return True
+
+
+@compiled
 def one_minus_plus(gap: Array, r: float, side: int) -> tuple[float, float]:
     """(1 - η, 1 + η) at the distance r from the left (side 0) or right end, relatively exact."""
     own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]

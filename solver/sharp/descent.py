@@ -18,9 +18,11 @@ from solver.sharp.balance import (
 )
 from solver.sharp.box import off_saddle, running_step
 from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
-from solver.sharp.field import Kinds, Rules, Solution, choose_kinds, solve, solve_again
+from solver.sharp.field import solve, solve_again
 from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.linear import is_definite
+from solver.sharp.rules import Kinds, Rules, choose_kinds
+from solver.sharp.solution import Solution
 from solver.sharp.source import Panels
 
 # Further running steps with one tangent: of an edge that runs alone only the size of its step

@@ -23,10 +23,12 @@ from solver.sharp.counters import Counters
 from solver.sharp.descent import LOST, MET, NARROW, RESTING, descend
 from solver.sharp.equilibrium import equilibrium
 from solver.sharp.far import solve_many_plain
-from solver.sharp.field import FIXED, RULES, GapField, Hold, Solution, choose_kinds
+from solver.sharp.field import GapField
 from solver.sharp.gaps import outward, widths, without_small
 from solver.sharp.many import equilibrium_many
 from solver.sharp.nearby import Start
+from solver.sharp.rules import RULES, choose_kinds
+from solver.sharp.solution import FIXED, Hold, Solution
 from solver.sharp.source import StressSource
 from solver.sharp.window import About, descend_many, known_about
 from solver.sharp.yielding import between_edges

@@ -18,17 +18,10 @@ from solver.sharp.balance import (
     tangent_of,
 )
 from solver.sharp.coordinate import map_gaps
-from solver.sharp.field import (
-    Kinds,
-    PlainSolution,
-    Rules,
-    Solution,
-    choose_kinds,
-    edge_openings,
-    plain,
-    solve,
-)
+from solver.sharp.field import solve
 from solver.sharp.linear import is_definite
+from solver.sharp.rules import Kinds, Rules, choose_kinds
+from solver.sharp.solution import PlainSolution, Solution, edge_openings, plain
 from solver.sharp.source import Panels
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost

@@ -12,19 +12,11 @@ import numpy as np
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp.coordinate import map_gaps
-from solver.sharp.field import (
-    Hold,
-    Kinds,
-    PlainSolution,
-    Rules,
-    Solution,
-    edge_openings,
-    in_order,
-    one_gap,
-    plain,
-)
+from solver.sharp.coordinate import in_order, map_gaps
+from solver.sharp.equations import one_gap
 from solver.sharp.linear import factor_rows, solve_factored
+from solver.sharp.rules import Kinds, Rules
+from solver.sharp.solution import Hold, PlainSolution, Solution, edge_openings, plain
 from solver.sharp.source import Panels
 from solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
 

@@ -19,9 +19,11 @@ from solver.profile import Array
 from solver.sharp.course import Course
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.equilibrium import equilibrium
-from solver.sharp.field import RULES, GapField, Solution
+from solver.sharp.field import GapField
 from solver.sharp.gaps import outward
 from solver.sharp.nearby import Window
+from solver.sharp.rules import RULES
+from solver.sharp.solution import Solution
 
 _HALF_WIDTH = 3  # gaps of a window on each side of the edge that leads
 _MOVING = 0.15  # motion of an edge, in λ_min, that ends a stretch as a fold does

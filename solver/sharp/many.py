@@ -9,7 +9,7 @@ from solver.profile import Array
 from solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.far import solve_many
-from solver.sharp.field import Kinds, Rules, choose_kinds
+from solver.sharp.rules import Kinds, Rules, choose_kinds
 from solver.sharp.source import Panels
 from solver.sharp.window import About, at_rest
 from solver.sharp.yielding import newton_step, yielding_gaps

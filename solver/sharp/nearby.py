@@ -17,8 +17,8 @@ from solver.profile import Array
 from solver.sharp.balance import Law
 from solver.sharp.counters import Counters
 from solver.sharp.descent import LOST, NARROW, descend, limits
-from solver.sharp.field import RULES
 from solver.sharp.gaps import without_small
+from solver.sharp.rules import RULES
 from solver.sharp.source import Panels
 from solver.sharp.window import About, following, open_window
 

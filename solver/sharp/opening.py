@@ -27,7 +27,8 @@ from solver.sharp.coordinate import (
     one_minus_plus,
     theta_at,
 )
-from solver.sharp.field import RULES, GapField, Kinds, Rules
+from solver.sharp.field import GapField
+from solver.sharp.rules import RULES, Kinds, Rules
 from solver.sharp.sine import circle, sine_sums
 from solver.sharp.source import interpolate
 

@@ -22,8 +22,9 @@ from solver.sharp.aim import Closing
 from solver.sharp.bottom import bottoms_of
 from solver.sharp.clearance import Clearances
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
-from solver.sharp.field import RULES, GapField, Kinds
+from solver.sharp.field import GapField
 from solver.sharp.gaps import with_patches
+from solver.sharp.rules import RULES, Kinds
 
 _OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
 _MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits

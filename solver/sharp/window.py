@@ -21,8 +21,10 @@ from solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
 from solver.sharp.coordinate import LEFT, RIGHT, map_gaps
 from solver.sharp.descent import LOST, NARROW, RESTING, UNFINISHED, descend, limits
 from solver.sharp.far import Gaps, solve_many
-from solver.sharp.field import Kinds, Rules, Solution, choose_kinds, solve
+from solver.sharp.field import solve
 from solver.sharp.outside import Outside, reach
+from solver.sharp.rules import Kinds, Rules, choose_kinds
+from solver.sharp.solution import Solution
 from solver.sharp.source import Panels, measure_at, with_outside
 from solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
 from solver.sharp.yielding import Yielding, newton_step, yielding_gaps

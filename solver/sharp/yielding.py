@@ -17,8 +17,10 @@ import numpy as np
 from solver.compiled import compiled
 from solver.profile import Array
 from solver.sharp.coordinate import ALPHA, LEFT
+from solver.sharp.equations import mapped, periodic
 from solver.sharp.far import Gaps, by_gaps, solve_many, spread
-from solver.sharp.field import Hold, Kinds, Rules, Solution, edge_openings, mapped, periodic
+from solver.sharp.rules import Kinds, Rules
+from solver.sharp.solution import Hold, Solution, edge_openings
 from solver.sharp.source import Panels
 from solver.sharp.tree import collect, distribute, respond
 

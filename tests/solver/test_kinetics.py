@@ -8,9 +8,11 @@ import pytest
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from solver.grid.method import GridMethod
 from solver.sharp.balance import imbalance, moved_gaps, tangent_of
-from solver.sharp.field import RULES, choose_kinds, map_gaps, solve
+from solver.sharp.coordinate import map_gaps
+from solver.sharp.field import solve
 from solver.sharp.kinetics import flow_step, hessian, leaving_step
 from solver.sharp.method import SharpMethod
+from solver.sharp.rules import RULES, choose_kinds
 
 SOLID = HalfSpace(1e6, 0.5)
 PHASES = [

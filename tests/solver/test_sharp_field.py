@@ -9,18 +9,12 @@ from adhesis import Problem, self_affine_profile, single_wave
 from solver.grid.method import GridMethod
 from solver.sharp.along import forces_on
 from solver.sharp.coordinate import map_gaps, theta_at
-from solver.sharp.field import (
-    FIXED,
-    RULES,
-    GapField,
-    Hold,
-    choose_kinds,
-    derivatives,
-    solve,
-    solve_again,
-)
+from solver.sharp.derivatives import derivatives
+from solver.sharp.field import GapField, solve, solve_again
 from solver.sharp.moments import gap_moments
 from solver.sharp.opening import fine_opening, sum_modes, work_of_gaps
+from solver.sharp.rules import RULES, choose_kinds
+from solver.sharp.solution import FIXED, Hold
 from solver.sharp.source import StressSource
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.scenes import HALF_SPACE

@@ -11,13 +11,16 @@ from adhesis import HalfSpace, Problem, self_affine_profile
 from solver.loop import run_loop
 from solver.sharp.balance import imbalance, symmetric, tangent_of
 from solver.sharp.coordinate import map_gaps
+from solver.sharp.derivatives import derivatives
 from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
 from solver.sharp.far import solve_many
-from solver.sharp.field import FIXED, RULES, Solution, choose_kinds, derivatives, solve_plain
+from solver.sharp.field import solve_plain
 from solver.sharp.gaps import with_patches
 from solver.sharp.linear import is_definite
 from solver.sharp.method import SharpMethod
 from solver.sharp.nearby import Window
+from solver.sharp.rules import RULES, choose_kinds
+from solver.sharp.solution import FIXED, Solution
 from solver.sharp.source import StressSource
 from solver.sharp.tree import plant
 from solver.sharp.window import known_about, open_window
