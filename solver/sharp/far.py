@@ -16,7 +16,14 @@ from solver.sharp.coordinate import in_order, map_gaps
 from solver.sharp.equations import one_gap
 from solver.sharp.linear import factor_rows, solve_factored
 from solver.sharp.rules import Kinds, Rules
-from solver.sharp.solution import Hold, PlainSolution, Solution, edge_openings, plain
+from solver.sharp.solution import (
+    Hold,
+    PlainSolution,
+    Solution,
+    balanced,
+    openings_at,
+    plain,
+)
 from solver.sharp.source import Panels
 from solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
 
@@ -166,22 +173,10 @@ def solve_many(
     for i in range(theta.shape[0]):
         load_mean += weight[i] * solved[i, 0]
         unit_mean += weight[i] * solved[i, 1]
-    resistance = hold.share * unit_mean + 2 * np.pi * hold.give
-    pressure = -(2 * np.pi * prescribed + hold.share * load_mean) / resistance
-    separation = prescribed
-    if hold.give != 0:
-        separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
+    resistance, pressure, separation = balanced(load_mean, unit_mean, prescribed, hold)
     if not (sound and definite):
         pressure = np.nan
-    f = np.empty(theta.shape[0])
-    for i in range(theta.shape[0]):
-        f[i] = -solved[i, 0] - pressure * solved[i, 1]
-    opening = edge_openings(f.reshape(-1, 1), slope, kinds, offset, rules.start, rules.ends)[
-        :, 0
-    ].copy()
-    for k in range(count):
-        for side in range(2):
-            opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
+    f, opening = openings_at(pressure, solved, slope, beyond, kinds, offset, rules)
     empty = np.empty((0, 0))
     solution = Solution(
         table, kinds, offset, theta, weight, slope, empty, empty, rhs, solved, beyond,

@@ -48,7 +48,9 @@ from solver.sharp.solution import (
     Hold,
     PlainSolution,
     Solution,
+    balanced,
     edge_openings,
+    openings_at,
     plain,
     without_field,
 )
@@ -237,19 +239,8 @@ def _solved(
         if windowed:
             load_mean -= panels.outside.mean[0]
             unit_mean += panels.outside.mean[1]
-        resistance = hold.share * unit_mean + 2 * np.pi * hold.give
-        pressure = -(2 * np.pi * prescribed + hold.share * load_mean) / resistance
-        separation = prescribed
-        if hold.give != 0:
-            separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
-        for i in range(theta.shape[0]):
-            f[i] = -solved[i, 0] - pressure * solved[i, 1]
-        opening = edge_openings(f.reshape(-1, 1), slope, kinds, offset, rules.start, rules.ends)[
-            :, 0
-        ].copy()
-        for k in range(table.shape[0]):
-            for side in range(2):
-                opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
+        resistance, pressure, separation = balanced(load_mean, unit_mean, prescribed, hold)
+        f, opening = openings_at(pressure, solved, slope, beyond, kinds, offset, rules)
         if windowed:
             opening[-2:] = panels.outside.opening
             if fields > 1:

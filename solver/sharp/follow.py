@@ -10,12 +10,14 @@ from solver.jumps import Branch
 from solver.method import ContactState
 from solver.sharp.clearance import NOT_SEEN
 from solver.sharp.course import Course
-from solver.sharp.edges import CORRECTED, Before, EdgeMechanics, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics
 from solver.sharp.gaps import without_small
 from solver.sharp.jump import Jumps
-from solver.sharp.local import Astray, LocalPoint, advance, confirmed
+from solver.sharp.local import Astray, advance, confirmed
+from solver.sharp.point import Before, Point
 from solver.sharp.states import Memory, States, Trace
 from solver.sharp.touch import Located, Nucleation
+from solver.sharp.walk import Walk
 
 _BEGUN = 0.05  # longest first step of an edge after a jump, in λ_min: there its course is straight
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
@@ -63,61 +65,6 @@ class Target:
     at: float
     prescribed: float
     branch: Branch
-
-
-@dataclass
-class _Walk:
-    """The way since the last look for touches.
-
-    Attributes
-    ----------
-    trail : list of Point
-        From the point of the last look, known to be clear.
-    clearance : float
-        Least clearance there.
-    closed : float
-        Bound on how far a gap may have closed since.
-    pending : list of ContactState
-        States that wait for the next look: they may lie beyond a touch.
-    known : tuple
-        How many points of the trail there were up to the last one that is an equilibrium of all
-        edges, and ``closed`` there.
-    """
-
-    trail: list[Point]
-    clearance: float
-    closed: float
-    pending: list[ContactState]
-    known: tuple[int, float]
-
-    def __init__(self, point: Point) -> None:
-        self.trail, self.closed, self.pending = [point], 0.0, []
-        self.clearance = point.clearance
-        self.known = (1, 0.0)
-
-    def add(self, point: Point, closed: float) -> None:
-        """Go on to a point; a gap has closed by ``closed`` at most."""
-        self.trail.append(point)
-        self.closed += closed
-        if not isinstance(point, LocalPoint):
-            self.known = (len(self.trail), self.closed)
-
-    def confirm(self) -> Point:
-        """Make sure that the last point is an equilibrium of all edges."""
-        self.trail[-1] = confirmed(self.trail[-1])
-        self.known = (len(self.trail), self.closed)
-        return self.trail[-1]
-
-    def back(self) -> Point:
-        """Go back to the last point that is one."""
-        count, self.closed = self.known
-        del self.trail[count:]
-        return self.trail[-1]
-
-    def restart(self, clearance: float) -> None:
-        """Begin anew after a look, at a point that is one."""
-        self.trail, self.clearance, self.closed = [self.trail[-1]], clearance, 0.0
-        self.known = (1, 0.0)
 
 
 class Follower:
@@ -171,7 +118,7 @@ class Follower:
         lost = np.inf  # distance of the nearest d at which no equilibrium was found
         across = False  # whether to step across the fold that is seen, after a failure short of it
         course = Course(point)  # straight at first: short steps there keep the integral exact
-        walk = _Walk(point)
+        walk = Walk(point)
         shown = point
         windows = len(point.gaps) >= self.edges.many
         while point.at != target.at:
@@ -277,7 +224,7 @@ class Follower:
         trace.states[-1] = replace(trace.states[-1], internal=remembered)
         return target.at, point
 
-    def _look(self, trace: Trace, walk: _Walk, branch: Branch) -> Located | None:
+    def _look(self, trace: Trace, walk: Walk, branch: Branch) -> Located | None:
         """Whether surfaces have touched since the last look; hands out the states before that."""
         touched = None
         if len(walk.trail) > 1:

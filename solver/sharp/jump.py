@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from solver.jumps import Branch
 from solver.method import ContactState, PathError
 from solver.profile import Array
-from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Point, Track
+from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Track
 from solver.sharp.gaps import outward
 from solver.sharp.nearby import Start
+from solver.sharp.point import Point
 from solver.sharp.states import States, Trace
 from solver.sharp.touch import Nucleation, Touch
 

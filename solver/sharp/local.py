@@ -17,11 +17,12 @@ import numpy as np
 
 from solver.profile import Array
 from solver.sharp.course import Course
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics
 from solver.sharp.equilibrium import equilibrium
 from solver.sharp.field import GapField
 from solver.sharp.gaps import outward
 from solver.sharp.nearby import Window
+from solver.sharp.point import Point
 from solver.sharp.rules import RULES
 from solver.sharp.solution import Solution
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from solver.compiled import compiled
 from solver.profile import Array
-from solver.sharp.rules import Kinds
+from solver.sharp.rules import Kinds, Rules
 
 
 class Hold(NamedTuple):
@@ -130,3 +130,42 @@ def edge_openings(
                 for j in range(f.shape[1]):
                     out[2 * k + side, j] += factor * f[offset[k] + i, j]
     return out
+
+
+@compiled
+def balanced(
+    load_mean: float, unit_mean: float, prescribed: float, hold: Hold
+) -> tuple[float, float, float]:
+    """Resistance, p and q0 s at which what is prescribed holds.
+
+    ``load_mean`` and ``unit_mean`` are Xᵀ (B + G)⁻¹ of S~ and of X.
+    """
+    resistance = hold.share * unit_mean + 2 * np.pi * hold.give
+    pressure = -(2 * np.pi * prescribed + hold.share * load_mean) / resistance
+    separation = prescribed
+    if hold.give != 0:
+        separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
+    return resistance, pressure, separation
+
+
+@compiled
+def openings_at(
+    pressure: float,
+    solved: Array,
+    slope: Array,
+    beyond: Array,
+    kinds: Kinds,
+    offset: Kinds,
+    rules: Rules,
+) -> tuple[Array, Array]:
+    """The openings over sqrt(1-η²) at a mean stress p, and C at each gap end, of all modes."""
+    f = np.empty(solved.shape[0])
+    for i in range(solved.shape[0]):
+        f[i] = -solved[i, 0] - pressure * solved[i, 1]
+    opening = edge_openings(f.reshape(-1, 1), slope, kinds, offset, rules.start, rules.ends)[
+        :, 0
+    ].copy()
+    for k in range(slope.shape[0]):
+        for side in range(2):
+            opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
+    return f, opening

@@ -12,9 +12,9 @@ from solver.problem import Problem
 from solver.profile import Array
 from solver.sharp.clearance import NOT_SEEN, Seen
 from solver.sharp.counters import Counters
-from solver.sharp.edges import Point
 from solver.sharp.field import GapField
 from solver.sharp.opening import work_of_gaps
+from solver.sharp.point import Point
 from solver.sharp.solution import Hold
 from solver.sharp.source import StressSource
 

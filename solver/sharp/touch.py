@@ -21,9 +21,10 @@ from solver.profile import EQUAL_CRESTS, Array
 from solver.sharp.aim import Closing
 from solver.sharp.bottom import bottoms_of
 from solver.sharp.clearance import Clearances
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics
 from solver.sharp.field import GapField
 from solver.sharp.gaps import with_patches
+from solver.sharp.point import Point
 from solver.sharp.rules import RULES, Kinds
 
 _OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state

@@ -12,13 +12,14 @@ from solver.loop import run_loop
 from solver.sharp.balance import imbalance, symmetric, tangent_of
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.derivatives import derivatives
-from solver.sharp.edges import CORRECTED, EdgeMechanics, Point
+from solver.sharp.edges import CORRECTED, EdgeMechanics
 from solver.sharp.far import solve_many
 from solver.sharp.field import solve_plain
 from solver.sharp.gaps import with_patches
 from solver.sharp.linear import is_definite
 from solver.sharp.method import SharpMethod
 from solver.sharp.nearby import Window
+from solver.sharp.point import Point
 from solver.sharp.rules import RULES, choose_kinds
 from solver.sharp.solution import FIXED, Solution
 from solver.sharp.source import StressSource
