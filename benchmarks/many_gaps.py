@@ -4,7 +4,7 @@
 
 Random gaps and patches (log-normal widths, spread 0.7) over the paper's spectrum. Best of a few
 repetitions, in CPU time; the exponent is that between one number of gaps and the next. A step is
-Newton's of all edges, with its stability, beyond the field.
+Newton's of all edges beyond the field: on the tree with its stability, and by dense matrices.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ import numpy as np
 from solver.memory import keep_freed
 from solver.profile import Array, self_affine_profile
 from solver.sharp.coordinate import map_gaps
+from solver.sharp.derivatives import derivatives
 from solver.sharp.far import solve_many
 from solver.sharp.field import solve_plain
 from solver.sharp.rules import RULES, choose_kinds
 from solver.sharp.solution import FIXED, Solution
 from solver.sharp.source import StressSource
 from solver.sharp.yielding import newton_many
+
+_FEW = 100  # gaps up to which dense matrices are timed as often as the tree
 
 
 def random_gaps(count: int, contact: float, spread: float = 0.7, seed: int = 1) -> Array:
@@ -45,6 +48,11 @@ def _best(work: Callable[[], Any], repetitions: int) -> tuple[float, Any]:
     return min(times), result
 
 
+def _dense_step(of: Solution) -> Array:
+    by_edge, by_mean = derivatives(of, RULES)
+    return np.linalg.solve(by_edge, by_mean)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -59,7 +67,9 @@ def main() -> None:
     source = StressSource(profile, given.tolerance)
     separation, digits = 0.5 * profile.h_max * profile.q0, -np.log(given.tolerance)
     print(f"contact {given.contact}, tolerance {given.tolerance}; times in ms")
-    print("  gaps  unknowns    field   per gap (µs)  exponent     step    dense  difference")
+    print(
+        "  gaps  unknowns    field   per gap (µs)  exponent     step    dense     step  difference"
+    )
     before = (0, 0.0)
     for count in given.gaps:
         gaps = random_gaps(count, given.contact)
@@ -76,17 +86,20 @@ def main() -> None:
         if before[0]:
             exponent = f"{np.log(time / before[1]) / np.log(count / before[0]):.2f}"
         before = (count, time)
-        dense = difference = "-"
+        dense = dense_step = difference = "-"
         if count <= given.dense:
-            plain = (gaps, separation, FIXED, kinds, 1, RULES, source.panels)
-            solve_plain(*plain)
-            dense_time, solution = _best(lambda a=plain: solve_plain(*a), 2)
-            dense = f"{1e3 * dense_time:.2f}"
-            opening = Solution(*solution).opening
+            plain = (gaps, separation, FIXED, kinds, 2, RULES, source.panels)
+            repetitions = given.repetitions if count <= _FEW else 2
+            solution = Solution(*solve_plain(*plain))
+            _dense_step(solution)
+            dense_time, _ = _best(lambda a=plain: solve_plain(*a), repetitions)
+            step_time, _ = _best(lambda s=solution: _dense_step(s), repetitions)
+            dense, dense_step = f"{1e3 * dense_time:.2f}", f"{1e3 * step_time:.2f}"
+            opening = solution.opening
             difference = f"{np.abs(of.opening - opening).max() / np.abs(opening).max():.0e}"
         print(
             f"{count:6d} {len(of.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
-            f"{exponent:>9s} {1e3 * step:8.2f} {dense:>8s} {difference:>11s}"
+            f"{exponent:>9s} {1e3 * step:8.2f} {dense:>8s} {dense_step:>8s} {difference:>11s}"
         )
 
 
