@@ -112,6 +112,8 @@ class EdgeMechanics:
     ----------
     many : int
         From so many gaps on they are solved on a tree and moved in windows.
+    lost : int
+        Edge that led away where :meth:`equilibrium` of many gaps last found none; -1 if unknown.
     """
 
     def __init__(
@@ -146,6 +148,7 @@ class EdgeMechanics:
             origin=source.highest,
         )
         self.many = MANY
+        self.lost = -1
         self.count = Counters()
 
     def field(self, gaps: Array, prescribed: float) -> GapField:
@@ -207,6 +210,9 @@ class EdgeMechanics:
         self.count.fields += steps
         self.count.derivatives += steps
         if not found:
+            self.lost = -1
+            if len(gaps) >= self.many and np.isfinite(rate).all():
+                self.lost = int(np.argmax(np.abs(rate)))
             return None
         about = solution if isinstance(solution, About) else None
         of = about.of if about else Solution(*solution)

@@ -13,7 +13,7 @@ from solver.sharp.course import Course
 from solver.sharp.edges import CORRECTED, EdgeMechanics
 from solver.sharp.gaps import without_small
 from solver.sharp.jump import Jumps
-from solver.sharp.local import Astray, advance, confirmed
+from solver.sharp.local import Astray, advance, confirmed, led_by
 from solver.sharp.point import Before, Point
 from solver.sharp.states import Memory, States, Trace
 from solver.sharp.touch import Located, Nucleation
@@ -121,6 +121,7 @@ class Follower:
         walk = Walk(point)
         shown = point
         windows = len(point.gaps) >= self.edges.many
+        led: Point | None = None  # where an edge leads that had led astray
         while point.at != target.at:
             step = self._next_step(course, target.at, wanted, finest, lost, across)
             reached = None
@@ -138,9 +139,12 @@ class Follower:
                     coarse = error > 4 and abs(step) > 2 * self.resolution.finest and not across
                     if not coarse and (error > 1 or there or looks):
                         reached = confirmed(reached)
-            except Astray:
+            except Astray as astray:
                 far = point.at if reached is None else reached.at
-                point, windows, lost = walk.back(), False, np.inf
+                point, lost = walk.back(), np.inf
+                # once at a point the window moves to the edge outside that led astray
+                windows = point is not led and led_by(self.edges, point, astray.edge)
+                led = point
                 course = Course(point)
                 wanted = 0.5 * abs(far - point.at)
                 continue

@@ -37,7 +37,11 @@ _AWAY = 0.02  # further from where it was expected, in λ_min, no edge outside i
 
 
 class Astray(Exception):
-    """No equilibrium of all edges is where a window led to."""
+    """No equilibrium of all edges is where a window led to; because of this edge (-1: unknown)."""
+
+    def __init__(self, edge: int) -> None:
+        super().__init__()
+        self.edge = edge
 
 
 class Stretch:
@@ -48,16 +52,19 @@ class Stretch:
     edges : EdgeMechanics
     start : Point
         Solved with all gaps.
+    lead : int, optional
+        The edge, if another one is to lead.
     """
 
-    def __init__(self, edges: EdgeMechanics, start: Point) -> None:
+    def __init__(self, edges: EdgeMechanics, start: Point, lead: int | None = None) -> None:
         # A copy that knows no stretch: points hold theirs, and a circle would not be let go.
         self.edges, self.start = edges, copy(start)
         self.start.__dict__.pop("stretch", None)
         count = len(start.gaps)
         rates = np.abs(start.rate)
         folds = self._folds
-        lead = int(np.argmin(np.fmin(_MOVING * edges.wave / rates, folds)))
+        if lead is None:
+            lead = int(np.argmin(np.fmin(_MOVING * edges.wave / rates, folds)))
         half = min(_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
         self.first = (lead // 2 - half) % count
         self.inside = (self.first + np.arange(2 * half + 1)) % count
@@ -205,9 +212,11 @@ class LocalPoint(Point):
         return stretch.expected(self.__dict__["_local"], self.at)
 
     @cached_property
-    def _full(self) -> Point | None:
+    def _full(self) -> tuple[Point | None, int]:
+        """The equilibrium of all edges, or None and the edge that is lost."""
         edges: EdgeMechanics = self.__dict__["stretch"].edges
-        return edges.equilibrium(self._expected, self.at, CORRECTED * edges.wave)
+        found = edges.equilibrium(self._expected, self.at, CORRECTED * edges.wave)
+        return found, -1 if found else edges.lost
 
     def confirmed(self) -> Point:
         """The equilibrium of all edges.
@@ -218,19 +227,33 @@ class LocalPoint(Point):
             If there is none here.
         """
         stretch: Stretch = self.__dict__["stretch"]
-        full = self._full
+        full, lost = self._full
         if full is None:
-            raise Astray
-        away = float(np.abs(full.gaps - self._expected)[stretch.others].max())
-        if away > _AWAY * stretch.edges.wave:
-            raise Astray
+            raise Astray(lost)
+        away = np.abs(full.gaps - self._expected)
+        away[stretch.inside] = 0.0
+        if away.max() > _AWAY * stretch.edges.wave:
+            raise Astray(int(np.argmax(away)))
         return stretch.goes_on(full)
 
     @cached_property
     def field(self) -> GapField:
         """Field of the corrected edges; where their equilibrium is lost, of these."""
         edges: EdgeMechanics = self.__dict__["stretch"].edges
-        return self._full.field if self._full else edges.field(self.gaps, self.at)
+        full, _ = self._full
+        return full.field if full else edges.field(self.gaps, self.at)
+
+
+def led_by(edges: EdgeMechanics, point: Point, edge: int) -> bool:
+    """Let ``edge`` lead on from a point that is solved with all gaps; whether it did not before."""
+    before: Stretch | None = point.__dict__.get("stretch")
+    if edge < 0 or before is None or edge // 2 in before.inside:
+        return False
+    stretch = Stretch(edges, point, edge)
+    if not stretch.span > 0:
+        return False
+    point.__dict__["stretch"] = stretch
+    return True
 
 
 def confirmed(point: Point) -> Point:

@@ -9,12 +9,14 @@ from solver.profile import Array
 from solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.far import solve_many
+from solver.sharp.landing import landed
 from solver.sharp.rules import Kinds, Rules, choose_kinds
 from solver.sharp.source import Panels
 from solver.sharp.window import About, at_rest
 from solver.sharp.yielding import newton_step, yielding_gaps
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
+_SHRINKS = 0.7  # share of the last correction to which the next one has to come down
 
 
 @compiled
@@ -30,7 +32,10 @@ def equilibrium_many(
 ) -> tuple[bool, Array, About, Array, float, int]:
     """As :func:`solver.sharp.equilibrium.equilibrium`, in work that grows as the number of gaps.
 
-    With the solution comes what windows are opened with.
+    With the solution comes what windows are opened with. Where the edges are not stable on the
+    way, or the corrections hardly shrink, the iteration is not gone on with: of some 1,300 that
+    came to a minimum four had not been stable, and one in a hundred had a correction half as large
+    as the one before. Then the last correction takes the place of the rate.
     """
     at = gaps
     kinds = at_least(choose_kinds(map_gaps(gaps), law.digits, rules.counts), least)
@@ -43,7 +48,7 @@ def equilibrium_many(
         of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
         residual, drift = imbalance(of, law, panels)
         edges = yielding_gaps(of, parts, residual, drift, rules)
-        step, rate, slope, stable = newton_step(of, parts, edges, law.hold)
+        step, rate, slope, stable, change = newton_step(of, parts, edges, law.hold)
         size = np.abs(step).max()
         if not np.isfinite(of.pressure):
             break
@@ -55,8 +60,8 @@ def equilibrium_many(
             break
         travelled += step
         # not written as > : a size that is no number is a failure, too
-        within = size <= reach and size <= 2 * last and np.abs(travelled).max() <= reach
-        if not within or steps == _NEWTON_LIMIT:
+        within = size <= reach and size <= _SHRINKS * last and np.abs(travelled).max() <= reach
+        if not within or (patient and not stable) or steps == _NEWTON_LIMIT:
             break
         moved = moved_gaps(at, step)
         if not narrowest(moved) > 0:
@@ -67,8 +72,8 @@ def equilibrium_many(
         expected = size * (size / last) ** 2 if last < np.inf else size * size / law.longest
         if stable and expected <= law.coarse:
             steps += 1
-            of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 1, rules, panels)
+            of, parts = landed(at, prescribed, law.hold, of, parts, change, rules, panels)
             found = np.isfinite(of.pressure)
             break
         last = size
-    return found, at, at_rest(of, parts, edges), rate, slope, steps
+    return found, at, at_rest(of, parts, edges), rate if found else step, slope, steps

@@ -86,7 +86,7 @@ def descend_many(
             return gaps, LOST, fields, tangents, kinds
         residual, drift = imbalance(of, law, panels)
         edges = yielding_gaps(of, parts, residual, drift, rules)
-        step, _, _, stable = newton_step(of, parts, edges, law.hold)
+        step, _, _, stable, _ = newton_step(of, parts, edges, law.hold)
         size = np.abs(step).max()
         if stable and size < law.near:
             return moved_gaps(gaps, step), RESTING, fields, tangents, kinds

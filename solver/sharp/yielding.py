@@ -49,6 +49,20 @@ class Yielding(NamedTuple):
     follows: Array
 
 
+class Change(NamedTuple):
+    """What a step of all edges changes for every gap, to first order.
+
+    Attributes
+    ----------
+    potential : array, shape (N,)
+        Of the other gaps at its nodes, which stay where they are.
+    pressure : float
+    """
+
+    potential: Array
+    pressure: float
+
+
 @compiled
 def singular_gap(of: Solution, gap: int, block: Array, rules: Rules) -> tuple[Array, Array, Array]:
     """Own load, charges and area of the openings sqrt((1∓η)/(1±η)) at both ends of a gap."""
@@ -206,14 +220,15 @@ def newton_many(
     q0 s), and whether the edges are stable.
     """
     parts = yielding_gaps(of, gaps, residual, drift, rules)
-    return newton_step(of, gaps, parts, hold)
+    step, rate, slope, stable, _ = newton_step(of, gaps, parts, hold)
+    return step, rate, slope, stable
 
 
 @compiled
 def newton_step(
     of: Solution, gaps: Gaps, parts: Yielding, hold: Hold
-) -> tuple[Array, Array, float, bool]:
-    """As :func:`newton_many`, from the gaps' parts."""
+) -> tuple[Array, Array, float, bool, Change]:
+    """As :func:`newton_many`, from the gaps' parts; and what the step changes for every gap."""
     response = respond(gaps.tree, parts.own, parts.negative)
     charge = collect(gaps.tree, response, parts.alone)
     potential = distribute(gaps.tree, response, charge, np.zeros((0, 2)))
@@ -231,9 +246,11 @@ def newton_step(
     yields = hold.share * mean[1] - 2 * np.pi * hold.give
     rate = 2 * np.pi / yields  # dp/dd
     stable = (response.negative == 0 and yields < 0) or (response.negative == 1 and yields > 0)
-    step = motion[:, 0] - motion[:, 1] * (hold.share * mean[0] / yields)
+    pressure = -hold.share * mean[0] / yields
+    step = motion[:, 0] + motion[:, 1] * pressure
     slope = rate if hold.share != 0 else rate * mean[1] / (2 * np.pi)
-    return step, motion[:, 1] * rate, slope, stable
+    change = Change(potential[:, 0] + pressure * potential[:, 1], pressure)
+    return step, motion[:, 1] * rate, slope, stable, change
 
 
 @compiled
