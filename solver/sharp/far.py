@@ -149,6 +149,8 @@ def solve_many(
 ) -> tuple[Solution, Gaps]:
     """As :func:`solver.sharp.field.solve`, for many gaps; ``matrix`` and ``factor`` are empty.
 
+    Of S' there is the load alone, no solution.
+
     ``digits`` is -ln of the wanted accuracy of the interaction.
     """
     table = map_gaps(gaps)
@@ -167,7 +169,7 @@ def solve_many(
     tree = plant(table, offset, theta, weight / w, digits, True)
     response = respond(tree, own, np.zeros(count, dtype=np.int64))
     of_gaps = Gaps(blocks, inverse, w, tree, response)
-    solved = spread(of_gaps, kinds, offset, rules, rhs, np.zeros(rhs.shape))
+    solved = spread(of_gaps, kinds, offset, rules, rhs[:, :2].copy(), np.zeros((rhs.shape[0], 2)))
     load_mean = 0.0
     unit_mean = 0.0
     for i in range(theta.shape[0]):

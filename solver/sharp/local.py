@@ -126,6 +126,10 @@ class Stretch:
         point.__dict__["stretch"] = self
         return point
 
+    def begins(self, point: Point) -> bool:
+        """Whether it begins at this point."""
+        return not isinstance(point, LocalPoint) and self.start.field is point.field
+
     def holds(self, at: float) -> bool:
         """Whether the edges outside are still near their first state at ``at``."""
         return abs(at - self.start.at) <= self.span
@@ -275,14 +279,14 @@ def advance(edges: EdgeMechanics, course: Course, at: float, windows: bool) -> P
     point = course.point
     if len(point.gaps) < edges.many:
         return edges.equilibrium(course.gaps(at), at, reach)
+    if not windows:
+        reached = edges.equilibrium(course.gaps(at), at, reach)
+        return None if reached is None else reached.after(confirmed(point))
     stretch: Stretch | None = point.__dict__.get("stretch")
-    if stretch is None or not stretch.holds(at) or not windows:
+    if stretch is None or not (stretch.holds(at) or stretch.begins(point)):
         point = confirmed(point)
         stretch = Stretch(edges, point)
-        if not windows:
-            reached = edges.equilibrium(course.gaps(at), at, reach)
-            return None if reached is None else reached.after(point)
-        if not stretch.holds(at):
-            at = point.at + float(np.copysign(stretch.span, at - point.at))
         point.__dict__["stretch"] = stretch
+    if not stretch.holds(at):
+        at = point.at + float(np.copysign(stretch.span, at - point.at))
     return stretch.equilibrium(course.gaps(at), at, reach)
