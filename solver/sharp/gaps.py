@@ -49,15 +49,13 @@ def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
         order = np.argsort(centres)
         left, right = (centres + widths / 2)[order], (centres - widths / 2)[order]
         return np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1)
-    cuts = []
-    for left, right in gaps:
-        marks = [left]
-        for centre, width in sorted(zip(centres, widths, strict=True)):
-            if left < centre < right:
-                marks += [centre - width / 2, centre + width / 2]
-        marks.append(right)
-        cuts += [marks[i : i + 2] for i in range(0, len(marks), 2)]
-    return np.array(cuts)
+    order = np.argsort(centres, kind="stable")
+    centres, widths = centres[order], widths[order]
+    place = np.searchsorted(gaps[:, 0], centres) - 1
+    inside = (place >= 0) & (centres < gaps[place, 1])
+    seeds = np.stack([centres - widths / 2, centres + widths / 2], axis=1)[inside]
+    ends = np.insert(gaps.ravel(), np.repeat(2 * place[inside] + 1, 2), seeds.ravel())
+    return np.asarray(ends.reshape(-1, 2))
 
 
 def without_small(gaps: Array, smallest: float) -> Array | None:

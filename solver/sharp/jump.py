@@ -211,9 +211,8 @@ class Jumps:
         if len(runners) < 2:
             return False
         opening = end.field.solution.opening[runners]
-        stiffness = np.zeros((way.size, way.size))
-        stiffness[np.ix_(runners, runners)] = opening[:, None] * self.edges.stiffness(end, runners)
-        return self._hold_back(way, (stiffness + stiffness.T) * way)
+        stiffness = opening[:, None] * self.edges.stiffness(end, runners)
+        return self._hold_back(way[runners], (stiffness + stiffness.T) * way[runners])
 
     def _runners(self, way: Array) -> NDArray[np.int64]:
         return np.flatnonzero(np.abs(way) > _RAN * self.edges.wave)

@@ -60,7 +60,8 @@ def _felt_at(gap: Array, eta: Array, w: Array, felt: Array, theta: float) -> flo
     for i in range(eta.shape[0]):
         apart = x - eta[i]
         if apart == 0:
-            return per * felt[i]
+            above, below = felt[i], 1.0
+            break
         share = sign * w[i] / apart
         above += share * felt[i]
         below += share

@@ -68,11 +68,12 @@ class Stretch:
         half = min(_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
         self.first = (lead // 2 - half) % count
         self.inside = (self.first + np.arange(2 * half + 1)) % count
-        self.others = np.setdiff1d(np.arange(count), self.inside)
-        outside = np.delete(np.arange(2 * count).reshape(-1, 2), self.inside, axis=0).ravel()
-        still = _STILL * edges.wave / rates[outside].max()
+        out = np.ones(count, dtype=np.bool_)
+        out[self.inside] = False
+        self.others = np.flatnonzero(out)
+        still = _STILL * edges.wave / rates.reshape(-1, 2)[self.others].max()
         # how far the edges outside are near enough to their first state
-        before_fold = _BEFORE_FOLD * folds[outside].min()
+        before_fold = _BEFORE_FOLD * folds.reshape(-1, 2)[self.others].min()
         self.span = float(min(still, max(before_fold, _LEAST_SPAN * still)))
 
     @cached_property

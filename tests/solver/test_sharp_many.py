@@ -9,13 +9,14 @@ import pytest
 
 from adhesis import HalfSpace, Problem, self_affine_profile
 from solver.loop import run_loop
-from solver.sharp.balance import imbalance, symmetric, tangent_of
+from solver.sharp.balance import imbalance, moved_gaps, symmetric, tangent_of
 from solver.sharp.coordinate import map_gaps
 from solver.sharp.derivatives import derivatives
 from solver.sharp.edges import CORRECTED, EdgeMechanics
 from solver.sharp.far import solve_many
 from solver.sharp.field import solve_plain
 from solver.sharp.gaps import with_patches
+from solver.sharp.landing import landed
 from solver.sharp.linear import is_definite
 from solver.sharp.method import SharpMethod
 from solver.sharp.nearby import Window
@@ -25,7 +26,7 @@ from solver.sharp.solution import FIXED, Solution
 from solver.sharp.source import StressSource
 from solver.sharp.tree import plant
 from solver.sharp.window import known_about, open_window
-from solver.sharp.yielding import newton_many
+from solver.sharp.yielding import newton_many, newton_step, yielding_gaps
 from tests.support import next_to_a_fold
 
 
@@ -131,6 +132,33 @@ def loaded(profile):
     for depth in (0.0, 0.3, 0.5):
         state = method.follow(state, profile.h_max * (1 - depth)).states[-1]
     return method, state
+
+
+def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded):
+    """Openings and pressure after Newton's step against those of all gaps solved anew."""
+    method, state = loaded
+    edges = method.edges
+    law, panels = edges.law, edges.source.panels
+    kinds = choose_kinds(map_gaps(state.internal.gaps), law.digits, RULES.counts)
+    wrong, moved = [], []
+    for way in (4e-3, 2e-3):
+        at = state.separation * method.q0 * (1 - way)
+        given = at, law.hold, kinds, law.digits, 2, RULES, panels
+        of, parts = solve_many(state.internal.gaps, *given)
+        residual, drift = imbalance(of, law, panels)
+        yielding = yielding_gaps(of, parts, residual, drift, RULES)
+        step, _, _, stable, change = newton_step(of, parts, yielding, law.hold)
+        assert stable
+        ends = moved_gaps(state.internal.gaps, step)
+        after, _ = landed(ends, at, law.hold, of, parts, change, RULES, panels)
+        anew, _ = solve_many(ends, *given)
+        scale = np.abs(anew.opening).max()
+        wrong.append(np.abs(after.opening - anew.opening).max() / scale)
+        moved.append(np.abs(of.opening - anew.opening).max() / scale)
+        assert after.weight @ after.f == pytest.approx(2 * np.pi * at, rel=1e-12)
+        assert after.pressure == pytest.approx(anew.pressure, rel=1e-2 * moved[-1])
+    assert wrong[0] < 1e-2 * moved[0]
+    assert wrong[1] < 0.3 * wrong[0]
 
 
 @pytest.mark.parametrize("follow", [False, True])
