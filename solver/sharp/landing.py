@@ -103,18 +103,20 @@ def landed(
             there = _felt_at(of.table[k], rules.eta[rule], rules.w[rule], felt[own], theta[i])
             load[i, 0] = -rhs[i, 0] - pressure * rhs[i, 1] - weight[i] * there
     f = by_gaps(kinds, offset, rules, inverse, load)
-    mean = 0.0  # of the opening, times 2π
+    mean = 0.0  # of the opening, times 2π, and what it loses by a unit of p
+    by_pressure = 0.0
     for i in range(theta.shape[0]):
         mean += weight[i] * f[i, 0]
-    # share·mean - 2π give·p = 2π d
-    more = 2 * np.pi * (prescribed + hold.give * pressure) - hold.share * mean
-    more /= -of.resistance
+        by_pressure += weight[i] * of.solved[i, 1]
+    # share·mean - 2π give·p = 2π d, to rounding
+    more = hold.share * mean - 2 * np.pi * (prescribed + hold.give * pressure)
+    more /= hold.share * by_pressure + 2 * np.pi * hold.give
     pressure += more
     for i in range(theta.shape[0]):
         f[i, 0] -= more * of.solved[i, 1]
     separation = prescribed
     if hold.give != 0:
-        separation = (mean - more * of.unit_mean) / (2 * np.pi)
+        separation = (mean - more * by_pressure) / (2 * np.pi)
     if not definite:
         pressure = np.nan
     opening = edge_openings(f, slope, kinds, offset, rules.start, rules.ends)[:, 0].copy()
