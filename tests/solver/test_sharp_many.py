@@ -296,6 +296,31 @@ def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
     assert np.abs(found[0].field.gaps - found[1].field.gaps).max() < 0.1 * edges.wave
 
 
+def test_a_window_that_comes_to_where_it_has_no_field_is_left():
+    """Its edges run so far that the others, which follow, would overlap: they are held instead.
+
+    The descent ends where it does with dense matrices, with one gap less.
+    """
+    # fmt: off
+    gaps = np.array([
+        3.201424, 3.727505, 3.795059, 4.324042, 4.502841, 4.991897,
+        5.116157, 5.451749, 5.517615, 7.638616, 7.677602, 8.761642,
+        8.781749, 9.444071,
+    ]).reshape(-1, 2)
+    # fmt: on
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=8, h_rms=1e-6)
+    ends = []
+    for many in (6, 100):
+        edges = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 1e-3)).edges
+        edges.many = many
+        rest = gaps
+        while isinstance(rest, np.ndarray):
+            rest = edges.relax(rest, 1.98188e-3, CORRECTED * edges.wave)
+        ends.append(rest.field.gaps)
+    assert ends[0].shape == ends[1].shape == (6, 2)
+    assert np.abs(ends[0] - ends[1]).max() < 1e-3 * edges.wave
+
+
 @pytest.fixture
 def in_windows(loaded):
     """Edges that are moved in windows, and a point of theirs with what windows need."""
