@@ -5,7 +5,8 @@ followed in a window (:mod:`solver.sharp.outside`), at the cost of a field of a 
 the others stay near the state about which they are linear. A point found so is confirmed, that is
 solved with all gaps, before a state, a touch or a jump is told from it: an edge elsewhere may have
 passed a fold of its own, which no linear response shows. Then there is no such equilibrium, and the
-way from the last confirmed point on is gone once more, with all gaps.
+way from the last confirmed point on is gone once more: in a window around the edge that was lost
+and, if that leads astray, too, with all gaps.
 """
 
 from __future__ import annotations
