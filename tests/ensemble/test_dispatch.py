@@ -173,6 +173,25 @@ def test_what_is_queued_is_short_and_never_behind_a_long_task():
     assert channel.now <= 1.02 * channel.busy / 3
 
 
+def test_a_worker_has_its_next_task_before_its_result_is_collected():
+    """Collecting writes to a disk that may be slow: no worker waits for it."""
+    seconds, group_of = [1.0] * 20, dict.fromkeys(range(20), 0)
+    channel = SimulatedRanks(2, seconds)
+    schedule = Schedule(range(20), group_of, {0: 1.0})
+    in_flight: list[int] = []
+
+    def collect(outcome):
+        in_flight.append(master.in_flight)
+        channel.now += 0.4
+
+    master = Master(
+        *(channel, schedule, group_of, collect, Limits()), clock=channel.clock, sleep=channel.sleep
+    )
+    assert master.run() is None
+    assert in_flight == [2] * 18 + [1, 0]
+    assert channel.now < 1.1 * channel.busy / 2  # 40 % more if results were collected first
+
+
 def test_an_idle_master_rarely_looks():
     channel, _, _, _ = simulate(2, [60.0, 60.0])
     assert channel.looks / channel.now < 250

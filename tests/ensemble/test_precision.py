@@ -11,7 +11,7 @@ import pytest
 from ensemble.aggregate.statistics import estimates
 from ensemble.campaign.compare import compare
 from ensemble.campaign.file import load_campaign, parse_campaign
-from ensemble.campaign.precision import LEAST, enough, looks, narrow, relative_error
+from ensemble.campaign.precision import LEAST, enough, fewest, looks, narrow, relative_error
 from ensemble.errors import InputError
 from ensemble.interval import interval
 from ensemble.results.read import Results
@@ -84,6 +84,27 @@ def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
     assert 1.98 * rare.std(ddof=1) / np.sqrt(rare.size) / rare.mean() < 0.06
     assert not narrow(rare, 0.07)
     assert enough(np.full(200, np.nan), at, 0.05) == 200  # all failed: there is an end
+
+
+def test_a_wide_look_starts_the_count_of_looks_again():
+    """Two narrow looks, a wide one for a single large loss, then narrow ones: the first two lapse."""
+    at = looks(8, 8, 200)
+    losses = np.tile([0.9, 1.1], 100)
+    losses[40] = 1.6  # seen first at the look at 48
+    found = [narrow(losses[:n], 0.045) for n in at]
+    assert found[:7] == [False, False, False, True, True, False, True]  # 8, 16, … 56 realisations
+    assert all(found[6:])
+    assert enough(losses, at, 0.045) == at[9]
+
+
+@pytest.mark.parametrize(
+    ("first", "batch", "most", "count"),
+    [(8, 8, 200, 56), (32, 8, 200, 56), (30, 8, 200, 62), (64, 16, 200, 112), (8, 8, 40, 40)],
+)
+def test_fewest_realisations_are_those_of_a_cell_without_any_spread(first, batch, most, count):
+    at = looks(first, batch, most)
+    assert fewest(at) == count
+    assert enough(np.ones(most), at, 0.01) == count
 
 
 @pytest.mark.parametrize(
