@@ -12,6 +12,7 @@ import pytest
 from hypothesis import settings
 
 from tests.support.launchers import without_mpi, without_slurm
+from tests.support.progress import Waiting
 from tests.support.two_processes import rank_of, scheduler
 
 # The same examples every time. `make fuzz` draws anew, from a seed that it prints.
@@ -23,6 +24,14 @@ settings.load_profile(os.environ.get("ADHESIS_PROPERTIES", "same"))
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add ``--slow``."""
     parser.addoption("--slow", action="store_true", help="run what is marked slow, too")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Name the tests under way when none ends for long."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    if "PYTEST_XDIST_WORKER" not in os.environ and reporter is not None:
+        config.pluginmanager.register(Waiting(reporter.write_line), "waiting")
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -1,0 +1,53 @@
+"""Lines that name the tests under way while none ends, so that a long wait is never silent."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+_EVERY = 10.0  # s
+
+
+class Waiting:
+    """Write which tests are under way, whenever none has ended for some seconds.
+
+    Of several processes, the one that hands the tests out is told when each begins and ends.
+
+    Parameters
+    ----------
+    write : callable
+        Writes a line to the terminal.
+    every : float
+        Longest time without a line, in s.
+    """
+
+    def __init__(self, write: Callable[[str], None], every: float = _EVERY) -> None:
+        self._write = write
+        self._every = every
+        self._begun: dict[str, float] = {}
+        self._last = time.monotonic()
+        self._ended = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """Note the beginning of a test."""
+        self._begun[nodeid] = time.monotonic()
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        """Note the end of a test, of which pytest itself writes."""
+        self._begun.pop(nodeid, None)
+        self._last = time.monotonic()
+
+    def pytest_sessionfinish(self) -> None:
+        """Write no more."""
+        self._ended.set()
+
+    def _watch(self) -> None:
+        while not self._ended.wait(1.0):
+            now = time.monotonic()
+            if now - self._last < self._every:
+                continue
+            self._last = now
+            under_way = [f"{name} ({now - begun:.0f} s)" for name, begun in self._begun.items()]
+            self._write(f"waiting for {', '.join(under_way) or 'the tests to be collected'}")
