@@ -87,7 +87,7 @@ def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
 
 
 def test_a_wide_look_starts_the_count_of_looks_again():
-    """Two narrow looks, a wide one for a single large loss, then narrow ones: the first two lapse."""
+    """Two narrow looks lapse when a large loss makes the next one wide."""
     at = looks(8, 8, 200)
     losses = np.tile([0.9, 1.1], 100)
     losses[40] = 1.6  # seen first at the look at 48

@@ -221,7 +221,7 @@ def test_a_cancelled_job_ends_and_stays_away(cluster: Cluster, study: Path) -> N
     wait_for(lambda: done_tasks(study) > 0, "a first task", 60)
     cluster.call("scancel", number)
     wait_for(lambda: cluster.job(number)["JobState"] == "CANCELLED", "cancelled", 60)
-    time.sleep(2)
+    wait_for(lambda: number not in cluster.call("squeue", "--noheader", "--format=%i"), "gone", 60)
     job = cluster.job(number)
     assert (job["JobState"], job["Restarts"]) == ("CANCELLED", "0")
     assert 0 < done_tasks(study) < 40  # and the file is readable

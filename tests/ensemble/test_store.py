@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 
 import h5py
 import numpy as np
@@ -369,15 +368,12 @@ def test_a_full_disk_leaves_nothing(campaign):
 # ---------------------------------------------------------------- scale and lock
 
 
-def test_many_tasks_take_little_time_and_memory(tmp_path):
+def test_a_file_of_many_tasks_is_as_large_as_its_data(tmp_path):
     text = campaign_text(realisations="5000", load_steps="40", jumps="64")
     many = parse_campaign(text)
-    started = time.perf_counter()
     create(tmp_path / "many.h5", many)
-    took = time.perf_counter() - started
     size = (tmp_path / "many.h5").stat().st_size
     assert size < 1.02 * schema.file_size(many) + 100_000
-    assert took < 10
     with Results(tmp_path / "many.h5") as results:
         assert len(results) == 20_000
 
