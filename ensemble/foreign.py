@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 
 def printable(text: str) -> str:
     r"""Return a text for the terminal: control characters (colours, cursor, title) spelled out.
 
-    Line ends stay; ESC becomes ``\x1b``.
+    Line ends and tabs stay; ESC becomes ``\x1b``.
     """
     return "".join(
-        char if char == "\n" or char.isprintable() else char.encode("unicode_escape").decode()
+        char if char in "\n\t" or char.isprintable() else char.encode("unicode_escape").decode()
         for char in text
     )
 
@@ -29,3 +30,22 @@ def target(path: Path | str) -> Path:
     """
     path = Path(path)
     return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def markdown(text: str) -> str:
+    """Return a text as Markdown that shows it as it is: no image, link, HTML, code or table."""
+    return re.sub(r"([\\`*\[\]<>&|])", r"\\\1", one_line(text))
+
+
+def code_span(text: str) -> str:
+    """Return a text as Markdown that shows it as code."""
+    text = one_line(text)
+    ticks = fence(text, 1)
+    space = " " if "`" in text else ""
+    return f"{ticks}{space}{text}{space}{ticks}"
+
+
+def fence(text: str, least: int = 3) -> str:
+    """Return so many backticks that none in the text end what they begin."""
+    longest = max((len(run) for run in re.findall("`+", text)), default=0)
+    return "`" * max(least, longest + 1)
