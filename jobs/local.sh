@@ -33,7 +33,7 @@ stop() {
     signalled=yes
     if [ -n "$run" ]; then kill -s USR1 "$run" 2>/dev/null || true; fi
 }
-trap stop USR1 TERM INT
+trap stop USR1 TERM INT HUP
 "$adhesis" run "$campaign" --out "$out/$name.h5" --ranks "$ranks" </dev/null &
 run=$!
 while :; do
@@ -42,7 +42,7 @@ while :; do
     # A signal ends the wait, but not the run.
     if [ -z "$signalled" ]; then break; fi
 done
-trap - USR1 TERM INT
+trap - USR1 TERM INT HUP
 if [ "$code" = 75 ]; then
     echo "jobs/local.sh: stopped early; the same command resumes it ($out/$name.h5)" >&2
 fi

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -100,7 +101,9 @@ def in_installation(folder: Path) -> bool:
 
 
 def _marker(method: str) -> str:
-    return f"{method}.json"
+    """Name of the file that says that all is compiled; another one when more comes to be."""
+    made_by = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
+    return f"{method}-{made_by}.json"
 
 
 def _mark(method: str, to_installation: bool) -> None:
@@ -141,5 +144,6 @@ def _small_loops(method: str) -> None:
         run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
         if isinstance(chosen, SharpMethod) and work_of_adhesion > 0:
             run_loop(_crowded(), max_penetration=0.5, load_steps=2)
-        nodes = chosen.nodes or 256
-        chosen.fields(max(states, key=lambda state: state.patches), nodes)
+        state = max(states, key=lambda state: state.patches)
+        chosen.fields(state, chosen.nodes or 256)
+        chosen.openings(state)

@@ -357,7 +357,7 @@ sees_two() { # MPIRUN: do two ranks that it starts see each other?
     sizes=$(
         MPIRUN=$1
         allow_ranks 2 1
-        cd /tmp && timeout 60 "$1" -n 2 "$venv/bin/python" -c \
+        cd /tmp && timeout 60 "$1" -n 2 "$venv/bin/python" -P -c \
             'from mpi4py import MPI; print(MPI.COMM_WORLD.size, end=" ", flush=True)' \
             </dev/null
     ) || return 1

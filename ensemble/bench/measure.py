@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import resource
 import signal
 import subprocess
@@ -20,7 +19,7 @@ from typing import Literal
 
 from ensemble.bench.scenes import WARM_UP, Scene
 from ensemble.bench.tamaas import tamaas_loop
-from ensemble.run.launch import ONE_THREAD
+from ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
 from solver.loop import run_loop
 from solver.loop_result import LoopResult
 from solver.registry import MethodName, make_method
@@ -116,8 +115,8 @@ def measure(run: Run) -> Measurement:
     # What the warm-up does not meet may be compiled once; the next process finds it in the cache.
     for _ in range(2):
         child = subprocess.run(
-            [sys.executable, "-m", "ensemble.bench.measure", json.dumps(asdict(run))],
-            env={**os.environ, **ONE_THREAD},
+            python("-m", "ensemble.bench.measure", json.dumps(asdict(run))),
+            env=python_environment() | ONE_THREAD,
             capture_output=True,
             text=True,
             check=False,
@@ -220,4 +219,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     main()

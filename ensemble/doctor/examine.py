@@ -8,17 +8,22 @@ clean environment, so that a broken MPI can neither hang the caller nor be blame
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ensemble.run.launch import cores, launch_environment, launcher
+from ensemble.run.launch import (
+    cores,
+    end_with_parent,
+    launch_environment,
+    launcher,
+    python,
+    python_environment,
+)
 from ensemble.versions import installed, last_lines
 
 _RANKS = 2
@@ -132,14 +137,10 @@ class _Probe:
 
 def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
     with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
-        command = [*launch, sys.executable, "-m", "ensemble.doctor.probe", scratch]
+        command = [*launch, *python("-m", "ensemble.doctor.probe", scratch)]
         if launch:
             command.append("together")
-        env = launch_environment(_RANKS)
-        # The ranks must find this very package, whatever the working directory is.
-        here = str(Path(__file__).resolve().parent.parent.parent)
-        env["PYTHONPATH"] = os.pathsep.join(filter(None, [here, env.get("PYTHONPATH", "")]))
-        failure = _failure_of(command, env)
+        failure = _failure_of(command, python_environment(launch_environment(_RANKS)))
         reports = [_read_report(path) for path in sorted(Path(scratch).glob("report-*.json"))]
         return _Probe([report for report in reports if report], failure)
 
@@ -155,6 +156,7 @@ def _failure_of(command: list[str], env: dict[str, str]) -> str:
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
+            preexec_fn=end_with_parent,
         )
     except OSError as error:
         return str(error)

@@ -38,6 +38,7 @@ pre { background: #f6f6f6; padding: .8rem; font-size: .8rem; overflow-x: auto;
   .table { overflow: visible; }
 }
 """
+_PNG = b"\x89PNG\r\n\x1a\n"
 _DOTS_OF_ONE_COLUMN = 1200  # a figure with more pixels across fills two columns
 
 
@@ -49,7 +50,7 @@ def html_page(text: str, directory: Path) -> str:
     text : str
         The page. Links to files beside it stay links.
     directory : path
-        Where its images are.
+        Where its images are; none from elsewhere is taken.
     """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.add_render_rule("image", _image)
@@ -67,10 +68,12 @@ def html_page(text: str, directory: Path) -> str:
 
 def _image(renderer: Any, tokens: Sequence[Token], place: int, options: Any, env: Any) -> str:
     token = tokens[place]
-    path = env["directory"] / str(token.attrs["src"])
-    if not path.is_file():
+    # What is not a PNG of this folder itself, by its name or through a link, is not shown.
+    folder = env["directory"].resolve()
+    path = (folder / str(token.attrs["src"])).resolve()
+    data = path.read_bytes() if path.parent == folder and path.is_file() else b""
+    if not data.startswith(_PNG):
         return f"<em>{_escaped(token.content)}</em>"
-    data = path.read_bytes()
     # The width stands in the header of a PNG: four bytes from the sixteenth on.
     wide = int.from_bytes(data[16:20], "big") > _DOTS_OF_ONE_COLUMN
     return (

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ensemble.aggregate.average import Aggregate
+from ensemble.foreign import code_span, fence, markdown, printable
 from ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from ensemble.report import findings, paper
 from ensemble.report.axes import shown_cells
@@ -35,8 +36,8 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
 
     losses = loss_tables.losses(data)
     out = [
-        f"# Hysteresis loops of `{data.path.name}`",
-        " ".join(findings.verdict(data)),
+        f"# Hysteresis loops of {code_span(data.path.name)}",
+        markdown(" ".join(findings.verdict(data))),
         *_bullets(findings.missing(data)),
         _summary(data),
         left_out(data),
@@ -105,7 +106,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
             "### Failed tasks",
             *_bullets([f"row {row}: {text or 'no reason given'}" for row, text in data.failures]),
         ]
-    out += ["## The campaign", "```toml\n" + data.campaign.text.strip() + "\n```", _origin(data)]
+    out += ["## The campaign", _toml(data.campaign.text), _origin(data)]
     return "\n\n".join(part for part in out if part) + "\n"
 
 
@@ -168,12 +169,21 @@ def _footnote(data: Aggregate) -> str:
 
 def _origin(data: Aggregate) -> str:
     shown = ("adhesis_version", "commit", "created", "mpi", "hdf5", "fftw")
-    parts = [f"{name} {data.attributes[name]}" for name in shown if data.attributes.get(name)]
+    parts = [
+        f"{name} {markdown(str(data.attributes[name]))}"
+        for name in shown
+        if data.attributes.get(name)
+    ]
     return f"Results file: {'; '.join(parts)}." if parts else ""
 
 
+def _toml(text: str) -> str:
+    text = printable(text.replace("\r\n", "\n").strip())
+    return f"{fence(text)}toml\n{text}\n{fence(text)}"
+
+
 def _bullets(sentences: Sequence[str]) -> list[str]:
-    return ["\n".join(f"- {sentence}" for sentence in sentences)] if sentences else []
+    return ["\n".join(f"- {markdown(sentence)}" for sentence in sentences)] if sentences else []
 
 
 def _shown(item: Illustration, of_paper: bool) -> str:

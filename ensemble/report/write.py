@@ -9,6 +9,7 @@ from typing import IO
 
 from ensemble.aggregate.average import Aggregate, aggregate
 from ensemble.errors import InputError
+from ensemble.foreign import printable
 
 
 def write_report(
@@ -107,5 +108,5 @@ def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
         *findings.missing(data),
         *findings.quality(data),
     ):
-        print(sentence, file=stream)
+        print(printable(sentence), file=stream)
     print(f"report: {directory / 'report.md'}, {directory / 'report.html'}", file=stream)

@@ -23,6 +23,7 @@ import numpy as np
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
+from ensemble.foreign import target
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
     DATASETS,
@@ -54,7 +55,7 @@ def create(
     Parameters
     ----------
     path : path
-        Replaced if it exists.
+        Replaced if it exists; of a symbolic link, the file that it leads to.
     campaign : Campaign
     part : Part, optional
         Rows to lay out, if not all.
@@ -68,7 +69,7 @@ def create(
     InputError
         If the file cannot be written or the disk is too small.
     """
-    path = Path(path)
+    path = target(path)
     unfinished = path.with_name(f"{path.name}.part")
     needed = file_size(campaign, part)
     try:
@@ -77,7 +78,9 @@ def create(
             raise InputError(
                 f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
             )
-        with h5py.File(unfinished, "w", locking=False, track_order=False) as file:
+        # Made anew, so that a link of that name is removed and not followed.
+        unfinished.unlink(missing_ok=True)
+        with h5py.File(unfinished, "x", locking=False, track_order=False) as file:
             _lay_out(file, campaign, part)
             _describe(file, campaign, versions or {}, grown_from)
             if part != WHOLE:

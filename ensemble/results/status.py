@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.campaign.precision import relative_error
+from ensemble.foreign import one_line, printable
 from ensemble.results.read import Results
 from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful
@@ -68,7 +69,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
             "row": row,
             **{name: column[name][row].item() for name in _TASK},
             "seconds": float(column["wall_time"][row]),
-            "error": error,
+            "error": one_line(error),
         }
         for row, error in zip(failed.tolist(), errors, strict=True)
     ]
@@ -190,7 +191,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines += ["", *_doubt_lines(status["doubtful"])]
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"])]
-    return "\n".join(lines)
+    return printable("\n".join(lines))
 
 
 def _group_line(group: dict[str, Any], further: Sequence[str]) -> str:

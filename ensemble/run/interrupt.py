@@ -6,22 +6,35 @@ import os
 import re
 import signal
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Self
 
 from ensemble.errors import InputError
 
-SIGNALS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
 # Before the walltime ends, what is in flight is given up and the file closed: this long before (s),
 # but at most this share of the walltime.
 RESERVE, RESERVE_SHARE = 30.0, 0.1
+# Workers may take so long to answer a stop (s), and where there is a walltime at most this share of
+# the reserve: the rest is for closing the file and ending the ranks.
+GRACE, GRACE_SHARE = 30.0, 0.5
 
 _CLOCK = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(\d+):(\d+)")
 _UNITS = re.compile(r"(?:(\d+)d)?(?:(\d+)h)?(?:(\d+)m)?(?:(\d+(?:\.\d*)?)s?)?")
 
 
+def stop_signals() -> tuple[signal.Signals, ...]:
+    """Return the signals that stop a run in order.
+
+    SIGHUP, of a terminal that closes, is one of them unless it is ignored, as under ``nohup``.
+    """
+    always = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
+    ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    return always if ignored else (*always, signal.SIGHUP)
+
+
 class StopSignals:
-    """Notes SIGTERM, SIGUSR1 and SIGINT instead of dying from them; a context manager.
+    """Notes the signals of :func:`stop_signals` instead of dying from them; a context manager.
 
     A second SIGINT (Ctrl-C) interrupts at once.
 
@@ -36,7 +49,7 @@ class StopSignals:
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
-        for number in SIGNALS:
+        for number in stop_signals():
             self._before[number] = signal.signal(number, self._note)
         return self
 
@@ -71,10 +84,26 @@ def parse_duration(text: str) -> float:
     return seconds
 
 
+@dataclass(frozen=True)
+class Deadline:
+    """When a run has to stop.
+
+    Attributes
+    ----------
+    at : float
+        When what is in flight is given up, as ``time.time()`` counts.
+    grace : float
+        How long workers may take from then on, in s.
+    """
+
+    at: float
+    grace: float
+
+
 def deadline(
     walltime: float | None, started: float, environ: Mapping[str, str] = os.environ
-) -> float | None:
-    """Return when to give up what is in flight, as ``time.time()`` counts; None if never.
+) -> Deadline | None:
+    """Return when to give up what is in flight; None if never.
 
     Parameters
     ----------
@@ -85,15 +114,17 @@ def deadline(
         When this process started.
     """
     if walltime is not None:
-        return started + walltime - min(RESERVE, RESERVE_SHARE * walltime)
+        return _before(started + walltime, started)
     try:
-        end = float(environ["SLURM_JOB_END_TIME"])
+        return _before(float(environ["SLURM_JOB_END_TIME"]), started)
     except (KeyError, ValueError):
         pass
-    else:
-        return end - min(RESERVE, RESERVE_SHARE * max(0.0, end - started))
     try:
-        limit = float(environ["PBS_WALLTIME"])
+        return _before(started + float(environ["PBS_WALLTIME"]), started)
     except (KeyError, ValueError):
         return None
-    return started + limit - min(RESERVE, RESERVE_SHARE * limit)
+
+
+def _before(end: float, started: float) -> Deadline:
+    reserve = min(RESERVE, RESERVE_SHARE * max(0.0, end - started))
+    return Deadline(end - reserve, min(GRACE, GRACE_SHARE * reserve))

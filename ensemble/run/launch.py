@@ -1,20 +1,27 @@
 """Starting ranks from within a program: which ``mpirun``, how many cores, which environment.
 
+Every Python process that adhesis starts is started by :func:`python` in :func:`python_environment`:
+neither lets it import from the working directory, where a user's ``numpy.py`` may lie.
+
 One thread a rank: the ranks share the cores among themselves, small matrices gain nothing from
 threads, and sums split over a number of threads would tie the last bits to it.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+import sysconfig
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
+
+from ensemble.run.interrupt import stop_signals
 
 # What a launcher tells its ranks. A program that passes it on to a launcher of its own is taken
 # for one of those ranks, and both wait for each other or end without a word.
@@ -28,6 +35,34 @@ ONE_THREAD = dict.fromkeys(
 # Set for ranks that :func:`run_ranks` starts: they start none themselves.
 STARTED = "ADHESIS_STARTED"
 KILLED = 137  # what a shell says of a process that signal 9 has ended
+
+
+_PR_SET_PDEATHSIG = 1  # of Linux's prctl
+_LIBC = ctypes.CDLL(None)
+
+
+def python(*words: str) -> list[str]:
+    """Return the command that starts this interpreter, with nothing of the working directory."""
+    return [sys.executable, "-P", *words]
+
+
+def python_environment(environ: Mapping[str, str] = os.environ) -> dict[str, str]:
+    """Return an environment in which a process of :func:`python` finds this very package.
+
+    PYTHONPATH keeps its entries but the empty ones, which stand for the working directory.
+    """
+    here = str(Path(__file__).resolve().parent.parent.parent)
+    entries = [entry for entry in environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    # as an entry of PYTHONPATH, packages of the interpreter's own would come before its library
+    if here not in (sysconfig.get_path("purelib"), sysconfig.get_path("platlib")):
+        entries.insert(0, here)
+    return {**environ, "PYTHONPATH": os.pathsep.join(entries)}
+
+
+def end_with_parent() -> None:
+    """Let the system end this process (SIGTERM) when its parent ends, however that ends; Linux."""
+    if sys.platform == "linux":
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def cores() -> int:
@@ -84,7 +119,8 @@ def run_ranks(
 ) -> int:
     """Start ranks with a command of adhesis and wait for their end; returns the exit code.
 
-    SIGTERM, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C ends them at once.
+    SIGTERM, SIGHUP, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C ends them at once.
+    If this process is killed, the launcher ends them.
 
     Parameters
     ----------
@@ -97,15 +133,14 @@ def run_ranks(
         What a rank runs instead of adhesis, before the words.
     """
     # An error that a rank does not handle must end the others, too: mpi4py sees to it.
-    program = program or [sys.executable, "-m", "mpi4py", "-m", "ensemble"]
-    here = str(Path(__file__).resolve().parent.parent.parent)
-    env = launch_environment(ranks) | ONE_THREAD | {STARTED: "1"}
-    env["PYTHONPATH"] = os.pathsep.join(filter(None, [here, env.get("PYTHONPATH", "")]))
+    program = program or python("-m", "mpi4py", "-m", "ensemble")
+    env = python_environment(launch_environment(ranks)) | ONE_THREAD | {STARTED: "1"}
     process = subprocess.Popen(
         [launcher, "-n", str(ranks), *program, *words],
         env=env,
         stdin=subprocess.DEVNULL,
         process_group=0,  # Ctrl-C would make mpirun end its ranks; here it becomes a stop in order
+        preexec_fn=end_with_parent,  # else ranks would go on, and keep the results file locked
     )
     with _passed_on(process):
         return process.wait()
@@ -122,8 +157,7 @@ def _passed_on(process: subprocess.Popen[bytes]) -> Iterator[None]:
         process.send_signal(signal.SIGTERM if again else signal.SIGUSR1)
         interrupted = interrupted or number == signal.SIGINT
 
-    numbers = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
-    before = {number: signal.signal(number, stop) for number in numbers}
+    before = {number: signal.signal(number, stop) for number in stop_signals()}
     try:
         yield
     finally:

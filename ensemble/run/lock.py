@@ -4,6 +4,9 @@ HDF5 keeps no second writer out (under MPI it takes no lock at all). The lock is
 system's, on a file beside the results: it ends with the process that holds it, however that ends,
 and a lock file left over by a killed run locks nothing. Ranks may outlive a killed launcher by
 seconds; each rank that writes therefore holds its share, and a new run waits for the last of them.
+
+The lock belongs to the file itself: a symbolic link to a results file has no lock of its own. Where
+others can write to the folder, a link in place of the lock is refused, not followed.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import fcntl
 import json
 import os
 import socket
+import stat
 import sys
 import time
 from collections.abc import Mapping
@@ -20,11 +24,16 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, WriteError
+from ensemble.foreign import one_line, target
 
 # Two bytes far beyond the text: the run as a whole, and the ranks that write.
 _RUN, _WRITERS = 1 << 30, (1 << 30) + 1
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
+_FULL = {errno.ENOSPC, errno.EDQUOT}
+# O_NONBLOCK: a pipe in place of the lock would be waited for.
+_SAFELY = os.O_NOFOLLOW | os.O_NONBLOCK
+_LONGEST_CARD = 4096  # bytes
 _PAUSE = 0.1
 
 
@@ -39,7 +48,7 @@ class RunLock:
 
     def __init__(self, results: Path | str) -> None:
         self._results = Path(results)
-        self.path = self._results.with_name(f"{self._results.name}.lock")
+        self.path = _lock_of(self._results)
         self._descriptor: int | None = None
         self._owner = False
 
@@ -57,6 +66,8 @@ class RunLock:
         ------
         InputError
             If another run holds it, or the folder cannot be written.
+        WriteError
+            If the disk is full.
         """
         deadline = time.monotonic() + patience
         told = False
@@ -124,9 +135,23 @@ class RunLock:
     def _open(self) -> None:
         if self._descriptor is None:
             try:
-                self._descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+                descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | _SAFELY, 0o666)
             except OSError as error:
-                raise InputError(f"{self._results} cannot be written: {error.strerror}") from error
+                if error.errno == errno.ELOOP:
+                    raise self._no_lock() from None
+                kind = WriteError if error.errno in _FULL else InputError
+                raise kind(f"{self._results} cannot be written: {error.strerror}") from error
+            found = os.fstat(descriptor)
+            # Another name of it would be that of a file which the lock's text would replace.
+            if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+                os.close(descriptor)
+                raise self._no_lock()
+            self._descriptor = descriptor
+
+    def _no_lock(self) -> InputError:
+        return InputError(
+            f"{self.path} is a link or no ordinary file, and not the lock of a run: remove it"
+        )
 
     def _lock(self, byte: int, kind: int) -> bool:
         assert self._descriptor is not None
@@ -152,12 +177,28 @@ class RunLock:
             "ranks": ranks,
             "since": datetime.now().astimezone().isoformat(timespec="seconds"),
         }
-        os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, json.dumps(card).encode(), 0)
+        try:
+            os.ftruncate(self._descriptor, 0)
+            os.pwrite(self._descriptor, json.dumps(card).encode(), 0)
+        except OSError as error:
+            self.release()
+            raise WriteError(f"{self.path} cannot be written: {error.strerror}") from error
 
     def _holder(self) -> str:
-        card = _card(self.path)
+        try:
+            descriptor = os.open(self.path, os.O_RDONLY | _SAFELY)
+        except OSError:
+            return ""
+        try:
+            card = _card(descriptor)
+        finally:
+            os.close(descriptor)
         return f" ({described(card)})" if card else ""
+
+
+def _lock_of(results: Path) -> Path:
+    results = target(results)
+    return results.with_name(f"{results.name}.lock")
 
 
 def holder(results: Path | str) -> dict[str, Any] | None:
@@ -166,16 +207,14 @@ def holder(results: Path | str) -> dict[str, Any] | None:
     Takes nothing that a run would wait for longer than a moment. Where the file system has no locks
     nothing is known, and None is returned.
     """
-    path = Path(results)
-    path = path.with_name(f"{path.name}.lock")
     try:
-        descriptor = os.open(path, os.O_RDONLY)
+        descriptor = os.open(_lock_of(Path(results)), os.O_RDONLY | _SAFELY)
     except OSError:
         return None
     try:
         fcntl.lockf(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB, 1, _RUN)
     except OSError as error:
-        return None if error.errno in _UNSUPPORTED else _card(path) or {}
+        return None if error.errno in _UNSUPPORTED else _card(descriptor) or {}
     finally:
         os.close(descriptor)
     return None
@@ -185,15 +224,15 @@ def described(card: Mapping[str, Any]) -> str:
     """Return in words which run holds a lock."""
     if not card:
         return "of which nothing more is known"
-    return (
+    return one_line(
         f"host {card['host']}, process {card['pid']}, {card['ranks']} ranks, since {card['since']}"
     )
 
 
-def _card(path: Path) -> dict[str, Any] | None:
+def _card(descriptor: int) -> dict[str, Any] | None:
     """Read what the holder of a lock has written into it."""
     try:
-        card = json.loads(path.read_text())
+        card = json.loads(os.pread(descriptor, _LONGEST_CARD, 0))
         return {name: card[name] for name in ("host", "pid", "ranks", "since")}
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -14,10 +14,11 @@ import h5py
 
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
+from ensemble.foreign import target
 from ensemble.results.write import Writer
 from ensemble.run.attempt import Compute, Outcome, StopCheck
 from ensemble.run.dispatch import Limits, Master, Worker, work_alone
-from ensemble.run.interrupt import StopSignals
+from ensemble.run.interrupt import GRACE, Deadline, StopSignals
 from ensemble.run.lock import RunLock
 from ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
 from ensemble.run.progress import Counts, ProgressLine
@@ -106,8 +107,8 @@ class Options:
         Rows to compute again.
     max_failures : int, optional
         So many failed tasks stop the run.
-    deadline : float, optional
-        When to give up what is in flight, as ``time.time()`` counts.
+    deadline : Deadline, optional
+        When to give up what is in flight.
     patience : float
         How long to wait for another run to let go of the results file, in s.
     """
@@ -115,7 +116,7 @@ class Options:
     part: Part = WHOLE
     redo: Selection | None = None
     max_failures: int | None = 20
-    deadline: float | None = None
+    deadline: Deadline | None = None
     patience: float = 10.0
 
 
@@ -180,7 +181,7 @@ def run_campaign(
         If workers did not stop in time when told to; the results file is sound.
     """
     options, engine = options or Options(), engine or Engine()
-    path = Path(path)
+    path = target(path)
     if comm is not None and comm.size == 1:
         comm = None
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
@@ -261,6 +262,7 @@ class _Session:
             stop=self._stop,
             time_left=self._time_left,
             task_seconds=campaign.solver.time_limit,
+            grace=GRACE if options.deadline is None else options.deadline.grace,
         )
 
     def alone(self) -> str | None:
@@ -396,7 +398,7 @@ class _Session:
 
     def _time_left(self) -> float | None:
         deadline = self._options.deadline
-        return None if deadline is None else deadline - time.time()
+        return None if deadline is None else deadline.at - time.time()
 
     @staticmethod
     def _estimate(schedule: Schedule, in_flight: float, workers: int) -> float | None:

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from ensemble.errors import InputError
+from ensemble.foreign import printable
 from ensemble.trace.prepare import Prepared, prepare_trace
 from ensemble.trace.read import Trace, read_trace
 from ensemble.trace.units import counted, length_text, parse_length
@@ -95,7 +96,7 @@ def what_was_read(prepared: Prepared) -> str:
     ]
     lines += [f"            {said}" for said in trace.said]
     lines += [f"{step.name:<11} {step.said}" for step in prepared.steps]
-    return "\n".join(lines)
+    return printable("\n".join(lines))
 
 
 def given(args: argparse.Namespace) -> list[str]:

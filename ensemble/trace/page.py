@@ -8,6 +8,7 @@ import re
 from importlib import metadata
 from pathlib import Path
 
+from ensemble.foreign import code_span, markdown, printable
 from ensemble.trace.answer import _DOUBTS, COVERAGE, Answer, Quantity
 from ensemble.trace.figures import Drawn, draw_all
 from ensemble.trace.units import counted, length_text
@@ -45,7 +46,7 @@ def summary(answer: Answer) -> str:
         + f" of the loss (standard uncertainties; the interval is {COVERAGE:g} times their sum)",
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
-    return "\n".join(lines)
+    return printable("\n".join(lines))
 
 
 def write_page(answer: Answer, folder: Path) -> None:
@@ -89,7 +90,7 @@ def _blocks(answer: Answer) -> list[Block]:
     )
     half_space = cycle.half_space
     blocks: list[Block] = [
-        ("h1", f"From the trace {trace.path.name} to its loss"),
+        ("h1", f"From the trace {markdown(trace.path.name)} to its loss"),
         (
             "p",
             f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area, pull-off at a mean "
@@ -99,12 +100,12 @@ def _blocks(answer: Answer) -> list[Block]:
             f"again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} Pa, "
             f"ν = {half_space.poisson:g}.",
         ),
-        *(("warning", warning) for warning in answer.warnings),
+        *(("warning", markdown(warning)) for warning in answer.warnings),
         ("h2", "What was read"),
         (
             "list",
             [
-                [f"`{trace.path.name}`: " + "; ".join(trace.said)],
+                [f"{code_span(trace.path.name)}: {markdown('; '.join(trace.said))}"],
                 [
                     f"{trace.points} points, step {length_text(trace.step, 5)}, "
                     f"length {length_text(trace.length, 5)}, "
@@ -114,7 +115,7 @@ def _blocks(answer: Answer) -> list[Block]:
             ],
         ),
         ("h2", "What was done to it"),
-        ("list", [[f"**{step.name}**: {step.said}"] for step in prepared.steps]),
+        ("list", [[f"**{step.name}**: {markdown(step.said)}"] for step in prepared.steps]),
         (
             "p",
             "One period: the last 5 % of the trace fade out over the first 5 %, which fade in, "
@@ -262,7 +263,7 @@ def _html(blocks: list[Block], figures: list[Drawn], answer: Answer) -> str:
     out = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',
-        f"<title>{html.escape(answer.prepared.trace.path.name)}: its loss</title>",
+        f"<title>{html.escape(printable(answer.prepared.trace.path.name))}: its loss</title>",
         f"<style>{_STYLE}</style></head><body>",
     ]
     for kind, content in blocks:
@@ -301,8 +302,23 @@ def _version() -> str:
         return "(not installed)"
 
 
+# A code span, an escaped character, or the beginning or end of bold text.
+_MARKUP = re.compile(
+    r"(?P<ticks>`+)(?P<code>.+?)(?<!`)(?P=ticks)(?!`)|\\(?P<char>.)|(?P<bold>\*\*)"
+)
+
+
 def _inline(text: str) -> str:
-    """Bold and code of the page's own text as HTML; everything else is escaped."""
-    safe = html.escape(text, quote=False)
-    safe = re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", safe)
-    return re.sub(r"`(.+?)`", r"<code>\1</code>", safe)
+    """Return a line of Markdown as HTML: bold and code; everything else is text."""
+    out, place, is_bold = [], 0, False
+    for found in _MARKUP.finditer(text):
+        out.append(html.escape(text[place : found.start()], quote=False))
+        place = found.end()
+        if found["bold"]:
+            is_bold = not is_bold
+            out.append("<b>" if is_bold else "</b>")
+        elif found["code"]:
+            out.append(f"<code>{html.escape(found['code'].strip(), quote=False)}</code>")
+        else:
+            out.append(html.escape(found["char"], quote=False))
+    return "".join([*out, html.escape(text[place:], quote=False)])

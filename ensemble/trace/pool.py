@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import pickle
 import queue
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
-from ensemble.run.launch import ONE_THREAD
+from ensemble.run.launch import ONE_THREAD, python, python_environment
 from ensemble.trace.worker import FAILURES, Job, failure, run
 
 Result = dict[str, Any]
@@ -92,15 +89,11 @@ class Pool:
 
     def _start(self) -> None:
         worker = len(self._workers)
-        root = str(Path(__file__).resolve().parents[2])
-        path = os.environ.get("PYTHONPATH")
-        environment = os.environ | ONE_THREAD
-        environment["PYTHONPATH"] = root + (os.pathsep + path if path else "")
         process = subprocess.Popen(
-            [sys.executable, "-m", "ensemble.trace.worker"],
+            python("-m", "ensemble.trace.worker"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env=environment,
+            env=python_environment() | ONE_THREAD,
         )
         self._workers.append(process)
         threading.Thread(target=self._listen, args=(worker, process), daemon=True).start()

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ensemble.run.launch import end_with_parent
+
 if TYPE_CHECKING:
     from solver.registry import MethodName
 
@@ -131,4 +133,5 @@ def _number(loop: Any, name: str) -> float | None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     main()

@@ -13,7 +13,7 @@ import pytest
 from ensemble import versions
 from ensemble.doctor import examine as doctor
 from ensemble.run import launch
-from solver import warm
+from solver import code_cache, warm
 from solver.code_cache import CodeFiles
 
 
@@ -126,13 +126,13 @@ def test_doctor_tells_whether_code_is_compiled(
 ) -> None:
     files = CodeFiles("key")
     monkeypatch.setattr(warm, "code_files", lambda to_installation=False: files)
-    monkeypatch.setattr(files, "_places", [tmp_path / "key"])
+    monkeypatch.setattr(files, "_places", [code_cache._Place(tmp_path / "key", installed=True)])
     before = doctor.compiled_code()
     assert (before.ok, before.needed) == (False, False)
     assert "sharp and grid not yet" in before.text
     (tmp_path / "key").mkdir()
     for method in warm.COMPILED_METHODS:
-        (tmp_path / "key" / f"{method}.json").write_text("{}")
+        (tmp_path / "key" / warm._marker(method)).write_text("{}")
     after = doctor.compiled_code()
     assert after.ok
     assert str(tmp_path / "key") in after.text

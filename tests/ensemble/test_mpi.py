@@ -28,6 +28,7 @@ from tests.support.campaign_support import (
     differences,
     done_rows,
     environment,
+    has_ended,
     kill_all,
     ranks_of,
     start,
@@ -121,8 +122,16 @@ def test_a_run_starts_its_own_ranks(tmp_path, whole):
         assert sentence in process.stderr
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number):
+@pytest.fixture
+def hangup_counts():
+    """SIGHUP as from a terminal, even if the tests run under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number, hangup_counts):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = start("run", path, "--out", out, "--ranks", "3", fake="hold=1")
     wait_until(lambda: done_rows(out) >= 1)
@@ -130,6 +139,22 @@ def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 75, errors
     assert "stopped early: SIGUSR1 received" in errors
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system ends children on Linux alone")
+def test_ranks_end_with_a_run_that_is_killed_and_the_next_one_resumes(tmp_path, whole):
+    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
+    process = start("run", path, "--out", out, "--ranks", "3", fake="hold=1")
+    wait_until(lambda: done_rows(out) >= 1)
+    (launcher,) = ranks_of(process.pid)
+    left = [launcher, *ranks_of(launcher)]
+    assert len(left) == 4
+    process.kill()
+    process.wait()
+    wait_until(lambda: all(map(has_ended, left)))
+    resumed = adhesis("run", path, "--out", out, fake="")
+    assert resumed.returncode == 0, resumed.stderr
+    assert differences(out, whole) == []
 
 
 def test_a_killed_rank_ends_with_what_to_do(tmp_path):

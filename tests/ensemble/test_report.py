@@ -29,6 +29,8 @@ from ensemble.report.figures import fields as field_figures
 from ensemble.report.figures import loops, losses
 from ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
 from ensemble.report.figures.style import save, spread_out, style
+from ensemble.report.html import html_page
+from ensemble.report.page import write_page
 from ensemble.report.tables import losses as loss_tables
 from ensemble.report.tables import mechanisms as mechanism_tables
 from ensemble.report.tables.table import number
@@ -693,6 +695,29 @@ def test_the_html_page_needs_no_other_file(report):
         for table in re.findall(r"(?:^\|.*\n)+", markdown, re.MULTILINE)
         for line in table.splitlines()[2:]
     )
+
+
+def test_texts_of_a_results_file_are_shown_as_texts(data, tmp_path):
+    """An error text that asks for a file by its path does not get it, nor does any other text."""
+    secret = tmp_path / "secret.png"
+    secret.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(100))
+    hostile = f"![x]({secret}) <script> | `a` \x1b[31m\n\n![y]({secret})\n"
+    text = f"# {hostile}```\n![z]({secret})\n<script>\n````\n{data.campaign.text}"
+    evil = replace(
+        data,
+        path=Path(f"![name]({secret.name})`.h5"),
+        failures=[(3, hostile)],
+        attributes={"adhesis_version": hostile, "mpi": hostile},
+        campaign=replace(data.campaign, text=text),
+    )
+    page = write_page(evil, [])
+    assert "\x1b" not in page
+    (tmp_path / "report").mkdir()
+    for folder in (tmp_path / "report", tmp_path):  # also where the image is the report's own
+        html = html_page(page, folder)
+        assert "<img" not in html
+        assert "<script" not in html
+        assert html.count(f"![y]({secret})") == 4  # failure, two attributes, campaign
 
 
 def test_campaigns_that_come_along_are_comparable_with_the_paper_campaign():

@@ -19,7 +19,10 @@ from ensemble.campaign.file import load_campaign
 from ensemble.errors import InputError
 from ensemble.results.layout import create
 from ensemble.results.write import Writer
-from ensemble.run.interrupt import deadline, parse_duration
+from ensemble.run import session
+from ensemble.run.interrupt import StopSignals, deadline, parse_duration
+from ensemble.run.plan import Plan
+from ensemble.run.session import Engine, Options
 from tests.support.campaign_support import (
     TESTS,
     adhesis,
@@ -428,11 +431,41 @@ def test_bad_durations(text):
 
 
 def test_the_deadline_of_the_batch_system():
-    assert deadline(1000.0, 5.0, {}) == 975.0
-    assert deadline(20.0, 5.0, {}) == 23.0
+    for walltime, environ, end in (
+        (1000.0, {}, 1005.0),
+        (70.0, {}, 75.0),
+        (20.0, {}, 25.0),
+        (0.5, {}, 5.5),
+        (None, {"SLURM_JOB_END_TIME": "10005"}, 10005.0),
+        (None, {"PBS_WALLTIME": "100"}, 105.0),
+    ):
+        found = deadline(walltime, 5.0, environ)
+        assert found.at == end - min(30.0, 0.1 * (end - 5.0))
+        # half of what is kept in reserve is left when workers that did not answer are ended
+        assert found.at + found.grace == pytest.approx(0.5 * (found.at + end))
     assert deadline(None, 5.0, {}) is None
-    assert deadline(None, 5.0, {"SLURM_JOB_END_TIME": "10005"}) == 9975.0
-    assert deadline(None, 5.0, {"PBS_WALLTIME": "100"}) == 95.0
+
+
+def test_workers_have_as_long_to_answer_as_the_walltime_leaves(tmp_path):
+    campaign = load_campaign(write_campaign(tmp_path))
+    plan = Plan(campaign.tasks(), [0], 0, 0)
+    for options, grace in ((Options(), 30.0), (Options(deadline=deadline(70.0, 0.0, {})), 3.5)):
+        found = session._Session(campaign, plan, None, options, StopSignals(), Engine())
+        assert found._limits.grace == pytest.approx(grace)
+
+
+def test_a_hangup_stops_a_run_unless_it_is_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    try:
+        with StopSignals() as signals:
+            signal.raise_signal(signal.SIGHUP)
+        assert signals.received == "SIGHUP"
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+        with StopSignals() as signals:
+            signal.raise_signal(signal.SIGHUP)
+        assert signals.received is None
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_the_fake_tasks_depend_on_nothing_but_the_task(tmp_path):

@@ -15,12 +15,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from markdown_it import MarkdownIt
 from matplotlib.image import imread
 
 from adhesis import Problem, make_method, run_loop, self_affine_profile
 from ensemble.command.main import main
 from ensemble.trace import answer as answers
-from ensemble.trace.answer import COVERAGE, NoAnswer, loss_of_trace, make_cycle, run_plan
+from ensemble.trace import page
+from ensemble.trace.answer import COVERAGE, Answer, NoAnswer, loss_of_trace, make_cycle, run_plan
+from ensemble.trace.options import what_was_read
 from ensemble.trace.plan import Plan, make_plan
 from ensemble.trace.pool import Pool
 from ensemble.trace.prepare import Prepared, prepare_trace
@@ -111,16 +114,16 @@ def test_the_document_says_what_was_read_done_and_found(document: dict[str, Any]
 def test_the_page_holds_its_figures_and_needs_nothing_else(folder: Path) -> None:
     made = [*FIGURES, "trace.html", "trace.json", "trace.md"]
     assert sorted(p.name for p in folder.iterdir()) == sorted(made)
-    page = (folder / "trace.html").read_text()
-    assert page.count('src="data:image/png;base64,') == len(FIGURES)
-    assert re.findall(r'(?:src|href)="(?!data:)', page) == []
+    html = (folder / "trace.html").read_text()
+    assert html.count('src="data:image/png;base64,') == len(FIGURES)
+    assert re.findall(r'(?:src|href)="(?!data:)', html) == []
     text = (folder / "trace.md").read_text()
     for name in FIGURES:
         assert f"]({name})" in text
         assert imread(folder / name).shape[0] > 300
     for words in ("decimal commas", "tilt and bow", "interval", "taper 10 %", "γ, J/m²"):
         assert words in text, words
-        assert words in page, words
+        assert words in html, words
 
 
 def small_plan() -> tuple[Prepared, Any, Plan]:
@@ -142,14 +145,44 @@ def spoiled(plan: Plan, name: str) -> Plan:
     return dataclasses.replace(plan, jobs=jobs)
 
 
-def test_a_variant_that_fails_is_a_warning_and_the_answer_stands() -> None:
+@pytest.fixture(scope="module")
+def spoiled_answer() -> Answer:
     trace, cycle, plan = small_plan()
-    found = run_plan(trace, cycle, spoiled(plan, "blend 10 %"))
+    return run_plan(trace, cycle, spoiled(plan, "blend 10 %"))
+
+
+def test_a_variant_that_fails_is_a_warning_and_the_answer_stands(spoiled_answer: Answer) -> None:
+    trace, cycle, plan = small_plan()
+    found = spoiled_answer
     assert any("“blend 10 %” did not end (ValueError" in warning for warning in found.warnings)
     assert "continuation" not in found.loss.doubts
     assert found.loss.value > 0
     with pytest.raises(NoAnswer, match="could not be run to its end: ValueError"):
         run_plan(trace, cycle, spoiled(plan, "answer"))
+
+
+def test_the_page_shows_names_headers_and_warnings_as_texts(spoiled_answer: Answer) -> None:
+    """Neither page has an element that a name or a header of a file brought along."""
+    before = spoiled_answer.prepared
+    said = ("text", "channel ![z](/etc/hostname) <script>x</script> \x1b[31m")
+    evil = dataclasses.replace(before.trace, path=Path("![x](y.png)`<script>`|.txt"), said=said)
+    answer = dataclasses.replace(
+        spoiled_answer,
+        prepared=dataclasses.replace(before, trace=evil),
+        warnings=("a <script> of ![w](/etc/passwd)",),
+    )
+    blocks = page._blocks(answer)
+    by_markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
+    for text in (
+        page._html(blocks, [], answer),
+        by_markdown.render(page._markdown(blocks, [])),
+    ):
+        assert "<script" not in text
+        assert "<img" not in text
+        assert "\x1b" not in text
+        for shown in ("![x](y.png)`&lt;script&gt;`|.txt", "channel ![z](/etc/hostname) &lt;script"):
+            assert shown in text
+    assert "\x1b" not in what_was_read(answer.prepared)
 
 
 def test_a_process_that_is_killed_is_said_and_replaced() -> None:

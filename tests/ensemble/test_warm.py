@@ -15,7 +15,7 @@ from solver import code_cache, warm
 from solver import compiled as door
 from solver.code_cache import CodeFiles
 from solver.compiled import Compilation
-from tests.support.campaign_support import ROOT, environment, write_campaign
+from tests.support.campaign_support import ROOT, campaign_text, environment, write_campaign
 from tests.support.launchers import MPIRUN
 
 # Another setting than any cache was made with: nothing is compiled yet, and it is quickly done.
@@ -46,7 +46,7 @@ def test_three_ranks_with_an_empty_cache_compile_once_and_before_the_first_task(
     compiling = [pid for pid, what in lines if what == "compiles"]
     assert len(set(compiling)) == 1
     assert "compiles" not in [what for _, what in lines[len(compiling) :]]
-    assert [path.name for path in (tmp_path / "cache").glob("*/*.json")] == ["grid.json"]
+    assert [path.name for path in (tmp_path / "cache").glob("*/*.json")] == [warm._marker("grid")]
     assert said.count("compiling the method grid") <= 1
 
 
@@ -61,6 +61,50 @@ def test_without_a_folder_each_rank_compiles_before_the_first_task_and_one_line_
         own = [what for other, what in lines if other == pid]
         assert own == sorted(own)  # compiles, then computes
     assert said.count("cannot be kept") == 1
+
+
+# Prints the number of functions that were compiled after warming up, and the kernels among them.
+AFTER_WARMING = """
+import os, sys
+from pathlib import Path
+import numpy as np
+from ensemble.campaign.file import parse_campaign
+from ensemble.task.compute import Runner
+from ensemble.trace.worker import Job, run
+from solver.profile import self_affine_profile
+from solver.warm import COMPILED_METHODS, compiled_in, warm, watch_compilation
+def kept():
+    return {path.name for path in Path(os.environ["ADHESIS_CACHE"]).glob("*/*")}
+warm(method for method in COMPILED_METHODS if compiled_in(method) is None)
+before = kept()
+with watch_compilation() as seen:
+    for text in sys.argv[1:]:
+        campaign = parse_campaign(text, "a campaign")
+        compute = Runner()
+        for task in campaign.tasks():
+            row = compute(campaign, task, None)
+            assert np.isfinite(row["gap_density"]).any() and "field_gap" in row
+    profile = self_affine_profile(0.7, period=1e-3, n0=1, ratio=4, seed=2, h_rms=1e-6)
+    for method in ("sharp", "grid"):
+        run(Job("answer", 1e-3, profile.coefficients, 1e6, 0.5, 0.02, 0.6, 4, method, 0.05))
+print(seen.functions, *sorted(kept() - before))
+"""
+
+
+def test_after_warming_up_neither_campaigns_nor_traces_compile_anything(tmp_path):
+    """In a new process with an empty folder of the user: all there is lies in the installation."""
+    few = {"hurst": "[0.7]", "realisations": "1", "work_of_adhesion": "[0.04]"}
+    sharp = campaign_text(**few, method='"sharp"').replace("nodes_per_wave = 16\n", "")
+    several = sharp.replace("max_penetration = 0.6", "max_penetration = [0.3, 0.6]")
+    texts = (several, campaign_text(**few))
+    done = subprocess.run(
+        [sys.executable, "-c", AFTER_WARMING, *texts],
+        env=environment(ADHESIS_CACHE=str(tmp_path)),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.split() == ["0"], done.stdout + done.stderr
 
 
 @pytest.fixture
@@ -84,7 +128,7 @@ def test_the_command_keeps_code_for_all_or_for_the_user(places, own, capsys, mon
     monkeypatch.setattr(warm, "_small_loops", lambda method: None)
     assert command.execute(argparse.Namespace(own=own)) == 0
     for method in warm.COMPILED_METHODS:
-        assert (places[own] / "key" / f"{method}.json").is_file()
+        assert (places[own] / "key" / warm._marker(method)).is_file()
     assert not places[not own].exists()
     capsys.readouterr()
     monkeypatch.setattr(warm, "_small_loops", lambda method: pytest.fail("compiled again"))

@@ -201,7 +201,8 @@ def test_local_script_asks_for_a_campaign() -> None:
     assert "usage: jobs/local.sh CAMPAIGN.toml" in done.stderr
 
 
-def test_local_script_stops_its_run_in_order(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Signals) -> None:
     # A checkout in which adhesis is a stand-in that notes how it is stopped.
     for folder in ("jobs", "tools"):
         shutil.copytree(ROOT / folder, tmp_path / folder)
@@ -209,6 +210,7 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path) -> None:
     adhesis.parent.mkdir(parents=True)
     adhesis.write_text("#!/bin/bash\ntrap 'exit 75' USR1\ntouch begun\nsleep 60 & wait\n")
     adhesis.chmod(0o755)
+    before = signal.signal(number, signal.SIG_DFL)  # the tests may run under nohup
     script = subprocess.Popen(
         [tmp_path / "jobs" / "local.sh", "study.toml", "1"],
         cwd=tmp_path,
@@ -217,12 +219,13 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path) -> None:
         text=True,
         start_new_session=True,
     )
+    signal.signal(number, before)
     try:
         end = time.monotonic() + 20
         while not (tmp_path / "begun").exists():
             assert time.monotonic() < end
             time.sleep(0.05)
-        script.terminate()
+        script.send_signal(number)
         assert script.wait(20) == 75
         assert script.stderr is not None
         assert "the same command resumes it (out/study.h5)" in script.stderr.readline()

@@ -130,6 +130,15 @@ def ranks_of(launcher: int) -> list[int]:
     return sorted(found)
 
 
+def has_ended(pid: int) -> bool:
+    """Return whether a process, of whichever parent, runs no more."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return True
+    return stat.rpartition(")")[2].split()[0] == "Z"
+
+
 def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
     """Wait for a condition; AssertionError if it does not come true."""
     end = time.monotonic() + seconds

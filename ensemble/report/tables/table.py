@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
+from ensemble.foreign import markdown
+
 Value = float | int | str | None
 Format = Callable[[Any], str]
 BLANK = "–"
@@ -89,7 +91,8 @@ class Table:
         """Return the columns that have a heading as a Markdown table."""
         shown = self._shown()
         rule = ["---:"] * len(shown[0])
-        return "\n".join("| " + " | ".join(row) + " |" for row in (shown[0], rule, *shown[1:]))
+        body = [[markdown(cell) for cell in row] for row in shown[1:]]
+        return "\n".join("| " + " | ".join(row) + " |" for row in (shown[0], rule, *body))
 
     def print(self, stream: IO[str]) -> None:
         """Print the columns that have a heading: rich on a terminal, plain lines elsewhere."""

@@ -1,0 +1,211 @@
+"""Texts from files are shown as texts; links in place of our own files are not followed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from markdown_it import MarkdownIt
+
+from ensemble.campaign.file import parse_campaign
+from ensemble.command.main import main
+from ensemble.errors import InputError
+from ensemble.foreign import code_span, markdown, one_line, printable
+from ensemble.report.html import html_page
+from ensemble.results.layout import create
+from ensemble.results.read import Results
+from ensemble.results.write import Writer
+from ensemble.run.lock import RunLock, holder
+from ensemble.run.session import run_campaign
+from ensemble.trace.page import _inline
+from tests.support.campaign_support import adhesis, campaign_text, write_campaign
+from tests.support.fake_run import fake_engine
+
+HOSTILE = [
+    "![x](/etc/passwd)",
+    "`![x](/etc/passwd)`",
+    "``![x](/etc/passwd)",
+    "[x](javascript:alert)",
+    "<img src=/etc/passwd>",
+    "a | b ** c ** &lt; \\",
+    "first\n\n# second\r\n| a |\n|---|",
+    "\x1b]0;title\x07\x1b[2J\x9b31m \u202e",
+]
+
+
+@pytest.fixture
+def campaign():
+    return parse_campaign(campaign_text())
+
+
+# ---------------------------------------------------------------------------------- texts
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("shown", [markdown, code_span])
+def test_a_text_from_a_file_is_shown_letter_by_letter(text, shown):
+    """By both makers of pages: no element but that of the code span comes out."""
+    for page in (
+        MarkdownIt("commonmark", {"html": False}).enable("table").render(f"- {shown(text)}"),
+        f"<li>{_inline(shown(text))}</li>",
+    ):
+        inside = page.replace("<ul>", "").replace("</ul>", "").replace("\n", "")
+        inside = inside.removeprefix("<li>").removesuffix("</li>")
+        inside = inside.removeprefix("<code>").removesuffix("</code>")
+        for char, entity in (("<", "&lt;"), (">", "&gt;"), ('"', "&quot;"), ("&", "&amp;")):
+            assert char == "&" or char not in inside
+            inside = inside.replace(entity, char)
+        assert inside.strip() == one_line(text)
+
+
+def test_control_characters_are_spelled_out_and_letters_stay():
+    assert printable("γ = 0.04 J/m² – «ok»\n\tnext") == "γ = 0.04 J/m² – «ok»\n\tnext"
+    assert printable("\x1b[31mred\x07 \x9b2J\r\u202e\udce9") == (
+        r"\x1b[31mred\x07 \x9b2J\r\u202e\udce9"
+    )
+    assert str(InputError("column \x1b[31m")) == r"column \x1b[31m"
+
+
+def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeypatch):
+    path = tmp_path / "r.h5"
+    create(path, campaign)
+    with Writer(path) as writer:
+        writer.write_failure(0, "diverged \x1b]0;title\x07\nsecond line \x9b31m", 1.0)
+    with RunLock(path) as lock:
+        monkeypatch.setattr("socket.gethostname", lambda: "node\x1b[2J")
+        lock.acquire(1, 0.0)
+        code = (
+            "import sys; from ensemble.run.lock import described, holder; "
+            "print(described(holder(sys.argv[1])))"
+        )
+        told = subprocess.run(
+            [sys.executable, "-c", code, path], capture_output=True, text=True, check=True
+        )
+    assert told.stdout.startswith(r"host node\x1b[2J, process ")
+    for words in ([], ["--json"]):
+        assert main(["status", str(path), *words]) == 0
+        shown = capsys.readouterr().out
+        assert all(char == "\n" or char.isprintable() for char in shown)
+        assert "diverged" in shown
+        assert "second line" in shown
+
+
+# ---------------------------------------------------------------------------------- images
+
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(100)
+
+
+def test_images_come_from_the_folder_of_the_page_alone(tmp_path):
+    report = tmp_path / "report"
+    (report / "below").mkdir(parents=True)
+    for path in (report / "own.png", report / "below" / "b.png", tmp_path / "outside.png"):
+        path.write_bytes(PNG)
+    (report / "secret.txt").write_text("no image")
+    (report / "link.png").symlink_to(tmp_path / "outside.png")
+
+    def shows(name: object) -> bool:
+        return "data:image/png" in html_page(f"# Page\n\n![figure]({name})\n", report)
+
+    assert shows("own.png")
+    for name in (
+        *(tmp_path / "outside.png", "../outside.png", "link.png", "secret.txt", "below/b.png"),
+        *("/etc/passwd", "missing.png", "../report/below/../../outside.png"),
+    ):
+        assert not shows(name), name
+
+
+# ---------------------------------------------------------------------------------- links
+
+
+@pytest.mark.parametrize("kind", ["symbolic", "dangling", "hard", "pipe"])
+def test_a_link_in_place_of_the_lock_is_refused_and_nothing_written(tmp_path, kind):
+    precious, results = tmp_path / "precious", tmp_path / "r.h5"
+    precious.write_text("mine")
+    lock = tmp_path / "r.h5.lock"
+    if kind == "symbolic":
+        lock.symlink_to(precious)
+    elif kind == "dangling":
+        lock.symlink_to(tmp_path / "new")
+    elif kind == "hard":
+        lock.hardlink_to(precious)
+    else:
+        os.mkfifo(lock)
+    with pytest.raises(InputError, match=r"r\.h5\.lock is a link or no ordinary file.* remove it"):
+        RunLock(results).acquire(1, 0.0)
+    assert holder(results) is None
+    assert precious.read_text() == "mine"
+    assert not (tmp_path / "new").exists()
+    assert lock.is_symlink() or lock.exists()
+
+
+def test_a_link_in_place_of_the_unfinished_file_is_removed_and_not_followed(tmp_path, campaign):
+    precious, results = tmp_path / "precious", tmp_path / "r.h5"
+    precious.write_text("mine")
+    (tmp_path / "r.h5.part").symlink_to(precious)
+    create(results, campaign)
+    assert precious.read_text() == "mine"
+    assert not results.is_symlink()
+    with Results(results) as file:
+        assert len(file) == campaign.task_count
+
+
+def test_two_names_of_one_results_file_have_one_lock(tmp_path):
+    real, link = tmp_path / "real.h5", tmp_path / "sym.h5"
+    link.symlink_to(real)
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "far.h5").symlink_to("../sym.h5")
+    assert {RunLock(path).path for path in (real, link, tmp_path / "sub" / "far.h5")} == {
+        tmp_path / "real.h5.lock"
+    }
+
+
+def test_a_run_through_a_link_makes_and_grows_the_file_that_it_leads_to(tmp_path):
+    scratch, link = tmp_path / "scratch", tmp_path / "r.h5"
+    scratch.mkdir()
+    link.symlink_to("scratch/real.h5")
+    for realisations in ("1", "2"):
+        campaign = parse_campaign(campaign_text(realisations=realisations))
+        run_campaign(campaign, link, engine=fake_engine(""))
+        assert link.is_symlink()
+        with Results(scratch / "real.h5") as file:
+            assert len(file) == campaign.task_count
+            assert np.all(file.status() == 1)
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["r.h5", "real.h5", "scratch"]
+
+
+# ---------------------------------------------------------------------------------- full disk
+
+
+@pytest.fixture
+def full_disk(tmp_path):
+    """A small file system of its own without a free byte."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or shutil.which("mount") is None:
+        pytest.skip("only root can mount a file system to fill")
+    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("no file system can be mounted here")
+    try:
+        with (folder / "filler").open("wb", buffering=0) as filler:
+            for size in (4096, 1):
+                while True:
+                    try:
+                        filler.write(bytes(size))
+                    except OSError:
+                        break
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_disk_that_is_full_at_the_start_is_one_sentence_and_74(tmp_path, full_disk):
+    process = adhesis("run", write_campaign(tmp_path), "--out", full_disk / "r.h5", fake="")
+    assert process.returncode == 74
+    (line,) = process.stderr.splitlines()
+    assert "r.h5.lock cannot be written: No space left on device" in line
+    assert os.listdir(full_disk) == ["filler"]

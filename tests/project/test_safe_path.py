@@ -1,0 +1,113 @@
+"""No process that adhesis starts imports anything from the user's working directory."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ensemble.doctor import examine
+from ensemble.run import launch
+from ensemble.trace.pool import Pool
+from ensemble.trace.worker import Job
+from tests.support.campaign_support import ROOT, environment, has_ended, wait_until
+from tests.support.launchers import MPIRUN
+
+# A job that the solver refuses: a profile needs a wave.
+IMPOSSIBLE = Job("only", 1.0, np.zeros(3, complex), 1.0, 0.5, 1.0, 0.5, 4, "grid", 1e-3)
+STRAY = ("numpy", "mpi4py", "solver", "ensemble", "h5py", "json", "pickle", "ctypes")
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """A working directory with modules that leave a file when they are executed."""
+    for name in STRAY:
+        executed = tmp_path / f"executed-{name}"
+        (tmp_path / f"{name}.py").write_text(f"open({str(executed)!r}, 'w').close()\n")
+    monkeypatch.chdir(tmp_path)
+    # an empty entry is the working directory, too
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", str(ROOT), ""]))
+    yield tmp_path
+    assert not sorted(path.name for path in tmp_path.glob("executed-*"))
+
+
+def test_every_start_of_python_is_the_safe_one():
+    """``sys.executable`` stands where the command is made, and in a hint for people."""
+    users = {
+        path.relative_to(ROOT).as_posix()
+        for package in ("adhesis", "solver", "ensemble")
+        for path in (ROOT / package).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Attribute) and node.attr == "executable"
+    }
+    assert users == {"ensemble/run/launch.py", "ensemble/trace/instrument.py"}
+    assert launch.python("-m", "x") == [sys.executable, "-P", "-m", "x"]
+
+
+def test_the_environment_of_a_process_names_this_package_and_no_working_directory(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", "/a", "", "/b", ""]))
+    assert launch.python_environment()["PYTHONPATH"].split(os.pathsep) == [str(ROOT), "/a", "/b"]
+    monkeypatch.delenv("PYTHONPATH")
+    assert launch.python_environment()["PYTHONPATH"] == str(ROOT)
+    # where it is installed the interpreter finds it, and PYTHONPATH would shadow the library
+    monkeypatch.setattr(launch.sysconfig, "get_path", lambda name: str(ROOT))
+    assert launch.python_environment()["PYTHONPATH"] == ""
+
+
+def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
+    (probe,) = [examine._run_probe([], study)]
+    assert probe.failure == ""
+    assert len(probe.reports) == 1
+    (answer,) = Pool([IMPOSSIBLE], 1).run().values()
+    assert str(answer).startswith("ValueError")  # from the solver, so that was found
+
+
+@pytest.mark.mpi
+def test_ranks_execute_nothing_of_the_working_directory(study, capfd):
+    assert launch.run_ranks(MPIRUN, 2, ["--version"]) == 0
+    assert capfd.readouterr().out.count("adhesis ") == 2
+
+
+# --------------------------------------------------------------------- the end of the parent
+
+PARENT = """
+import json, subprocess, sys, time
+from ensemble.run.launch import python, python_environment
+worker = subprocess.Popen(
+    python("-m", "ensemble.trace.worker"), stdin=int(sys.argv[1]), env=python_environment()
+)
+print(json.dumps(worker.pid), flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system ends children on Linux alone")
+def test_a_worker_ends_with_its_parent_even_if_that_is_killed():
+    """Its pipe is held open by this process, so that the pipe's end does not end it."""
+    theirs, ours = os.pipe()
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT, str(theirs)],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        pass_fds=[theirs],
+    )
+    os.close(theirs)
+    try:
+        worker = json.loads(parent.stdout.readline())
+        with os.fdopen(os.dup(ours), "wb") as jobs:
+            pickle.dump(IMPOSSIBLE, jobs)
+        assert pickle.load(parent.stdout)[0] == "failed"  # so it has come to its loop
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+        wait_until(lambda: has_ended(worker))
+    finally:
+        os.close(ours)
+        parent.kill()
+        parent.wait()
