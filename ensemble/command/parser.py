@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -74,12 +73,9 @@ def _whole_number(value: str) -> int:
 
 def _number(value: str) -> float:
     try:
-        number = float(value)
+        return float(value)  # NaN too: the rule of the quantity refuses it
     except ValueError:
-        number = math.nan
-    if math.isnan(number):
-        raise argparse.ArgumentTypeError(f"is {_shown(value)}: it must be a number")
-    return number
+        raise argparse.ArgumentTypeError(f"is {_shown(value)}: it must be a number") from None
 
 
 def _path(value: str) -> Path:
