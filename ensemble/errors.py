@@ -16,5 +16,9 @@ class InputError(_Printable):
     """A bad value, file or option. The text names the value and the rule in one sentence."""
 
 
+class RankError(InputError):
+    """A bad input that one rank alone may have, such as a library that is missing on its node."""
+
+
 class WriteError(_Printable):
     """A row could not be written: the disk is full, say. What was written before is sound."""

@@ -345,7 +345,8 @@ from importlib import import_module
 from ensemble.command.main import COMMANDS
 for name in COMMANDS:
     import_module(f"ensemble.command.{name}")
-import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, xarray'
+import ensemble.bench.compare, ensemble.bench.page, solver.validate.claims
+import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, rich.progress, xarray'
 }
 part adhesis "adhesis itself" finish_installation
 required adhesis

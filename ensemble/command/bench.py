@@ -13,20 +13,22 @@ import platform
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
-
-from ensemble.bench.compare import FULL, QUICK, Line, benchmark, exponents, growth, ratios
-from ensemble.bench.page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page, record
 from ensemble.errors import InputError
 from ensemble.ticker import tell, ticking
-from ensemble.warm import warm_missing
-from solver.warm import COMPILED_METHODS
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ensemble.bench.compare import Line
 
 _DEFAULT = Path("out/benchmark")
 _WIDTH = 120
+EXAMPLES = (
+    "adhesis bench --quick",
+    "adhesis bench --to out/benchmark --budget 60",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,6 +52,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Measure, print and write what came out."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from ensemble.bench.compare import FULL, QUICK, benchmark, exponents, growth, ratios
+    from ensemble.bench.page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page
+    from ensemble.warm import warm_missing
+    from solver.warm import COMPILED_METHODS
+
     if not (math.isfinite(args.budget) and args.budget > 0):
         raise InputError(f"--budget is {args.budget!r}: it must be positive, in seconds")
     try:
@@ -94,6 +104,8 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _table(title: str, columns: tuple[str, ...], rows: list[list[str]]) -> Table:
+    from rich.table import Table
+
     table = Table(title=title, title_justify="left")
     for k, heading in enumerate(columns):
         table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=True)
@@ -103,6 +115,8 @@ def _table(title: str, columns: tuple[str, ...], rows: list[list[str]]) -> Table
 
 
 def _write_csv(path: Path, lines: list[Line]) -> None:
+    from ensemble.bench.page import record
+
     records = [record(line) for line in lines]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(records[0]))

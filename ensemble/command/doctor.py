@@ -10,6 +10,11 @@ from pathlib import Path
 from ensemble.doctor.examine import Diagnosis, examine
 from ensemble.errors import InputError
 
+EXAMPLES = (
+    "adhesis doctor",
+    "adhesis doctor --in /scratch/me --json",
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""

@@ -1,8 +1,4 @@
-"""One loading-unloading loop of one profile: its losses, its jumps and its energy audit.
-
-The profile is either given as heights (one period, equally spaced, band-limited interpolation
-between them), a measured trace, or self-affine with random phases. Lengths in m, stresses in Pa.
-"""
+"""Run ``adhesis loop``: one profile, from the options to the files that they ask for."""
 
 from __future__ import annotations
 
@@ -17,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ensemble.errors import InputError
-from ensemble.loop.cycle import Cycle, add_cycle_arguments, cycle_of
+from ensemble.loop.arguments import H_RMS, N0, PERIOD, RATIO
+from ensemble.loop.cycle import Cycle, cycle_of
 from ensemble.loop.record import (
     FieldStates,
     check_writable,
@@ -30,7 +27,6 @@ from ensemble.loop.record import (
 )
 from ensemble.ticker import tell
 from ensemble.trace.options import (
-    add_reading_arguments,
     given,
     prepared_of,
     trace_of,
@@ -44,70 +40,12 @@ from solver.method import Branch, ContactState, Method, PathError
 from solver.path import PathResult, run_path
 from solver.problem import Problem
 from solver.profile import Array, Profile, profile_from_heights, self_affine_profile
-from solver.registry import METHOD_NAMES, make_method
+from solver.registry import make_method
 from solver.turns import run_loops
 
-# The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
-_PERIOD, _N0, _RATIO, _H_RMS = 2e-3 * np.pi, 10, 100, 1e-6
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
 _SECONDS_BETWEEN_LINES = 5.0
 FIGURE_FORMATS = (".png", ".pdf", ".svg")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis loop``."""
-    shape = parser.add_argument_group("profile (--heights, --hurst or --trace)")
-    shape.add_argument("--heights", type=Path, metavar="FILE", help=".npy or .csv: heights in m")
-    shape.add_argument(
-        "--trace", type=Path, metavar="FILE", help="a measured trace: see adhesis trace"
-    )
-    shape.add_argument("--hurst", type=float, metavar="H", help="Hurst exponent, 0 < H < 1")
-    shape.add_argument("--seed", type=int, metavar="K", help="seed of the phases (default 0)")
-    shape.add_argument(
-        "--period", type=float, metavar="L", help="period in m (default with --hurst: 2π mm)"
-    )
-    shape.add_argument("--n0", type=int, help=f"lowest harmonic (default {_N0})")
-    shape.add_argument("--ratio", type=int, help=f"highest over lowest harmonic (default {_RATIO})")
-    shape.add_argument(
-        "--h-rms", type=float, metavar="M", help=f"rms height in m (default {_H_RMS:g})"
-    )
-    shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
-    shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
-    shape.add_argument("--amplitudes", metavar="KIND", help="deterministic (default) or rayleigh")
-    add_reading_arguments(parser)
-    contact = parser.add_argument_group("contact and cycle")
-    contact.add_argument(
-        "--work-of-adhesion", type=float, default=0.04, metavar="G", help="J/m² (default 0.04)"
-    )
-    contact.add_argument("--young", type=float, default=1e6, metavar="E", help="Pa (default 1e6)")
-    contact.add_argument("--poisson", type=float, default=0.5, metavar="NU", help="(default 0.5)")
-    add_cycle_arguments(contact)
-    method = parser.add_argument_group("method")
-    method.add_argument(
-        "--method", default="auto", metavar="NAME", help=f"{', '.join(METHOD_NAMES)} (default auto)"
-    )
-    method.add_argument(
-        "--accuracy", type=float, default=1e-3, help="relative error of the loss (default 1e-3)"
-    )
-    method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
-    output = parser.add_argument_group("output")
-    output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")
-    output.add_argument(
-        "--figure", type=Path, metavar="FILE", help="stress and contact: .png, .pdf or .svg"
-    )
-    output.add_argument("--fields", type=Path, metavar="FILE.npz", help="stress, shape and gap")
-    output.add_argument(
-        "--field-penetrations",
-        nargs="+",
-        type=float,
-        metavar="D",
-        help="Δ/h_max of the fields on both branches (default: quarters of --max-penetration)",
-    )
-    output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
-    output.add_argument(
-        "--strict", action="store_true", help="exit code 1 where something makes the loss doubtful"
-    )
-    output.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
 
 def execute(args: argparse.Namespace) -> int:
@@ -244,12 +182,12 @@ def _given_heights(args: argparse.Namespace) -> Profile:
 def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
     if all(value is None for value in norms.values()):
-        norms["h_rms"] = _H_RMS
+        norms["h_rms"] = H_RMS
     return self_affine_profile(
         args.hurst,
-        period=_PERIOD if args.period is None else args.period,
-        n0=_N0 if args.n0 is None else args.n0,
-        ratio=_RATIO if args.ratio is None else args.ratio,
+        period=PERIOD if args.period is None else args.period,
+        n0=N0 if args.n0 is None else args.n0,
+        ratio=RATIO if args.ratio is None else args.ratio,
         seed=0 if args.seed is None else args.seed,
         amplitudes=args.amplitudes or "deterministic",
         **norms,

@@ -1,18 +1,28 @@
-"""``adhesis COMMAND …``: what commands there are, and the call of one.
+"""Run a command of the command line ``adhesis COMMAND …``.
 
-A command's module is imported only when it is called, so that ``status`` and ``report`` never load
-MPI.
+What holds for all commands is here: how errors, interrupts and failing streams are reported, and
+what processes that a launcher started do. A command's module is imported only when it is called, so
+that ``status`` and ``report`` never load MPI.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import os
+import signal
 import sys
+import threading
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 
-from ensemble.errors import InputError
-from ensemble.run.launch import ONE_THREAD
+from ensemble.command.parser import Parser
+from ensemble.command.streams import OutputError, standard_streams, write_line
+from ensemble.errors import InputError, RankError
+from ensemble.run.launch import ONE_THREAD, hand_over
+from ensemble.run.ranks import launched
 
 COMMANDS: dict[str, str] = {
     "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
@@ -26,46 +36,130 @@ COMMANDS: dict[str, str] = {
     "warm": "compile both methods now, for all users of this installation",
     "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",
 }
-BAD_INPUT = 2
+EXAMPLES = (
+    "adhesis loop --hurst 0.8 --seed 1",
+    "adhesis run jobs/example.toml --ranks 3",
+)
+# Modules that declare options without loading the solver; those of other commands do so themselves.
+_OPTIONS = {"loop": "ensemble.loop.arguments", "trace": "ensemble.trace.arguments"}
+# What several processes of a launcher do with a command: the ranks of `run` share its work, and
+# these are independent of one another (of other profiles, on other nodes). Rank 0 alone runs the
+# rest.
+_PARALLEL = "run"
+_INDEPENDENT = ("loop", "trace", "warm", "doctor")
+# How long a process waits for rank 0 to report the same error, whose end makes mpirun end all.
+_RANK_0_FIRST = 20.0  # s
+
+BAD_INPUT, OUR_ERROR, WRITE_FAILED = 2, 70, 74
+PIPE_CLOSED = 1
+INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM was received."""
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command; returns its exit code (2 for bad input, with one sentence on stderr)."""
-    words = sys.argv[1:] if argv is None else argv
+    """Run one command; returns its exit code (2 for bad input, with one sentence on stderr).
+
+    Of several ranks of a launcher rank 0 alone returns a code that is not 0, after its sentence is
+    out: mpirun ends all ranks at the first such code.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
     name = words[0] if words else ""
+    rank = launched()[1]
+    if rank > 0 and name != _PARALLEL and name not in _INDEPENDENT:
+        return 0
+    with standard_streams():
+        code, sentence, error = _run(name, words)
+        if rank > 0 and isinstance(error, InputError):
+            if name == _PARALLEL and not isinstance(error, RankError):
+                return 0  # rank 0 has the same error
+            time.sleep(_RANK_0_FIRST)
+        if sentence:
+            program = f"adhesis {name}" if name in COMMANDS else "adhesis"
+            write_line(f"{program}: {sentence}")
+    return 0 if code and hand_over(code) else code
+
+
+def parser_of(name: str) -> Parser:
+    """Return the parser of a command."""
+    module = importlib.import_module(_OPTIONS.get(name, f"ensemble.command.{name}"))
+    parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
+    module.add_arguments(parser)
+    return parser
+
+
+def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | None]:
+    """Return exit code, the sentence to report, and the error."""
+    try:
+        with _termination(enabled=name != _PARALLEL):
+            code = _execute(name, words)
+            sys.stdout.flush()
+        return code, "", None
+    except InputError as error:
+        return BAD_INPUT, str(error), error
+    except OutputError as error:
+        return WRITE_FAILED, f"stdout could not be written: {error}", error
+    except BrokenPipeError as error:
+        return PIPE_CLOSED, "", error  # the reader has seen enough
+    except Terminated as error:
+        return TERMINATED, "terminated", error
+    except KeyboardInterrupt as error:
+        return INTERRUPTED, "interrupted", error
+    except Exception as error:
+        traceback.print_exc()
+        return OUR_ERROR, "", error
+
+
+def _execute(name: str, words: Sequence[str]) -> int:
     if name == "--version":
         from ensemble.versions import adhesis_version
 
         print(f"adhesis {adhesis_version()}")
         return 0
+    if name in ("", "-h", "--help"):
+        _overview().print_help()
+        return 0
     if name not in COMMANDS:
-        _overview().parse_args(words or ["--help"])
-        return BAD_INPUT
+        raise InputError(f"COMMAND is {name!r}: it must be one of {', '.join(COMMANDS)}")
     for variable, count in ONE_THREAD.items():
         os.environ.setdefault(variable, count)  # before numpy is loaded
-    module = importlib.import_module(f"ensemble.command.{name}")
-    parser = argparse.ArgumentParser(prog=f"adhesis {name}", description=module.__doc__)
-    module.add_arguments(parser)
-    args = parser.parse_args(words[1:])
-    args.words = words
     try:
-        code: int = module.execute(args)
-    except InputError as error:
-        print(f"adhesis {name}: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except BrokenPipeError:
-        return 1
+        args = parser_of(name).parse(words[1:])
+    except SystemExit:  # --help
+        return 0
+    args.words = list(words)
+    code: int = importlib.import_module(f"ensemble.command.{name}").execute(args)
     return code
 
 
-def _overview() -> argparse.ArgumentParser:
+@contextmanager
+def _termination(*, enabled: bool) -> Iterator[None]:
+    """Raise Terminated at SIGTERM, so that unfinished files are removed."""
+    in_main = threading.current_thread() is threading.main_thread()
+    if not (enabled and in_main and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL):
+        yield
+        return
+
+    def terminate(_: int, __: FrameType | None) -> None:
+        raise Terminated
+
+    signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _overview() -> Parser:
     listing = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
-    parser = argparse.ArgumentParser(
-        prog="adhesis",
-        description="Hysteresis loops of rough contacts with zero-range (JKR) adhesion.",
-        epilog=f"commands:\n{listing}\n\nadhesis COMMAND --help tells more.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = Parser(
+        "adhesis",
+        "Hysteresis loops of rough contacts with zero-range (JKR) adhesion.\n\n"
+        f"commands:\n{listing}\n\nadhesis COMMAND --help lists its options.",
+        EXAMPLES,
     )
     parser.add_argument("--version", action="store_true", help="version and commit")
-    parser.add_argument("command", choices=list(COMMANDS), metavar="COMMAND")
+    parser.add_argument("command", metavar="COMMAND")
     return parser

@@ -13,6 +13,10 @@ from pathlib import Path
 from ensemble.errors import InputError, WriteError
 
 _WRITE_FAILED = 74
+EXAMPLES = (
+    "adhesis merge part1.h5 part2.h5 --out all.h5",
+    "adhesis merge part3.h5 --out all.h5",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,11 @@ from pathlib import Path
 
 from ensemble.ticker import ticking
 
+EXAMPLES = (
+    "adhesis report paper.h5 --to report",
+    "adhesis report paper.h5 --to report --beside fine.h5",
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""

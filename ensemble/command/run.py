@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ensemble.command.streams import OutputError, write_line
 from ensemble.errors import InputError, WriteError
 
 if TYPE_CHECKING:
@@ -26,17 +27,18 @@ if TYPE_CHECKING:
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
 OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
+INTERRUPTED = 130  # by a second Ctrl-C: the first one stops the run in order
+_ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
-_CODES = (DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, WRITE_FAILED, RESUME)
+_CODES = (DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, WRITE_FAILED, RESUME, INTERRUPTED)
+EXAMPLES = (
+    "adhesis run jobs/example.toml --ranks 3",
+    "adhesis run jobs/paper.toml --dry-run",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    from ensemble.run.ranks import launched
-
-    if launched()[1] > 0:  # rank 0 complains for all
-        # of this parser alone, which argparse made: no class of ours to override it in
-        parser.error = lambda message: sys.exit(BAD_INPUT)  # type: ignore[method-assign]
     parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
     parser.add_argument(
         "--out", metavar="FILE.h5", help="results file (default: the campaign's name, here)"
@@ -92,15 +94,14 @@ def execute(
     engine: Engine | None = None,
     program: Sequence[str] | None = None,
 ) -> int:
-    """Run; returns the exit code, the same on every rank.
+    """Run; returns the exit code, on ranks above 0 that of success.
 
     Tests pass another engine than loops, and what starts a rank with it.
     """
     from ensemble.run import launch
-    from ensemble.run.ranks import launched, world
+    from ensemble.run.ranks import wait_for_all, world
 
     started = time.time()
-    first = launched()[1] == 0
     comm = None
     try:
         if args.ranks is not None and not args.dry_run and launch.STARTED not in os.environ:
@@ -108,20 +109,26 @@ def execute(
             if code is not None:
                 return code
         comm = world()
-        if comm is not None:
-            first = comm.rank == 0
-        return _run(args, comm, started, engine)
+        code = _run(args, comm, started, engine)
+        return code if comm is None or comm.rank == 0 else DONE
     except InputError as error:
-        if first:
-            print(f"adhesis run: {error}", file=sys.stderr, flush=True)
-        return BAD_INPUT
+        if comm is None:
+            raise
+        if comm.rank == 0:
+            write_line(f"adhesis run: {error}")
+        if not wait_for_all(comm, _ALL_ARRIVE):  # the error is of this rank alone
+            _end_job(comm, BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")
+        return BAD_INPUT if comm.rank == 0 else DONE
     except WriteError as error:
-        print(f"adhesis run: {error}; what was done is kept", file=sys.stderr, flush=True)
-        _end_job(comm, WRITE_FAILED)
+        _end_job(comm, WRITE_FAILED, f"adhesis run: {error}; what was done is kept")
         os._exit(WRITE_FAILED)  # at an orderly exit HDF5 would try to write again, and crash
+    except KeyboardInterrupt:
+        text = "adhesis run: interrupted; what was done is kept, run the same command to resume"
+        _end_job(comm, INTERRUPTED, text)
+        return INTERRUPTED
     except BaseException as error:
-        if args.dry_run and isinstance(error, BrokenPipeError):
-            raise  # who reads has seen enough
+        if args.dry_run and isinstance(error, (BrokenPipeError, OutputError)):
+            raise
         traceback.print_exc()
         _end_job(comm, OUR_ERROR)
         return OUR_ERROR
@@ -135,6 +142,12 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
     ranks = int(_number("--ranks", args.ranks, whole=True))
     if ranks < 1:
         raise InputError(f"--ranks is {args.ranks!r}: it must be a whole number of at least 1")
+    most = launch.largest_number_of_ranks()
+    if ranks > most:
+        raise InputError(
+            f"--ranks is {args.ranks!r}: at most {most} are started here, on {launch.cores()} "
+            "cores; more ranks than cores compute no faster"
+        )
     if launched()[0] > 1:
         raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
     if ranks == 1:
@@ -147,21 +160,24 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
             flush=True,
         )
         return None
-    code = launch.run_ranks(mpirun, ranks, args.words, program)
-    if code in _CODES:
-        return code
-    print(
-        f"adhesis run: a rank was killed ({Path(mpirun).name} ended with {code}); what was done is "
-        "kept, run the same command again to resume",
-        file=sys.stderr,
-        flush=True,
-    )
-    return launch.KILLED
+    code, sentence = launch.run_ranks(mpirun, ranks, args.words, program)
+    if code not in _CODES:
+        sentence = (
+            f"adhesis run: a rank was killed ({Path(mpirun).name} ended with {code}); what was "
+            "done is kept, run the same command again to resume"
+        )
+        code = launch.KILLED
+    if sentence:
+        write_line(sentence)
+    return code
 
 
-def _end_job(comm: Any, code: int) -> None:
+def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     """End every rank: the others know nothing of this one's error and would wait for ever."""
-    sys.stderr.flush()
+    from ensemble.run.launch import hand_over
+
+    if not hand_over(code, sentence) and sentence:
+        write_line(sentence)
     if comm is not None:
         comm.Abort(code)
 
@@ -200,8 +216,8 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
         summary = run_campaign(campaign, path, comm, options, say, engine)
     except Overdue as error:
         # Nobody can be waited for; what was given up anyway is lost, the results file is sound.
-        say(f"adhesis run: {error}; run the same command again to resume")
-        _end_job(comm, RESUME)
+        text = f"adhesis run: {error}; run the same command again to resume"
+        _end_job(comm, RESUME, text)
         return RESUME
     if comm is None or comm.rank == 0:
         failed = f", {summary.failed} failed" if summary.failed else ""
@@ -277,7 +293,7 @@ def _selection(args: argparse.Namespace) -> Any:
 
 
 def _number(option: str, text: str, *, whole: bool = False) -> float:
-    """Read an option's number here and not in argparse, which every rank would complain from."""
+    """Return the number that is given for an option."""
     try:
         value = int(text) if whole else float(text)
     except ValueError:

@@ -11,6 +11,11 @@ from typing import Any
 
 from ensemble.errors import InputError
 
+EXAMPLES = (
+    "adhesis status paper.h5",
+    "adhesis status paper.h5 --watch --interval 10",
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -29,13 +34,14 @@ def execute(args: argparse.Namespace) -> int:
     from ensemble.results.status import as_text, read_status
     from ensemble.run.lock import holder
 
+    interval = _interval(args.interval)
     if args.watch:
         if args.json:
             raise InputError("--watch and --json cannot be given together")
-        return _watch(args.file, _interval(args.interval))
+        return _watch(args.file, interval)
     status = read_status(args.file) | {"run": holder(args.file)}
     if args.json:
-        print(json.dumps(status, indent=1, ensure_ascii=False))
+        print(json.dumps(status, indent=1))
     else:
         print(as_text(status, _life(status)))
     return 0
@@ -47,7 +53,9 @@ def _interval(text: str) -> float:
     except ValueError:
         seconds = 0.0
     if not 0.1 <= seconds <= 86_400:
-        raise InputError(f"--interval is {text!r}: it must be a number of seconds of at least 0.1")
+        raise InputError(
+            f"--interval is {text!r}: it must be a number of seconds between 0.1 and 86400"
+        )
     return seconds
 
 
@@ -75,8 +83,6 @@ def _watch(path: Path | str, interval: float) -> int:
             if not status["pending"]:
                 return 0
             time.sleep(interval)
-    except KeyboardInterrupt:
-        return 0
     finally:
         if live is not None:
             live.stop()

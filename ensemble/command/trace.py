@@ -1,9 +1,4 @@
-"""A measured trace to its loss, with what is doubtful about it.
-
-Reads a text of one or two columns, or an instrument's file, says what it read, makes one period of
-it step by step, runs the loop and what could have been decided otherwise, and writes one page.
-Lengths are in m unless they carry a unit (5um), stresses in Pa.
-"""
+"""Run ``adhesis trace``: read, plan, run the loops, write the page."""
 
 from __future__ import annotations
 
@@ -15,49 +10,13 @@ from pathlib import Path
 from ensemble.errors import InputError
 from ensemble.loop.record import check_writable, write_json
 from ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
-from ensemble.trace.options import (
-    add_reading_arguments,
-    prepared_of,
-    trace_of,
-    what_was_read,
-)
+from ensemble.trace.options import prepared_of, trace_of, what_was_read
 from ensemble.trace.plan import Plan, clock, make_plan
 from ensemble.trace.pool import Pool
 from solver.material import HalfSpace
 from solver.registry import METHOD_NAMES
 
 _SECONDS_BETWEEN_LINES = 10.0
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of ``adhesis trace``."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="text or instrument's file")
-    contact = parser.add_argument_group("contact and cycle")
-    contact.add_argument(
-        "--work-of-adhesion",
-        required=True,
-        metavar="G",
-        help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others a table",
-    )
-    contact.add_argument("--young", type=float, required=True, metavar="E", help="Pa")
-    contact.add_argument("--poisson", type=float, required=True, metavar="NU")
-    contact.add_argument(
-        "--max-penetration", default="0.9", metavar="D", help="Δ/h_max, or several (default 0.9)"
-    )
-    contact.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
-    contact.add_argument(
-        "--method", default="auto", metavar="NAME", help=f"{', '.join(METHOD_NAMES)} (default auto)"
-    )
-    contact.add_argument("--accuracy", type=float, default=1e-3, help="of each loop (default 1e-3)")
-    add_reading_arguments(parser)
-    output = parser.add_argument_group("output")
-    output.add_argument("--to", type=Path, metavar="DIR", help="for the page, its figures and JSON")
-    output.add_argument("--plan", action="store_true", help="say what would be done, do nothing")
-    output.add_argument(
-        "--quick", action="store_true", help="without tables of γ and turning point"
-    )
-    output.add_argument("--processes", type=int, metavar="N", help="side by side (default: cores)")
-    output.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
 
 def execute(args: argparse.Namespace) -> int:

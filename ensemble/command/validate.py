@@ -8,16 +8,21 @@ import math
 import sys
 from contextlib import nullcontext
 from dataclasses import asdict
-
-from rich.console import Console
-from rich.table import Table
+from typing import TYPE_CHECKING
 
 from ensemble.errors import InputError
 from ensemble.ticker import tell, ticking
-from ensemble.warm import warm_missing
-from solver.validate.claims import METHODS, Row, validate
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from solver.validate.claims import Row
 
 _EXCEEDED = 1
+EXAMPLES = (
+    "adhesis validate",
+    "adhesis validate --method sharp --json",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,17 +31,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         action="append",
         metavar="NAME",
-        help=f"method to validate, may be repeated (default: {', '.join(METHODS)})",
+        help="method to validate, may be repeated (default: all)",
     )
     parser.add_argument("--json", action="store_true", help="print the rows as JSON")
 
 
 def execute(args: argparse.Namespace) -> int:
     """Run the references and print what came out."""
+    from ensemble.warm import warm_missing
+    from solver.validate.claims import METHODS, validate
+
     names = [name for name in METHODS if not args.method or name in args.method]
     for name in args.method or ():
         if name not in METHODS:
-            raise InputError(f"method is {name!r}: it must be one of {', '.join(METHODS)}")
+            raise InputError(f"--method is {name!r}: it must be one of {', '.join(METHODS)}")
     warm_missing(names, tell)  # a time of compiling is no time of a method
     live = sys.stderr.isatty()
     lines = not args.json and not sys.stdout.isatty()
@@ -57,6 +65,8 @@ def execute(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps([_record(row) for row in rows], indent=1, allow_nan=False))
     elif not lines:
+        from rich.console import Console
+
         Console().print(_table(rows))
     failed = [row for row in rows if not row.passed]
     if not args.json:
@@ -88,6 +98,8 @@ def _line(row: Row) -> str:
 
 
 def _table(rows: list[Row]) -> Table:
+    from rich.table import Table
+
     table = Table(title="Methods against exact references", title_justify="left")
     for heading in ("claim", "method", "resolution"):
         table.add_column(heading)

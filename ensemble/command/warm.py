@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import argparse
 
-from ensemble.warm import warm_up
-from solver.warm import COMPILED_METHODS, compiled_in, in_installation, processor
+EXAMPLES = (
+    "adhesis warm",
+    "adhesis warm --own",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Compile what is not compiled yet; 0 if the code is kept."""
+    from ensemble.warm import warm_up
+    from solver.warm import COMPILED_METHODS, compiled_in, in_installation, processor
 
     def say(text: str) -> None:
         print(text, flush=True)

@@ -58,35 +58,6 @@ class Cycle:
             check_cycle(turn, self.load_steps, self.control)
 
 
-def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare the options of the loading path."""
-    group.add_argument(
-        "--max-penetration",
-        metavar="D[,D…]",
-        help="turning point in h_max, or several that share their loading branch (default 0.9); "
-        "with --stiffness of the far side, u_tot/h_max",
-    )
-    group.add_argument(
-        "--max-stress", metavar="P[,P…]", help="Pa: turning points under a load (--stiffness 0)"
-    )
-    group.add_argument(
-        "--path",
-        metavar="A,B,…,out",
-        help="instead: any path, loading first, ending with 'out' of contact or in contact",
-    )
-    group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
-    group.add_argument(
-        "--stiffness",
-        type=float,
-        metavar="K",
-        help="Pa/m of nominal area of what holds the solid; 0 is load control "
-        "(default: fixed separation)",
-    )
-    group.add_argument(
-        "--layer", type=float, metavar="D", help="m: the stiffness of a layer of this thickness"
-    )
-
-
 def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     """Read the cycle from the options.
 

@@ -16,6 +16,7 @@ import signal
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,8 +33,11 @@ _LAUNCHER_PREFIXES = ("OMPI_", "OPAL_", "ORTE_", "PRTE_", "PMIX_", "PMI_", "HYDI
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
-# Set for ranks that :func:`run_ranks` starts: they start none themselves.
+# Set for ranks that :func:`run_ranks` starts, which start none themselves: the file by which they
+# hand over their exit code. mpirun buries the sentence of a rank that ends with a code of its own
+# under a page of text.
 STARTED = "ADHESIS_STARTED"
+_RANKS_A_CORE = 16
 KILLED = 137  # what a shell says of a process that signal 9 has ended
 
 
@@ -114,10 +118,32 @@ def launch_environment(ranks: int) -> dict[str, str]:
     return env
 
 
+def largest_number_of_ranks(environ: Mapping[str, str] = os.environ) -> int:
+    """How many ranks :func:`run_ranks` may start: some for each core of this job's nodes."""
+    nodes = environ.get("SLURM_JOB_NUM_NODES", "1")
+    return _RANKS_A_CORE * cores() * (int(nodes) if nodes.isdecimal() else 1)
+
+
+def hand_over(code: int, sentence: str = "") -> bool:
+    """Leave exit code and a last sentence to the process that started the ranks.
+
+    False if there is none, or if it is on another node.
+    """
+    try:
+        with open(os.environ.get(STARTED, ""), "r+", encoding="utf-8") as stream:
+            stream.write(f"{code}\n{sentence}")
+    except OSError:
+        return False
+    return True
+
+
 def run_ranks(
     launcher: str, ranks: int, words: Sequence[str], program: Sequence[str] | None = None
-) -> int:
-    """Start ranks with a command of adhesis and wait for their end; returns the exit code.
+) -> tuple[int, str]:
+    """Start ranks with a command of adhesis and wait for their end.
+
+    Returns exit code and last sentence: those that the ranks handed over, else what the launcher
+    ended with, and no sentence.
 
     SIGTERM, SIGHUP, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C ends them at once.
     If this process is killed, the launcher ends them.
@@ -134,7 +160,9 @@ def run_ranks(
     """
     # An error that a rank does not handle must end the others, too: mpi4py sees to it.
     program = program or python("-m", "mpi4py", "-m", "ensemble")
-    env = python_environment(launch_environment(ranks)) | ONE_THREAD | {STARTED: "1"}
+    handle, handed_over = tempfile.mkstemp(prefix="adhesis-")
+    started = {STARTED: handed_over}
+    env = python_environment(launch_environment(ranks)) | ONE_THREAD | started
     process = subprocess.Popen(
         [launcher, "-n", str(ranks), *program, *words],
         env=env,
@@ -142,8 +170,11 @@ def run_ranks(
         process_group=0,  # Ctrl-C would make mpirun end its ranks; here it becomes a stop in order
         preexec_fn=end_with_parent,  # else ranks would go on, and keep the results file locked
     )
-    with _passed_on(process):
-        return process.wait()
+    with _passed_on(process), open(handle, encoding="utf-8") as stream:
+        code = process.wait()
+        os.unlink(handed_over)
+        own, _, sentence = stream.read().partition("\n")
+    return int(own or code), sentence
 
 
 @contextmanager

@@ -6,6 +6,7 @@ there is no MPI (:mod:`ensemble.doctor.probe`, in processes of its own, tries MP
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import sys
@@ -13,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, RankError
 
 T = TypeVar("T")
 
@@ -66,7 +67,7 @@ def world() -> Any:
         from mpi4py import MPI
     except (ImportError, RuntimeError, OSError) as error:
         if size > 1:
-            raise InputError(
+            raise RankError(
                 f"{launcher} started {size} processes, but mpi4py cannot be used here: {error}"
             ) from error
         return None
@@ -104,11 +105,17 @@ def together(comm: Any, function: Callable[[], T]) -> T:
     return result
 
 
-def wait_for_all(comm: Any) -> None:
-    """Return when every rank has come here; a rank that waits in a barrier would burn a core."""
-    arrived = comm.Ibarrier()
+def wait_for_all(comm: Any, seconds: float = math.inf) -> bool:
+    """Return when every rank has come here; a rank that waits in a barrier would burn a core.
+
+    False if some have not come within so many seconds.
+    """
+    arrived, end = comm.Ibarrier(), time.monotonic() + seconds
     while not arrived.Test():
+        if time.monotonic() > end:
+            return False
         time.sleep(_PAUSE)
+    return True
 
 
 def one_a_node_first(comm: Any, function: Callable[[bool], T]) -> T:

@@ -17,33 +17,6 @@ _NAMES = (
 )
 
 
-def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare how a trace is read and prepared; ``adhesis loop --trace`` shares them."""
-    reading = parser.add_argument_group("reading a trace")
-    reading.add_argument(
-        "--unit", metavar="U", help="unit of a text: um, or mm,um for positions and heights"
-    )
-    reading.add_argument("--step", metavar="S", help="step, for heights without positions: 0.5um")
-    reading.add_argument("--columns", metavar="X,Z", help="columns of a text, from 1")
-    reading.add_argument("--delimiter", metavar="C", help="of a text, if it is not found out")
-    reading.add_argument("--decimal", choices=[",", "."], help="decimal sign, if not found out")
-    reading.add_argument("--row", type=int, metavar="K", help="row of an instrument's map, from 0")
-    reading.add_argument("--channel", type=int, metavar="K", help="of an instrument's file, from 0")
-    making = parser.add_argument_group("preparing a trace")
-    making.add_argument(
-        "--degree", type=int, metavar="N", help="polynomial taken off (default 1, or as is seen)"
-    )
-    making.add_argument(
-        "--cut-off", metavar="W", help="shortest wave kept (default from step, noise and tip)"
-    )
-    making.add_argument("--tip-radius", metavar="R", help="of the stylus or probe: 2um")
-    making.add_argument(
-        "--longest-gap", metavar="G", help="drop-outs up to this length are interpolated"
-    )
-    making.add_argument("--keep-outliers", action="store_true", help="leave spikes in")
-    making.add_argument("--invert", action="store_true", help="z points into the sample: turn it")
-
-
 def trace_of(args: argparse.Namespace, path: Path) -> Trace:
     """Read the trace as the options say."""
     columns = None

@@ -321,17 +321,43 @@ def test_the_rank_0_writer_writes_the_same_file(tmp_path, whole):
     assert differences(tmp_path / "k.h5", whole) == []
 
 
-def test_bad_input_is_told_once_and_every_rank_ends(tmp_path):
-    path, out = write_campaign(tmp_path, hurst="[1.5]"), tmp_path / "r.h5"
-    process = adhesis("run", path, "--out", out, ranks=3)
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("run", "c.toml", "--speed", "3"), "adhesis run: unrecognized arguments: --speed 3"),
+        (("run", "c.toml", "--out", "r.h5"), "hurst is [1.5]: it must be a list"),
+        (("speed",), "adhesis: COMMAND is 'speed'"),
+        (("status", "none.h5"), "adhesis status: none.h5"),
+    ],
+)
+def test_an_error_under_mpirun_is_one_sentence(tmp_path, words, sentence):
+    """Also if the other ranks have ended long before rank 0 reports it."""
+    write_campaign(tmp_path, hurst="[1.5]")
+    process = adhesis(*words, ranks=3, cwd=tmp_path)
     assert process.returncode == 2
-    ours = [line for line in process.stderr.splitlines() if "adhesis run:" in line]
-    assert len(ours) == 1
-    assert "hurst is [1.5]: it must be a list of different values" in ours[0]
-    assert [p.name for p in tmp_path.iterdir()] == ["c.toml"]
-    process = adhesis("run", path, "--speed", "3", ranks=3)
+    assert sum(sentence in line for line in process.stderr.splitlines()) == 1, process.stderr
+    assert sum("adhesis" in line for line in process.stderr.splitlines()) == 1, process.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["c.toml"]
+
+
+def test_a_run_that_starts_its_ranks_ends_without_words_of_the_launcher(tmp_path):
+    bad = write_campaign(tmp_path, "bad.toml", hurst="[1.5]")
+    process = adhesis("run", bad, "--out", tmp_path / "r.h5", "--ranks", "3")
     assert process.returncode == 2
-    assert process.stderr.count("unrecognized arguments: --speed") == 1
+    assert len(process.stderr.splitlines()) == 1, process.stderr
+    assert process.stderr.startswith("adhesis run: ")
+    path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
+    words = ("run", path, "--out", tmp_path / "r.h5", "--ranks", "3")
+    process = adhesis(*words, fake="fail=0.7:0.01:0")
+    assert process.returncode == 1
+    assert "1 of 2 tasks done, 1 failed" in process.stderr
+    assert "mpirun" not in process.stderr.lower()
+    assert "primary job" not in process.stderr.lower()
+    process = adhesis(*words, "--redo", "all", fake="full=20000")
+    assert process.returncode == 74
+    last = process.stderr.splitlines()[-1]
+    assert "could not be written" in last
+    assert last.endswith("; what was done is kept")
 
 
 def test_the_status_during_a_run_under_mpirun(tmp_path):

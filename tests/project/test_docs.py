@@ -6,8 +6,6 @@ reason that fits nothing any more fails the test, too.
 
 from __future__ import annotations
 
-import argparse
-import importlib
 import re
 import shlex
 import subprocess
@@ -21,7 +19,7 @@ from matplotlib.image import imread
 
 from ensemble.campaign.file import parse_campaign
 from ensemble.command import run
-from ensemble.command.main import COMMANDS, main
+from ensemble.command.main import COMMANDS, main, parser_of
 from ensemble.run import launch
 
 ROOT = Path(__file__).parent.parent.parent
@@ -157,12 +155,6 @@ COMMAND_BLOCKS = [
     if block.language in ("", "bash", "sh") and not is_text(block) and not is_transcript(block)
 ]
 LINES = [(block, line) for block in COMMAND_BLOCKS for line in commands(block)]
-
-
-def parser_of(name: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=f"adhesis {name}")
-    importlib.import_module(f"ensemble.command.{name}").add_arguments(parser)
-    return parser
 
 
 # ---------------------------------------------------------------------- nothing is left out

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import ensemble.command.validate as validate_command
 import solver.validate.claims as validation
 import solver.validate.judge as judging
 from adhesis import ContactState, HalfSpace, Problem
@@ -189,7 +188,7 @@ def test_the_command_prints_error_against_bound_and_fails_with_one(monkeypatch, 
                 on_row(row)
             return rows
 
-        monkeypatch.setattr(validate_command, "validate", judged)
+        monkeypatch.setattr(validation, "validate", judged)
         assert main(["validate", "--method", "grid"]) == code
         lines = capsys.readouterr().out.splitlines()
         assert len(lines) == len(rows) + 1

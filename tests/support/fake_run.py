@@ -12,13 +12,13 @@ there is the file of ``free=FILE``,
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import signal
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -110,11 +110,6 @@ if __name__ == "__main__":
     from ensemble.command import run
     from ensemble.command.main import main
 
-    if sys.argv[2] != "run":
-        sys.exit(main(sys.argv[2:]))
-    parser = argparse.ArgumentParser(prog="adhesis run")
-    run.add_arguments(parser)
-    args = parser.parse_args(sys.argv[3:])
-    args.words = sys.argv[2:]
     program = [sys.executable, "-m", "mpi4py", __file__, sys.argv[1]]
-    sys.exit(run.execute(args, fake_engine(sys.argv[1]), program))
+    run.execute = partial(run.execute, engine=fake_engine(sys.argv[1]), program=program)
+    sys.exit(main(sys.argv[2:]))

@@ -5,12 +5,13 @@ A line is the process and what it begins: the word ``compiles``, or ``computes``
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
+from functools import partial
 from pathlib import Path
 
 from ensemble.command import run
+from ensemble.command.main import main
 from ensemble.run.session import Engine
 from ensemble.task.compute import run_task
 from solver.warm import watch_compilation
@@ -26,8 +27,7 @@ if __name__ == "__main__":
         begin("computes")
         return run_task(campaign, task, progress)
 
-    parser = argparse.ArgumentParser(prog="adhesis run")
-    run.add_arguments(parser)
+    run.execute = partial(run.execute, engine=Engine(compute=compute))
     with watch_compilation(lambda seen: begin("compiles")):
-        code = run.execute(parser.parse_args(sys.argv[3:]), Engine(compute=compute))
+        code = main(sys.argv[2:])
     sys.exit(code)

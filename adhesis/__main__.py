@@ -1,0 +1,7 @@
+"""``python -m adhesis COMMAND …``: the command line, where no script is installed."""
+
+import sys
+
+from ensemble.command.main import main
+
+sys.exit(main())

@@ -1,0 +1,88 @@
+"""Parse the options of a command; a bad option is one sentence."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from ensemble.errors import InputError
+
+_LONGEST = 80  # characters of a value that are shown
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser of one command: raises InputError instead of printing the usage and exiting.
+
+    Parameters
+    ----------
+    program : str
+        What is called, such as ``adhesis loop``.
+    description : str
+    examples : sequence of str
+        Command lines, at the end of the help.
+    """
+
+    def __init__(self, program: str, description: str, examples: Sequence[str]) -> None:
+        super().__init__(
+            prog=program,
+            description=description,
+            epilog="\n  ".join(["examples:", *examples]),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            exit_on_error=False,
+        )
+        for kind, convert in ((None, _text), (int, _whole_number), (float, _number), (Path, _path)):
+            self.register("type", kind, convert)
+
+    def parse(self, words: Sequence[str]) -> argparse.Namespace:
+        """Return the options.
+
+        Raises
+        ------
+        InputError
+            If an option is unknown, missing or of the wrong type.
+        SystemExit
+            After ``--help``.
+        """
+        try:
+            return self.parse_args(words)
+        except argparse.ArgumentError as error:
+            link = " " if error.message.startswith("is ") else ": "
+            self.error(f"{error.argument_name}{link}{error.message}")
+
+    def error(self, message: str) -> NoReturn:
+        """Raise an InputError that names the help."""
+        raise InputError(f"{message} ({self.prog} --help lists the options)")
+
+
+def _text(value: str) -> str:
+    if not value:
+        raise argparse.ArgumentTypeError("is '': a value is missing")
+    return value
+
+
+def _whole_number(value: str) -> int:
+    try:
+        return int(value)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"is {_shown(value)}: it must be a whole number"
+        ) from None
+
+
+def _number(value: str) -> float:
+    try:
+        return float(value)  # NaN too: the rule of the quantity refuses it
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"is {_shown(value)}: it must be a number") from None
+
+
+def _path(value: str) -> Path:
+    if not value:
+        raise argparse.ArgumentTypeError("is '': it must be the name of a file or directory")
+    return Path(value)
+
+
+def _shown(value: str) -> str:
+    return repr(value if len(value) <= _LONGEST else value[:_LONGEST] + "…")

@@ -1,0 +1,97 @@
+"""Make stdout and stderr safe: full devices, closed descriptors and ASCII terminals."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+
+class OutputError(Exception):
+    """stdout could not be written; the text gives the reason of the system."""
+
+
+class _Stdout(io.FileIO):
+    """File descriptor of stdout: the first failure raises, what follows is dropped.
+
+    Otherwise the interpreter would try to write the rest when it ends, and report that failure,
+    too.
+    """
+
+    _failed = False
+
+    def write(self, data: Any, /) -> int:
+        if self._failed:
+            return memoryview(data).nbytes
+        try:
+            return super().write(data) or 0
+        except BrokenPipeError:
+            self._failed = True
+            raise
+        except OSError as error:
+            self._failed = True
+            raise OutputError(error.strerror or str(error)) from None
+
+
+class _Stderr(io.FileIO):
+    """File descriptor of stderr: a message that cannot be written is lost, and nothing else."""
+
+    def write(self, data: Any, /) -> int:
+        try:
+            return super().write(data) or 0
+        except OSError:
+            return memoryview(data).nbytes
+
+
+@contextlib.contextmanager
+def standard_streams() -> Iterator[None]:
+    """Replace the process's own stdout and stderr by safe ones, and open those that are closed.
+
+    Characters that the encoding lacks appear as escapes. A closed stdout fails when something is
+    printed. Streams that are not the process's own (of a notebook, of a test) stay as they are.
+    """
+    _open_closed_descriptors()
+    before = sys.stdout, sys.stderr
+    if sys.stdout is sys.__stdout__:
+        sys.stdout = _stream(sys.stdout, io.BufferedWriter(_Stdout(1, "w", closefd=False)))
+    if sys.stderr is sys.__stderr__:
+        sys.stderr = _stream(sys.stderr, io.BufferedWriter(_Stderr(2, "w", closefd=False)), True)
+    try:
+        yield
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OutputError, OSError, ValueError):
+                stream.flush()
+        sys.stdout, sys.stderr = before
+
+
+def write_line(text: str) -> None:
+    """Write one line to stderr in one piece, so that lines of several processes do not mix."""
+    clear = "\r\x1b[K" if sys.stderr.isatty() else ""  # a progress line may stand there
+    sys.stderr.write(f"{clear}{' '.join(text.splitlines())}\n")
+    sys.stderr.flush()
+
+
+def _stream(like: Any, binary: io.BufferedWriter, by_line: bool = False) -> io.TextIOWrapper:
+    if like is not None:
+        like.flush()
+    return io.TextIOWrapper(
+        binary,
+        encoding="utf-8" if like is None else like.encoding,
+        errors="backslashreplace",
+        line_buffering=by_line or (like is not None and like.line_buffering),
+        write_through=like is not None and like.write_through,
+    )
+
+
+def _open_closed_descriptors() -> None:
+    """Occupy descriptors 0 to 2 where they are closed: a results file could become stdout."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The lowest free number is taken. Writing to a stdout that is read-only fails.
+            os.open(os.devnull, os.O_WRONLY if number == 2 else os.O_RDONLY)

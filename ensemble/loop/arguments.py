@@ -1,0 +1,105 @@
+"""One loading-unloading loop of one profile: its losses, its jumps and its energy audit.
+
+The profile is either given as heights (one period, equally spaced, band-limited interpolation
+between them), a measured trace, or self-affine with random phases. Lengths in m, stresses in Pa.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from ensemble.trace.arguments import add_reading_arguments
+
+# The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
+PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6
+EXAMPLES = (
+    "adhesis loop --hurst 0.8 --seed 1 --json loop.json",
+    "adhesis loop --heights heights.csv --period 1e-3 --work-of-adhesion 0.04 --figure loop.png",
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``adhesis loop``."""
+    shape = parser.add_argument_group("profile (--heights, --hurst or --trace)")
+    shape.add_argument("--heights", type=Path, metavar="FILE", help=".npy or .csv: heights in m")
+    shape.add_argument(
+        "--trace", type=Path, metavar="FILE", help="a measured trace: see adhesis trace"
+    )
+    shape.add_argument("--hurst", type=float, metavar="H", help="Hurst exponent, 0 < H < 1")
+    shape.add_argument("--seed", type=int, metavar="K", help="seed of the phases (default 0)")
+    shape.add_argument(
+        "--period", type=float, metavar="L", help="period in m (default with --hurst: 2π mm)"
+    )
+    shape.add_argument("--n0", type=int, help=f"lowest harmonic (default {N0})")
+    shape.add_argument("--ratio", type=int, help=f"highest over lowest harmonic (default {RATIO})")
+    shape.add_argument(
+        "--h-rms", type=float, metavar="M", help=f"rms height in m (default {H_RMS:g})"
+    )
+    shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
+    shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
+    shape.add_argument("--amplitudes", metavar="KIND", help="deterministic (default) or rayleigh")
+    add_reading_arguments(parser)
+    contact = parser.add_argument_group("contact and cycle")
+    contact.add_argument(
+        "--work-of-adhesion", type=float, default=0.04, metavar="G", help="J/m² (default 0.04)"
+    )
+    contact.add_argument("--young", type=float, default=1e6, metavar="E", help="Pa (default 1e6)")
+    contact.add_argument("--poisson", type=float, default=0.5, metavar="NU", help="(default 0.5)")
+    _add_cycle_arguments(contact)
+    method = parser.add_argument_group("method")
+    method.add_argument(
+        "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
+    )
+    method.add_argument(
+        "--accuracy", type=float, default=1e-3, help="relative error of the loss (default 1e-3)"
+    )
+    method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
+    output = parser.add_argument_group("output")
+    output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")
+    output.add_argument(
+        "--figure", type=Path, metavar="FILE", help="stress and contact: .png, .pdf or .svg"
+    )
+    output.add_argument("--fields", type=Path, metavar="FILE.npz", help="stress, shape and gap")
+    output.add_argument(
+        "--field-penetrations",
+        nargs="+",
+        type=float,
+        metavar="D",
+        help="Δ/h_max of the fields on both branches (default: quarters of --max-penetration)",
+    )
+    output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
+    output.add_argument(
+        "--strict", action="store_true", help="exit code 1 where something makes the loss doubtful"
+    )
+    output.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def _add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
+    """Declare the options of the loading path."""
+    group.add_argument(
+        "--max-penetration",
+        metavar="D[,D…]",
+        help="turning point in h_max, or several that share their loading branch (default 0.9); "
+        "with --stiffness of the far side, u_tot/h_max",
+    )
+    group.add_argument(
+        "--max-stress", metavar="P[,P…]", help="Pa: turning points under a load (--stiffness 0)"
+    )
+    group.add_argument(
+        "--path",
+        metavar="A,B,…,out",
+        help="instead: any path, loading first, ending with 'out' of contact or in contact",
+    )
+    group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+    group.add_argument(
+        "--stiffness",
+        type=float,
+        metavar="K",
+        help="Pa/m of nominal area of what holds the solid; 0 is load control "
+        "(default: fixed separation)",
+    )
+    group.add_argument(
+        "--layer", type=float, metavar="D", help="m: the stiffness of a layer of this thickness"
+    )

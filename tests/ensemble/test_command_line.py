@@ -1,0 +1,349 @@
+"""Check what all commands share: bad options, help, interrupts, full devices, several ranks."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ensemble.campaign.file import load_campaign
+from ensemble.command import main as command_line
+from ensemble.command.main import COMMANDS, main, parser_of
+from ensemble.command.parser import Parser
+from ensemble.errors import RankError
+from ensemble.results.layout import create
+from ensemble.run import launch
+from solver.registry import METHOD_NAMES
+from tests.support.campaign_support import environment, write_campaign
+
+CONTACT = ("--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A campaign c.toml, a results file r.h5 without a row, a text, and a directory."""
+    path = write_campaign(tmp_path)
+    create(tmp_path / "r.h5", load_campaign(path))
+    (tmp_path / "text").write_text("notes")
+    (tmp_path / "directory").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def refused(capsys, words) -> str:
+    """Run a command with bad input in this process; returns its one sentence."""
+    assert main(list(words)) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    (line,) = printed.err.splitlines()
+    return line
+
+
+# ---------------------------------------------------------------------- bad options
+
+BAD = {
+    "run": [
+        ("", "CAMPAIGN.toml is ''"),
+        ("none.toml", "none.toml"),
+        ("directory", "directory"),
+        ("text", "is not valid TOML"),
+        ("c.toml --out ''", "--out is ''"),
+        ("c.toml --out directory", "is a directory"),
+        ("c.toml --out none/r.h5", "no folder"),
+        ("c.toml --out text", "is not a results file"),
+        ("c.toml --ranks 100000", f"at most {launch.largest_number_of_ranks()} are started here"),
+        *((f"c.toml --ranks {bad}", f"--ranks is '{bad}'") for bad in ("x", "0", "-1", "nan")),
+        *((f"c.toml --walltime {bad}", f"walltime is '{bad}'") for bad in ("x", "0", "-1", "nan")),
+        *(
+            (f"c.toml {option} {bad}", f"{option} is '{bad}'")
+            for option in ("--max-failures", "--patience")
+            for bad in ("x", "-1", "nan", "1e99", "inf")
+        ),
+        *((f"c.toml --out p.h5 --part {bad}", bad) for bad in ("x", "0/3", "4/3", "1/0")),
+        ("c.toml --part 1/2", "--part needs --out"),
+        ("c.toml --redo some", "--redo is 'some'"),
+        ("c.toml --hurst 0.7", "choose among --redo"),
+        *(
+            (f"c.toml --redo all {option} {bad}", f"{option} is '{bad}'")
+            for option in ("--hurst", "--work-of-adhesion", "--realisation")
+            for bad in ("x", "-1", "nan")
+        ),
+    ],
+    "status": [
+        ("", "FILE.h5 is ''"),
+        ("none.h5", "none.h5"),
+        ("directory", "directory"),
+        ("text", "is not a results file"),
+        *(
+            (f"r.h5 --interval {bad}", f"--interval is '{bad}'")
+            for bad in ("x", "-1", "0", "nan", "inf", "1e9")
+        ),
+        ("r.h5 --watch --json", "--watch and --json"),
+    ],
+    "merge": [
+        ("r.h5", "required: --out"),
+        ("r.h5 --out ''", "--out is ''"),
+        ("'' --out all.h5", "PART.h5 is ''"),
+        ("none.h5 --out all.h5", "none.h5"),
+        ("text --out all.h5", "is not a results file"),
+        ("r.h5 --out none/all.h5", "no folder"),
+    ],
+    "report": [
+        ("r.h5", "required: --to"),
+        ("r.h5 --to ''", "--to is ''"),
+        ("'' --to out", "FILE.h5 is ''"),
+        ("none.h5 --to out", "none.h5"),
+        ("directory --to out", "directory"),
+        ("text --to out", "is not a results file"),
+    ],
+    "loop": [
+        ("--hurst 0.8 --decimal x", "--decimal: invalid choice"),
+        *((f"--hurst 0.8 --{name} nan", f"{name} is nan") for name in ("young", "period")),
+        ("--heights none.npy --period 1e-3", "none.npy"),
+    ],
+    "trace": [
+        ("text", "required: --work-of-adhesion, --young, --poisson"),
+        (f"none.csv {' '.join(CONTACT)} --to out", "none.csv"),
+        (f"text {' '.join(CONTACT)} --to out --processes 0", "--processes is 0"),
+    ],
+    "validate": [("--method ''", "--method is ''"), ("--method magic", "--method is 'magic'")],
+    "bench": [
+        *((f"--budget {bad}", "--budget is") for bad in ("0", "-1", "nan", "inf")),
+        ("--to text", "--to is 'text'"),
+        ("--to text/below", "--to is 'text/below'"),
+    ],
+    "warm": [("--own 3", "unrecognized arguments: 3")],
+    "doctor": [("--in none", "--in none"), ("--in text", "--in text"), ("--in ''", "--in is ''")],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "sentence"),
+    [(name, words, sentence) for name, cases in BAD.items() for words, sentence in cases],
+)
+def test_bad_values_are_one_sentence(name, words, sentence, folder, capsys):
+    before = sorted(path.name for path in folder.iterdir())
+    line = refused(capsys, [name, *(shlex.split(words) or [""])])
+    assert line.startswith(f"adhesis {name}: ")
+    assert sentence in line
+    after = sorted(path.name for path in folder.iterdir())
+    assert [path for path in after if not path.endswith(".lock")] == before
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_refuses_what_it_cannot_read(name, capsys):
+    """An unknown option, a missing value, an empty one, and a text in place of a number."""
+    assert "unrecognized arguments: --speed" in refused(capsys, [name, *required(name), "--speed"])
+    for action in parser_of(name)._actions:
+        if not action.option_strings or action.nargs == 0:
+            continue
+        option = action.option_strings[-1]
+        assert f"{option}: expected" in refused(capsys, [name, option])
+        if action.choices is None:
+            assert f"{option} is ''" in refused(capsys, [name, option, ""])
+        if action.type in (int, float):
+            assert f"{option} is 'x': it must be a" in refused(capsys, [name, option, "x"])
+        if action.type is int:
+            many = "9" * 5000
+            assert len(refused(capsys, [name, option, many])) < 250
+            assert f"{option} is '1.5': it must be" in refused(capsys, [name, option, "1.5"])
+
+
+def required(name: str) -> list[str]:
+    words = []
+    for action in parser_of(name)._actions:
+        if action.required:
+            words += [*action.option_strings[-1:], "1"]
+    return words
+
+
+@pytest.mark.parametrize("words", [["speed"], ["--speed"], ["Run"], ["-n", "3"], ["", "run"]])
+def test_an_unknown_command_is_refused_with_the_list(words, capsys):
+    if words[0] == "":
+        assert main(words) == 0  # as without a word: the overview
+        return
+    line = refused(capsys, words)
+    assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of run, status, ")
+
+
+def test_the_parser_keeps_the_names_and_values_of_its_options(capsys):
+    parser = Parser("adhesis x", "text", ("adhesis x 1", "adhesis x 2"))
+    parser.add_argument("--to", type=Path)
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--name")
+    read = parser.parse(["--to", "a/b", "--count", "-3", "--name", "n"])
+    assert read == argparse.Namespace(to=Path("a/b"), count=-3, name="n")
+
+
+# ---------------------------------------------------------------------- help
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_ends_with_two_examples_that_are_understood(name, capsys):
+    assert main([name, "--help"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[-3] == "examples:"
+    for line in shown[-2:]:
+        program, command, *words = shlex.split(line)
+        assert (program, command) == ("adhesis", name)
+        parser_of(name).parse(words)
+
+
+def test_help_of_the_methods_names_them_all(capsys):
+    for name in ("loop", "trace"):
+        main([name, "--help"])
+        shown = capsys.readouterr().out
+        assert [m for m in METHOD_NAMES if m not in shown] == []
+
+
+def test_help_and_wrong_options_load_neither_solver_nor_numpy_nor_mpi():
+    code = (
+        "import sys\nfrom ensemble.command.main import COMMANDS, main\n"
+        "assert main([]) == 0 and main(['speed']) == 2\n"
+        "for name in COMMANDS:\n"
+        "    assert main([name, '--help']) == 0 and main([name, '--speed']) == 2\n"
+        "print('\\nloaded', *{m.split('.')[0] for m in sys.modules})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment(), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stdout.splitlines()[-1].split()[1:])
+    heavy = {"solver", "numpy", "scipy", "numba", "mpi4py", "h5py", "matplotlib", "pandas", "rich"}
+    assert loaded & heavy == set()
+
+
+def test_both_packages_can_be_run():
+    for package in ("adhesis", "ensemble"):
+        done = process("--version", package=package)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith("adhesis 0.")
+
+
+# ---------------------------------------------------------------------- interrupts
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "run"])
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_signals_end_a_command_in_one_line(name, number, code, word, capsys, monkeypatch):
+    module = importlib.import_module(f"ensemble.command.{name}")
+    monkeypatch.setattr(module, "execute", lambda args: signal.raise_signal(number))
+    assert main([name, *required(name)]) == code
+    assert capsys.readouterr().err == f"adhesis {name}: {word}\n"
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
+    def interrupt(seconds):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("ensemble.command.status.time.sleep", interrupt)
+    assert main(["status", "r.h5", "--watch"]) == 130
+    assert capsys.readouterr().err == "adhesis status: interrupted\n"
+
+
+def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatch):
+    def fail(args):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("ensemble.command.status.execute", fail)
+    assert main(["status", "r.h5"]) == 70
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+# ---------------------------------------------------------------------- streams
+
+
+def process(*words, package="ensemble", before="", **options) -> subprocess.CompletedProcess[str]:
+    """Run a command in a process of its own, by a shell where something stands before it."""
+    command = [sys.executable, "-m", package, *words]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    if before:
+        command = ["sh", "-c", f'"$@" {before}', "sh", *command]
+    return subprocess.run(command, text=True, env=pipes.pop("env", environment()), **pipes)
+
+
+FULL = "adhesis{}: stdout could not be written: No space left on device\n"
+
+
+def test_a_full_device_is_one_sentence(folder):
+    with open("/dev/full", "w") as full:
+        for words, name in ((["--help"], ""), (["status", "r.h5"], " status")):
+            done = process(*words, stdout=full)
+            assert (done.returncode, done.stderr) == (74, FULL.format(name))
+
+
+def test_messages_that_cannot_be_written_change_nothing(folder):
+    with open("/dev/full", "w") as full:
+        assert process("status", "--speed", stderr=full).returncode == 2
+    assert process("status", "--speed", before="2>&-").returncode == 2
+
+
+def test_a_closed_stdout_is_one_sentence():
+    done = process("--version", before=">&-")
+    assert done.returncode == 74
+    assert done.stderr == "adhesis: stdout could not be written: Bad file descriptor\n"
+
+
+def test_a_reader_that_leaves_ends_the_command_without_a_word():
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "w") as pipe:
+        done = process("--help", stdout=pipe)
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_an_ascii_terminal_shows_what_it_can():
+    done = process("loop", "--help", env=environment() | {"PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "J/m\\xb2" in done.stdout
+
+
+# ---------------------------------------------------------------------- ranks of a launcher
+
+
+@pytest.fixture
+def rank_one(monkeypatch):
+    """Make this process rank 1 of 3; returns the times that it waited for rank 0."""
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "3")
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    waited: list[float] = []
+    monkeypatch.setattr(command_line.time, "sleep", waited.append)
+    return waited
+
+
+def test_rank_0_alone_reports_and_runs(rank_one, capsys):
+    for words in (["run", "c.toml", "--speed"], ["speed"], ["status", "none.h5"], ["--version"]):
+        assert main(words) == 0
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err, rank_one) == ("", "", [])
+
+
+def test_an_error_of_one_rank_is_reported_when_rank_0_had_its_time(rank_one, capsys, monkeypatch):
+    assert main(["loop", "--hurst", "x"]) == 2  # loops of a launcher are independent
+    assert len(rank_one) == 1
+    assert "--hurst is 'x'" in capsys.readouterr().err
+
+    def fail(args):
+        raise RankError("no mpi4py here")
+
+    monkeypatch.setattr("ensemble.command.run.execute", fail)
+    assert main(["run", "c.toml"]) == 2
+    assert len(rank_one) == 2
+    assert capsys.readouterr().err == "adhesis run: no mpi4py here\n"
+
+
+def test_ranks_are_bounded_by_cores_and_nodes():
+    most = launch.largest_number_of_ranks({})
+    assert most == 16 * launch.cores()
+    assert launch.largest_number_of_ranks({"SLURM_JOB_NUM_NODES": "100"}) == 100 * most
