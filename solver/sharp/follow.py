@@ -325,18 +325,12 @@ class Follower:
         return after, finest
 
     def _displaced(self, point: Point) -> float:
-        """Estimate how far (in d) the error of the field displaces the fold that ``point`` is at.
+        """Estimate how far (in d) the error of the field displaces the fold next to ``point``.
 
-        At a fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
-        vector, and scaled by C_e it is symmetric, so its left null vector is ψ_e = C_e dn_e/dd. An
-        error δC of the openings of given edges therefore moves the fold to where
-        ψ·(δC + δd ∂C/∂d) = 0. δC is taken from a field that is a hundred times as accurate.
+        The error of the openings is their difference from those of a more accurate field.
         """
-        of = point.field
         finer = self.edges.field(point.gaps, point.at, share=_FINER)
-        left = of.opening.ravel() * point.rate
-        work = left @ (finer.opening - of.opening).ravel()
-        return float(abs(work / (left @ of.opening_by_prescribed.ravel())))
+        return abs(point.fold_displacement(finer.opening - point.field.opening))
 
     def _same(self, point: Point, after: Point) -> bool:
         """Whether a descent from ``point`` led hardly anywhere: to its own branch."""

@@ -8,9 +8,11 @@ the field) and contact is not lost below s = h_max; that loop integral and sum o
 within both errors, where nothing raced; and for every twentieth that ``grid`` does. A path that is
 refused (PathError) is counted.
 
-    python tools/fuzz/loops.py --seed N [--scenes 2000] [--tight] [--log FILE] [--number K]
+    python tools/fuzz/loops.py --seed N [--scenes 2000] [--log FILE] [--number K]
+        [--tight] [--waves M]
 
-With ``--tight`` only the scenes are followed that are compared with a far more accurate run.
+With ``--tight`` only the scenes are followed that are compared with a far more accurate run, with
+``--waves`` only those of at most so many waves: they are cheap.
 """
 
 from __future__ import annotations
@@ -105,6 +107,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="number of the first")
     parser.add_argument("--number", type=int, help="this scene alone")
     parser.add_argument("--tight", action="store_true", help="only scenes that are compared so")
+    parser.add_argument("--waves", type=float, default=np.inf, help="highest wave number over q0")
     parser.add_argument("--log", type=Path, help="a line of JSON for each scene")
     args = parser.parse_args()
     if args.number is not None:
@@ -120,7 +123,10 @@ def main() -> int:
     for number in range(args.first, args.first + args.scenes):
         if time.monotonic() > end and everything:
             break
-        if args.tight and not compared_tightly(draw(args.seed, number), number):
+        scene = draw(args.seed, number)
+        if scene.n0 * scene.ratio > args.waves or (
+            args.tight and not compared_tightly(scene, number)
+        ):
             continue
         found = worker.judge(args.seed, number)
         if not worker.process.is_alive():
