@@ -9,6 +9,7 @@ Hessian of the energy divided by C).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -151,19 +152,20 @@ class EdgeMechanics:
         self.lost = -1
         self.count = Counters()
 
-    def field(self, gaps: Array, prescribed: float) -> GapField:
-        """Solve the field of these gaps."""
+    def field(self, gaps: Array, prescribed: float, *, share: float = 1.0) -> GapField:
+        """Solve the field of these gaps, to a ``share`` of the tolerance."""
         self.count.fields += 1
         solution = None
         if len(gaps) >= self.many:
-            kinds = choose_kinds(map_gaps(gaps), self.law.digits, RULES.counts)
+            digits = self.law.digits - math.log(share)
+            kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
             solution = Solution(
                 *solve_many_plain(
-                    gaps, prescribed, self.law.hold, kinds, self.law.digits, 2, RULES,
-                    self.source.panels,
+                    gaps, prescribed, self.law.hold, kinds, digits, 2, RULES, self.source.panels
                 )
-            )  # fmt: skip
-        return GapField(self.source, gaps, prescribed, self.tolerance, self.law.hold, solution)
+            )
+        tolerance = share * self.tolerance
+        return GapField(self.source, gaps, prescribed, tolerance, self.law.hold, solution)
 
     def stiffness(self, point: Point, edges: NDArray[np.int64]) -> Array:
         """∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).

@@ -27,6 +27,7 @@ _FASTEST_CLOSING = 4.0
 _CLOSING_OF_MANY = 1.0
 _ADVANCING = 4.0  # so many times the motion of one gap's edges closes others, where there are many
 _SAME = 1e-3  # edges that a jump moves by less than this, in λ_min, have not left their branch
+_FINER = 1e-2  # tolerance, over that of the path, of the field that shows the error of the path's
 _QUIET = 0.05  # mean stresses below this (in units of σ~ = 1) do not tighten the trapezoidal rule
 
 
@@ -48,6 +49,8 @@ class Resolution:
         Work that a jump may add to the loss by being found late, in units of its drop.
     least_drop : float
         Drop in J/m² below which jumps need not be located more finely.
+    field_share : float
+        Share of every drop that counts as its error by the error of the field.
     """
 
     jump: float
@@ -56,6 +59,7 @@ class Resolution:
     finest: float
     late: float
     least_drop: float
+    field_share: float
 
 
 @dataclass(frozen=True)
@@ -164,13 +168,13 @@ class Follower:
                 if touched is not None:
                     trace.states.append(self.states.of_point(point))
                     return self._touch(trace, touched, target.branch)
-                known = len(trace.states), len(trace.jumps), trace.late
+                known = len(trace.states), len(trace.jumps), trace.misplaced
                 after, better = self._fold(trace, point, at, target.branch, finest)
                 if windows and self._nearby(point, after):
                     # A window's verdict that this is a fold is not taken for that of all edges:
                     # where the descent ends nearby, the step is taken once more with all of them.
                     del trace.states[known[0] :], trace.jumps[known[1] :]
-                    trace.late = known[2]
+                    trace.misplaced = known[2]
                     windows, course = False, Course(point)
                     continue
                 if better < finest:
@@ -179,7 +183,7 @@ class Follower:
                 if at != target.at and not windows and after and self._same(point, after):
                     # Newton's iteration failed where there was no fold: the branch goes on.
                     del trace.states[known[0] :], trace.jumps[known[1] :]
-                    trace.late = known[2]
+                    trace.misplaced = known[2]
                     walk.add(after, self._closed(point, after, target.branch))
                     point, course, across, lost = after, Course(after), False, np.inf
                     continue
@@ -279,7 +283,7 @@ class Follower:
         trace.states.append(before)
         gaps = point.field.gaps
         after = self.jumps.run(trace, before, gaps, point.at, branch, touched.touches, point)
-        trace.late += self._late(before, trace.states[-1], touched.late)
+        trace.misplaced += self._late(before, trace.states[-1], touched.late)
         return point.at, after
 
     def _touch_before_fold(self, point: Point, at: float) -> Located | None:
@@ -316,8 +320,17 @@ class Follower:
             del trace.states[states:], trace.jumps[jumps:]
             share = max(0.5 * allowed / late, 1e-3)
             return None, max(share * min(abs(at - point.at), finest), self.resolution.finest)
-        trace.late += late
+        displaced = self._late(before, trace.states[-1], self._displaced(point))
+        trace.misplaced += late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         return after, finest
+
+    def _displaced(self, point: Point) -> float:
+        """Estimate how far (in d) the error of the field displaces the fold next to ``point``.
+
+        The error of the openings is their difference from those of a more accurate field.
+        """
+        finer = self.edges.field(point.gaps, point.at, share=_FINER)
+        return abs(point.fold_displacement(finer.opening - point.field.opening))
 
     def _same(self, point: Point, after: Point) -> bool:
         """Whether a descent from ``point`` led hardly anywhere: to its own branch."""

@@ -37,7 +37,8 @@ from solver.sharp.touch import Nucleation
 
 _RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
 _NOISE = 1e-13  # of h_max: no jump is located more finely
-# Error of the loss that the field's makes, in units of the accuracy, with room to spare.
+# Least error of a drop that the error of the field makes, in units of the accuracy; folds that the
+# field's error displaces by more count with that (Follower._displaced).
 _FIELD_SHARE = 0.05
 _FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
 # A jump may be late by a work of this share of its drop (in units of the accuracy), a jump whose
@@ -129,6 +130,7 @@ class SharpMethod(Method):
             finest=finest * h_max,
             late=_LATE * accuracy,
             least_drop=_LEAST_DROP * problem.work_of_adhesion,
+            field_share=_FIELD_SHARE * accuracy,
         )
         self.nucleation = Nucleation(problem, self.edges)
         self.jumps = Jumps(self.edges, self.nucleation, self.states)
@@ -178,9 +180,9 @@ class SharpMethod(Method):
         return Path(tuple(trace.states), tuple(trace.jumps), self._error(trace))
 
     def _error(self, trace: Trace) -> float:
-        """Estimated error of the loss in J/m²: jumps found late, and the error of the field."""
+        """Estimate the error of the loss, in J/m²: jumps not at their places, and the field's."""
         drops = sum(abs(jump.energy_drop) for jump in trace.jumps)
-        return trace.late + _FIELD_SHARE * self.accuracy * drops
+        return trace.misplaced + self.resolution.field_share * drops
 
     def _trace(self, state: ContactState, target: Target) -> Trace:
         """States and jumps from ``state`` to the target."""

@@ -92,6 +92,22 @@ class Point:
         point.__dict__[name] = value
         return point
 
+    def fold_displacement(self, change: Array) -> float:
+        """Change in d of the fold next to this point when the openings C of given edges change.
+
+        At a fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
+        vector. Scaled by sqrt(C_e/C_f) it is symmetric, so its left null vector is
+        ψ_e = C_e dn_e/dd. In first order the fold is moved to where ψ·(δC + δd ∂C/∂d) = 0.
+
+        Parameters
+        ----------
+        change : array, shape (L, 2)
+            δC.
+        """
+        left = self.field.opening.ravel() * self.rate
+        by_prescribed = self.field.opening_by_prescribed.ravel()
+        return -float(left @ change.ravel() / (left @ by_prescribed))
+
     def after(self, earlier: Point) -> Point:
         """Return this point with what ``earlier``, one of the same gaps, tells of its past."""
         at, rate = np.full(earlier.rate.shape, earlier.at), earlier.rate

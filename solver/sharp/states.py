@@ -23,12 +23,13 @@ from solver.sharp.source import StressSource
 class Trace:
     """States and jumps of a path, in order, as they are found.
 
-    ``late`` is the work, in J/m² of nominal area, that jumps found late may have added to the loss.
+    ``misplaced`` is the work, in J/m² of nominal area, by which the loss may be wrong because jumps
+    were not found at their exact places.
     """
 
     states: list[ContactState] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
-    late: float = 0.0
+    misplaced: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

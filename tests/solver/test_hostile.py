@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import run_loop
+from adhesis import Control, run_loop
 from solver.sharp.method import SharpMethod
+from solver.sharp.point import Point
 from tools.hostile import draw, independent_clearance, judge
 
 
@@ -19,6 +20,54 @@ def test_a_hostile_loop_keeps_every_promise(number):
     found = judge(scene, number)
     assert found["wrong"] == []
     assert found["kind"] == ("tight" if number % 4 == 0 else "loop")
+
+
+@pytest.mark.parametrize("number", [60, 460])
+def test_the_error_covers_a_loop_whose_loss_one_fold_makes(number):
+    """The error of the field displaces that fold, and no other jump balances it."""
+    scene = draw(77001, number)
+    problem = scene.problem()
+    loop, reference = (
+        run_loop(
+            SharpMethod(problem, accuracy=accuracy),
+            max_penetration=scene.max_penetration,
+            load_steps=scene.load_steps,
+        )
+        for accuracy in (scene.accuracy, 1e-2 * scene.accuracy)
+    )
+    assert abs(loop.loss - reference.loss_from_drops) < loop.loss_error
+    assert loop.loss_error < scene.accuracy * loop.loss
+
+
+@pytest.mark.parametrize(
+    ("control", "turning_point"),
+    [
+        (Control(), {"max_penetration": 0.3}),
+        (Control(stiffness=3e9), {"max_penetration": 0.3}),
+        (Control(stiffness=0), {"max_stress": 50.0}),
+    ],
+    ids=("separation", "stiffness", "load"),
+)
+def test_a_fold_moves_with_the_openings_of_its_edges(control, turning_point, monkeypatch):
+    """A work of adhesion that is 0.02 % larger acts as openings that are 0.01 % smaller."""
+    share = 1e-4
+    folds: list[Point] = []
+    displacement = Point.fold_displacement
+
+    def noted(point, change):
+        folds.append(point)
+        return displacement(point, change)
+
+    monkeypatch.setattr(Point, "fold_displacement", noted)
+    for larger in (1.0, (1 + share) ** 2):
+        problem = replace(draw(77001, 60), g=0.3 * larger).problem()
+        method = SharpMethod(replace(problem, control=control), accuracy=1e-5)
+        run_loop(method, **turning_point, load_steps=2)
+    count = len(folds) // 2
+    assert count == (1 if control.is_load else 2)
+    for before, after in zip(folds[:count], folds[count:], strict=True):
+        expected = displacement(before, -share * before.field.opening)
+        assert after.at - before.at == pytest.approx(expected, rel=0.02)
 
 
 def test_an_edge_that_leaps_to_and_fro_over_a_minimum_comes_to_rest():

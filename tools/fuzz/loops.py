@@ -9,6 +9,10 @@ within both errors, where nothing raced; and for every twentieth that ``grid`` d
 refused (PathError) is counted.
 
     python tools/fuzz/loops.py --seed N [--scenes 2000] [--log FILE] [--number K]
+        [--tight] [--waves M]
+
+With ``--tight`` only the scenes are followed that are compared with a far more accurate run, with
+``--waves`` only those of at most so many waves: they are cheap.
 """
 
 from __future__ import annotations
@@ -30,9 +34,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
 import numpy as np
 
-from tools.hostile import draw, judge
+from tools.hostile import compared_tightly, draw, judge
 
 LIMIT = 120.0  # s of CPU time of one scene, all its runs together
+_QUANTILES = (0.1, 0.5, 0.9, 0.99)  # of the differences over loss_error that are printed
 _PATIENCE = 20  # times as many seconds of the clock, should a process only sleep
 
 
@@ -79,15 +84,16 @@ class Worker:
 
 
 def calibration(found: list[dict[str, Any]]) -> str:
-    """Say how the errors told compare with the distances from tight runs."""
+    """Compare ``loss_error`` with the differences from far more accurate runs."""
     compared = [f for f in found if f["kind"] == "tight" and "off" in f]
     calm = [f for f in compared if not f["raced"]]
     if not calm:
         return "loss_error: nothing to compare"
-    ratio = np.array([f["loss_error"] / max(f["off"], 1e-300) for f in calm])
+    ratio = np.array([f["off"] / f["loss_error"] for f in calm])
+    shares = ", ".join(f"{np.quantile(ratio, q):.2f} ({100 * q:g} %)" for q in _QUANTILES)
     return (
-        f"loss_error against far more accurate runs: {np.sum(ratio >= 1)} of {len(calm)} "
-        f"losses within it, median {np.median(ratio):.2g} times the distance; "
+        f"difference from far more accurate runs over loss_error: below 1 in {np.sum(ratio < 1)} "
+        f"of {len(calm)} loops, largest {ratio.max():.2f}; quantiles {shares}; "
         f"{len(compared) - len(calm)} loops with races left out"
     )
 
@@ -100,6 +106,8 @@ def main() -> int:
     parser.add_argument("--scenes", type=int, default=2000, help="at most so many")
     parser.add_argument("--first", type=int, default=0, help="number of the first")
     parser.add_argument("--number", type=int, help="this scene alone")
+    parser.add_argument("--tight", action="store_true", help="only scenes that are compared so")
+    parser.add_argument("--waves", type=float, default=np.inf, help="highest wave number over q0")
     parser.add_argument("--log", type=Path, help="a line of JSON for each scene")
     args = parser.parse_args()
     if args.number is not None:
@@ -115,6 +123,11 @@ def main() -> int:
     for number in range(args.first, args.first + args.scenes):
         if time.monotonic() > end and everything:
             break
+        scene = draw(args.seed, number)
+        if scene.n0 * scene.ratio > args.waves or (
+            args.tight and not compared_tightly(scene, number)
+        ):
+            continue
         found = worker.judge(args.seed, number)
         if not worker.process.is_alive():
             worker = Worker()
