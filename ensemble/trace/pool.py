@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ensemble.run.interrupt import raised_by_handler
 from ensemble.run.launch import ONE_THREAD
 from ensemble.trace.worker import FAILURES, Job, failure, run
 
@@ -84,6 +85,8 @@ class Pool:
             try:
                 self.done[job.name] = run(job)
             except FAILURES as error:
+                if raised_by_handler(error):
+                    raise
                 self.done[job.name] = failure(error)
             self.took[job.name] = time.monotonic() - started
             if watch is not None:
@@ -151,13 +154,14 @@ class Pool:
             self._start()
 
     def _stop(self) -> None:
+        if self._job_of:
+            for process in self._workers:
+                process.terminate()
         for process in self._workers:
             if process.stdin is not None:
                 with contextlib.suppress(BrokenPipeError):
                     process.stdin.close()
         for process in self._workers:
-            if self._job_of:
-                process.terminate()
             try:
                 process.wait(timeout=10)
             except subprocess.TimeoutExpired:
