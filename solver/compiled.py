@@ -8,6 +8,11 @@ and the processor. Where no folder can be used, each process compiles anew.
 
 numba links the code of a function into all its callers and optimises it there once more. Here that
 is left to short functions; long ones are called under their symbol's name (:class:`_Kept`).
+
+Between a call from Python and its result no Python code runs, for a signal handler might raise in
+it, where neither numba nor LLVM expects an exception: it would become another one, be lost, or end
+the process. Hence results are boxed by C code alone (:func:`_box_array`), and functions are loaded
+and compiled in a thread of their own (:mod:`solver.uninterrupted`).
 """
 
 from __future__ import annotations
@@ -31,14 +36,15 @@ import llvmlite
 import numba
 import numpy as np
 from llvmlite import binding
+from numba.core import boxing, event, pythonapi, types
 from numba.core import config as _config
-from numba.core import event
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 from numba.extending import overload
 from numba.np import arrayobj
 
 from solver.code_cache import CodeFiles, folder_name
+from solver.uninterrupted import uninterrupted
 
 F = TypeVar("F", bound=Callable[..., Any])
 config: Any = _config  # its attributes are made at run time
@@ -48,6 +54,7 @@ config: Any = _config  # its attributes are made at run time
 # Longer ones are called: or each caller would optimise them all over again, and its own callers
 # them and it, which takes four fifths of the time to compile.
 _LONGEST_COPIED = 300
+_DIGEST = hashlib.sha256().digest_size  # bytes at the head of a file of code
 _SETTINGS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML", "BOUNDSCHECK"),
     *("DEBUGINFO_DEFAULT", "EXTEND_VARIABLE_LIFETIMES", "LLVM_REFPRUNE_PASS"),
@@ -71,6 +78,51 @@ def _shapes_differ_compiled(source: Any, target: Any) -> Any:
 # numba's own message tells the shapes, for which half of Python's strings are compiled: 3.5 s.
 if hasattr(arrayobj, "raise_with_shape_context"):
     arrayobj.raise_with_shape_context = _shapes_differ
+
+
+# ------------------------------------------------------------------- results handed to Python
+
+
+def _constant(c: Any, value: Any) -> Any:
+    """Read ``value``, which is kept with the compiled function; a borrowed reference."""
+    return c.env_manager.read_const(c.env_manager.add_const(value))
+
+
+def _box_array(typ: Any, val: Any, c: Any) -> Any:
+    """Box an array as numba does, with its class kept as a constant.
+
+    numba unpickles the class at each call, by a function in Python.
+    """
+    api = c.pyapi
+    api.serialize_object = lambda value: value
+    api.unserialize = lambda value: _constant(c, value)
+    try:
+        return boxing.box_array(typ, val, c)
+    finally:
+        del api.serialize_object, api.unserialize
+
+
+def _box_named_tuple(typ: Any, val: Any, c: Any) -> Any:
+    """Box a named tuple of this package by ``tuple.__new__``, as its own ``_make`` does.
+
+    numba calls the class, which is a function in Python.
+    """
+    if not typ.instance_class.__module__.startswith("solver."):
+        return boxing.box_namedtuple(typ, val, c)
+    values = boxing.box_tuple(typ, val, c)
+    new, named = _constant(c, tuple.__new__), _constant(c, typ.instance_class)
+    result = c.pyapi.call_function_objargs(new, (named, values))
+    c.pyapi.decref(values)
+    return result
+
+
+pythonapi._boxers.functions.update(
+    {
+        types.Array: _box_array,
+        types.NamedTuple: _box_named_tuple,
+        types.NamedUniTuple: _box_named_tuple,
+    }
+)
 
 
 def compiled(function: F) -> F:
@@ -106,10 +158,12 @@ def _compile(function: F, from_python: bool = False, **options: Any) -> F:
     dispatcher._cache = _Kept(function)
     # Most functions are called by compiled ones alone, which need nothing to unpack objects.
     inner: Any = dispatcher
+    dispatcher.compile = uninterrupted(dispatcher.compile)
     if not from_python:
         options["no_cpython_wrapper"] = True
         inner = numba.njit(**options)(function)
         inner._cache = _Kept(function, "-inner")
+        inner.compile = uninterrupted(inner.compile)
     template = inner.get_call_template
 
     def of_any_value(args: Any, kws: Any) -> Any:
@@ -222,14 +276,13 @@ class _Kept:
         content = _files().read(self._file(signature))
         if content is None:
             return None
+        digest, content = content[:_DIGEST], content[_DIGEST:]
+        if hashlib.sha256(content).digest() != digest:
+            return None  # a damaged file: compiled and written anew
         target.refresh()
-        try:
-            symbols, calls, copied, state = pickle.loads(content)
-            # code that this code calls must be there before it, under the name that it calls
-            ready = all(call.is_ready() for call in calls)
-        except Exception:  # a damaged file can raise anything; it is compiled and written anew
-            return None
-        if not ready:
+        symbols, calls, copied, state = pickle.loads(content)
+        # code that this code calls must be there before it, under the name that it calls
+        if not all(call.is_ready() for call in calls):
             return None
         target.codegen()._engine._defined_symbols.update(symbols)
         # numba has no types
@@ -256,7 +309,7 @@ class _Kept:
         state = result._reduce()
         # numba has no types
         content: bytes = dumps((symbols, calls, copied, state))  # type: ignore[no-untyped-call]
-        _files().write(self._file(signature), content)
+        _files().write(self._file(signature), hashlib.sha256(content).digest() + content)
 
     def _note(self, result: Any, signature: Any, calls: list[_Call], copied: bool) -> None:
         """Leave with the code what those call who call it."""

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from functools import cache, wraps
 from typing import Any, TypeVar
 
+from solver.uninterrupted import uninterrupted
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -28,6 +30,7 @@ def on_one_thread(function: F) -> F:
 
 
 @cache
+@uninterrupted  # the search calls back from C, where the exception of a signal handler is lost
 def _libraries() -> Any:
     # The search finds what is loaded: compiled code loads these at its first call.
     import scipy.linalg.cython_blas

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Literal, get_args
 
 from solver.method import Method
 from solver.problem import Problem
+from solver.uninterrupted import uninterrupted
 
 MethodName = Literal["grid", "sharp", "auto"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
@@ -45,9 +47,7 @@ def make_method(
     chosen = None
     if name == "auto":
         name, chosen = choose(problem, nodes_per_wave)
-    from solver.told import tell_of_compiling
-
-    tell_of_compiling()
+    _load(name)
     method: Method
     if name == "grid":
         from solver.grid.method import GridMethod
@@ -64,6 +64,15 @@ def make_method(
             )
         method = SharpMethod(problem, accuracy=accuracy, chosen=chosen)
     return method
+
+
+@uninterrupted  # an import that is interrupted leaves modules that are never whole again
+def _load(name: Literal["grid", "sharp"]) -> None:
+    """Import a method, and with it the compiler."""
+    from solver.told import tell_of_compiling
+
+    tell_of_compiling()
+    import_module(f"solver.{name}.method")
 
 
 def choose(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
+
+from ensemble.run.interrupt import raised_by_handler
 
 StopCheck = Callable[[], None]
 """Called by a task now and then; raises what ends the task."""
@@ -62,6 +63,8 @@ def attempt(
     ------
     GivenUp
         If ``stop()`` was true while it ran.
+    Exception
+        What the handler of a signal raised meanwhile.
     """
     started = time.perf_counter()
     over = started + (math.inf if limit is None else limit)
@@ -79,6 +82,8 @@ def attempt(
     except TimeLimit as failure:
         error = str(failure)
     except Exception as failure:
+        if raised_by_handler(failure):
+            raise
         error = f"{type(failure).__name__}: {failure}"
     return Outcome(task, rank, time.perf_counter() - started, error, result)
 
@@ -87,49 +92,58 @@ def attempt(
 def _watched(check: StopCheck) -> Iterator[None]:
     """Call ``check`` from a timer too: a task may hang long before it next calls it itself.
 
-    Where compiled code hands its results to Python, an exception is not expected: it would be lost,
-    or end the process. There the check waits until the task's own code goes on.
+    A timer that the caller has set goes on, and its handler is called when its time has come.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     over = False
 
-    def look() -> None:
+    def on_alarm(number: int, frame: FrameType | None) -> None:
         nonlocal over
-        if not over:
-            try:
+        try:
+            callers.pass_on(number, frame)
+            if not over:
                 check()
-            except BaseException:
-                over = True  # once is enough: not again while the first one unwinds
-                raise
+        except BaseException:
+            over = True  # once is enough: not again while the first one unwinds
+            raise
 
-    def on_alarm(_: int, frame: FrameType | None) -> None:
-        if _handing_over(frame):
-            sys.setprofile(later)
-        else:
-            look()
-
-    def later(frame: FrameType, *_: object) -> None:
-        if not _handing_over(frame):
-            sys.setprofile(None)
-            look()
-
-    before = signal.signal(signal.SIGALRM, on_alarm)
-    signal.setitimer(signal.ITIMER_REAL, WATCH_INTERVAL, WATCH_INTERVAL)
+    callers = _CallersTimer()
     try:
+        signal.signal(signal.SIGALRM, on_alarm)
+        signal.setitimer(signal.ITIMER_REAL, min(WATCH_INTERVAL, callers.left), WATCH_INTERVAL)
         yield
     finally:
         over = True
+        callers.restore()
+
+
+class _CallersTimer:
+    """The timer and the handler of SIGALRM that were set before a task began."""
+
+    def __init__(self) -> None:
+        self._handler = signal.getsignal(signal.SIGALRM)
+        delay, self._interval = signal.getitimer(signal.ITIMER_REAL)
+        self._due = time.monotonic() + delay if delay > 0 else math.inf
+
+    @property
+    def left(self) -> float:
+        """Time until it goes off, in s; infinite if it was not set."""
+        return max(self._due - time.monotonic(), 1e-6)
+
+    def pass_on(self, number: int, frame: FrameType | None) -> None:
+        """Call the caller's handler if its time has come."""
+        if time.monotonic() < self._due:
+            return
+        self._due = self._due + self._interval if self._interval > 0 else math.inf
+        if callable(self._handler):
+            self._handler(number, frame)
+
+    def restore(self) -> None:
+        """Set handler and timer again, as they would be by now."""
         signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
-        sys.setprofile(None)
-
-
-def _handing_over(frame: FrameType | None) -> bool:
-    """Whether numba's own code is under way, as it is where compiled code returns."""
-    while frame is not None:
-        if str(frame.f_globals.get("__name__")).startswith("numba."):
-            return True
-        frame = frame.f_back
-    return False
+        if self._handler is not None:  # None: it was not set from Python
+            signal.signal(signal.SIGALRM, self._handler)
+        if self._due < math.inf:
+            signal.setitimer(signal.ITIMER_REAL, self.left, self._interval)

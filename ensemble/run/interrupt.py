@@ -7,6 +7,7 @@ import re
 import signal
 from collections.abc import Mapping
 from dataclasses import dataclass
+from traceback import walk_tb
 from types import FrameType
 from typing import Any, Self
 
@@ -61,6 +62,16 @@ class StopSignals:
         if self.received == "SIGINT" and number == signal.SIGINT:
             raise KeyboardInterrupt
         self.received = signal.Signals(number).name
+
+
+def raised_by_handler(error: BaseException) -> bool:
+    """Find out whether the handler of a signal raised an exception.
+
+    Then it is an interrupt, whatever its class, and no failure of what was under way.
+    """
+    handlers = [signal.getsignal(number) for number in signal.valid_signals()]
+    codes = {code for each in handlers if (code := getattr(each, "__code__", None)) is not None}
+    return any(frame.f_code in codes for frame, _ in walk_tb(error.__traceback__))
 
 
 def parse_duration(text: str) -> float:

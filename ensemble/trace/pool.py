@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ensemble.run.interrupt import raised_by_handler
 from ensemble.run.launch import ONE_THREAD, python, python_environment
 from ensemble.trace.worker import FAILURES, Job, failure, run
 
@@ -81,6 +82,8 @@ class Pool:
             try:
                 self.done[job.name] = run(job)
             except FAILURES as error:
+                if raised_by_handler(error):
+                    raise
                 self.done[job.name] = failure(error)
             self.took[job.name] = time.monotonic() - started
             if watch is not None:
@@ -144,13 +147,14 @@ class Pool:
             self._start()
 
     def _stop(self) -> None:
+        if self._job_of:
+            for process in self._workers:
+                process.terminate()
         for process in self._workers:
             if process.stdin is not None:
                 with contextlib.suppress(BrokenPipeError):
                     process.stdin.close()
         for process in self._workers:
-            if self._job_of:
-                process.terminate()
             try:
                 process.wait(timeout=10)
             except subprocess.TimeoutExpired:

@@ -1,0 +1,354 @@
+"""Interrupts at random moments: what the handler of a signal raises has to arrive unchanged.
+
+A timer (SIGALRM) goes off at a random moment, and its handler raises. Counted is what the work then
+ends in: ``raised`` (that exception), ``done`` (it was ready before), ``lost`` (the handler raised,
+and nothing arrived), or another exception. Afterwards the same method goes on from a state that is
+known, and must give the bits of an uninterrupted loop. The work is done in processes of its own, so
+that a crash is counted too.
+
+- ``strong``, ``weak``: loops of ``sharp`` at paper scale, γ = 0.04 and 0.0025 J/m²
+- ``grid``: loops of ``grid``
+- ``first``: the first loop of a process, which loads compiled code
+- ``compile``: the same where nothing is compiled yet
+- ``trace``, ``pool``: ``loss_of_trace`` in one process, and with processes of its own
+- ``campaign``: a campaign in one process
+
+    python tools/fuzz/interrupts.py --seed N [--count 100] [--kind strong …] [--seconds S]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
+
+import numpy as np
+
+Work = Callable[[], object]
+
+KINDS = ("strong", "weak", "grid", "first", "compile", "trace", "pool", "campaign")
+OF_ONE_PROCESS_EACH = ("first", "compile")
+LOAD_STEPS = 40
+WAVES = 10  # the longest ones in a period
+AT_ONCE = 50  # interrupts of one process
+LIMIT = 1200.0  # s after which a process is taken for hanging
+
+
+class Interrupt(Exception):
+    """What the handler raises; no other code does."""
+
+
+def interrupted(work: Work, delay: float) -> str:
+    """Interrupt ``work`` after ``delay`` seconds; returns what it ended in."""
+    raised: list[Interrupt] = []
+
+    def handler(number: int, frame: object) -> None:
+        raised.append(Interrupt())
+        raise raised[-1]
+
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, delay)
+        work()
+        signal.setitimer(signal.ITIMER_REAL, 0)
+    except BaseException as error:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        if raised and error is raised[0]:
+            return "raised"
+        return f"{type(error).__name__}: {error}"[:200]
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    return "lost" if raised else "done"
+
+
+# ---------------------------------------------------------------------------------- the kinds
+
+
+def make(method: str, work_of_adhesion: float, ratio: int) -> Any:
+    """Return a method for the paper's profile, up to ``ratio`` times its longest wave."""
+    from solver.material import HalfSpace
+    from solver.problem import Problem
+    from solver.profile import self_affine_profile
+    from solver.registry import make_method
+
+    profile = self_affine_profile(
+        0.8, period=2e-3 * np.pi, n0=WAVES, ratio=ratio, seed=1, h_rms=1e-6
+    )
+    problem = Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
+    options: dict[str, Any] = {"nodes_per_wave": 8} if method == "grid" else {}
+    return make_method(method, problem, **options)  # type: ignore[arg-type]
+
+
+def bits(state: Any) -> tuple[object, ...]:
+    """Numbers of a state, for comparison."""
+    return state.mean_stress, state.elastic_energy, state.separation, state.edges.tobytes()
+
+
+class Loops:
+    """Stretches of one loop, each from a load step that is drawn, and loops from the beginning."""
+
+    def __init__(self, method: str, work_of_adhesion: float, ratio: int) -> None:
+        from solver.loop import run_loop
+
+        self._run_loop = run_loop
+        self.method = make(method, work_of_adhesion, ratio)
+        self.passed: list[tuple[float, Any]] = []
+        started = time.monotonic()
+        self._loop(lambda _, drive, state: self.passed.append((drive, state)))
+        self.step = (time.monotonic() - started) / len(self.passed)
+
+    def _loop(self, progress: Any = None) -> None:
+        self._run_loop(
+            self.method, max_penetration=0.9, load_steps=LOAD_STEPS, progress=progress
+        )
+
+    def _follow(self, first: int, last: int) -> list[Any]:
+        """Go on from a load step to another; returns the states there."""
+        state = self.passed[first][1]
+        states = []
+        for drive, _ in self.passed[first + 1 : last + 1]:
+            prescribed = self.method.problem.prescribed(drive)
+            state = self.method.follow(state, prescribed).states[-1]
+            states.append(state)
+        return states
+
+    def once(self, rng: np.random.Generator) -> str:
+        """Interrupt once; what it ended in, and whether the method still gives the same bits."""
+        steps = len(self.passed)
+        first = int(rng.integers(-steps // 4, steps - 1))
+        delay = float(rng.uniform(0.0, 5 * self.step)) + 1e-6
+        if first < 0:
+            ended = interrupted(self._loop, delay)
+        else:
+            ended = interrupted(lambda: self._follow(first, steps), delay)
+        again = int(rng.integers(0, steps - 1))
+        (state,) = self._follow(again, again + 1)
+        if bits(state) != bits(self.passed[again + 1][1]):
+            return f"OTHER BITS after {ended}"
+        return ended
+
+
+class First:
+    """The first loops of a process."""
+
+    def __init__(self, longest: float, *, compare: bool) -> None:
+        self._longest, self._compare = longest, compare
+
+    def once(self, rng: np.random.Generator) -> str:
+        """Interrupt once; then the loop runs to its end."""
+        from solver.loop import run_loop
+
+        method = make("sharp", 0.04, 4)
+
+        def loop() -> str:
+            found = run_loop(method, max_penetration=0.8, load_steps=4)
+            return found.loss.hex()
+
+        ended = interrupted(loop, float(rng.uniform(0.0, self._longest)) + 1e-6)
+        return f"{ended} {loop()}" if self._compare else ended
+
+
+class Traces:
+    """``loss_of_trace`` of a small trace."""
+
+    def __init__(self, processes: int, longest: float) -> None:
+        from ensemble.trace.prepare import prepare_trace
+        from ensemble.trace.read import Trace
+        from solver.material import HalfSpace
+        from solver.profile import self_affine_profile
+
+        profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=6, seed=2, h_rms=1e-6)
+        x = 1e-3 / 400 * np.arange(400)
+        noise = 5e-9 * np.random.default_rng(0).standard_normal(400)
+        self._prepared = prepare_trace(Trace(Path("t.txt"), profile.at(x) + noise, 1e-3 / 400))
+        self._half_space = HalfSpace(young=1e6, poisson=0.5)
+        self._processes, self._longest = processes, longest
+
+    def _work(self) -> None:
+        from ensemble.trace.answer import loss_of_trace
+
+        loss_of_trace(
+            self._prepared,
+            half_space=self._half_space,
+            work_of_adhesion=0.04,
+            processes=self._processes,
+        )
+
+    def once(self, rng: np.random.Generator) -> str:
+        """Interrupt once; processes that were started must be gone."""
+        ended = interrupted(self._work, float(rng.uniform(0.0, self._longest)) + 1e-6)
+        end = time.monotonic() + 20
+        while children() and time.monotonic() < end:
+            time.sleep(0.02)  # one whose start was interrupted ends when its input does
+        return f"PROCESSES LEFT after {ended}" if children() else ended
+
+
+def children() -> list[int]:
+    """Living processes that this one has started (Linux)."""
+    own = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    states = {int(pid): _state(pid) for pid in own}
+    return [pid for pid, state in states.items() if state not in ("Z", "")]
+
+
+def _state(pid: str) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return ""
+
+
+class Campaigns:
+    """A campaign in this process; the file must be sound, and go on to its end at last."""
+
+    TEXT = """
+        profile = { period = 1e-3, n0 = 1, ratio = 16, h_rms = 1e-6 }
+        material = { young = 1e6, poisson = 0.5 }
+        sweep = { hurst = [0.7, 0.8], work_of_adhesion = [0.01, 0.04], realisations = 20, seed = 5 }
+        cycle = { max_penetration = 0.6, load_steps = 8, unloading_until = -3 }
+    """
+
+    def __init__(self, longest: float) -> None:
+        from ensemble.campaign.file import parse_campaign
+
+        text = "\n".join(line.strip() for line in self.TEXT.splitlines())
+        self._campaign = parse_campaign(text)
+        self._longest = longest
+
+    def once(self, rng: np.random.Generator) -> str:
+        """Interrupt once, in a results file of its own."""
+        from ensemble.results.status import read_status
+        from ensemble.run.session import run_campaign
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "r.h5"
+            ended = interrupted(
+                lambda: run_campaign(self._campaign, path),
+                float(rng.uniform(0.0, self._longest)) + 1e-6,
+            )
+            failed = read_status(path)["failed"] if path.exists() else 0
+        return f"{failed} FAILED TASKS, {ended}" if failed else ended
+
+
+def kind_of(name: str) -> Any:
+    """Set up what is interrupted."""
+    if name == "strong":
+        return Loops("sharp", 0.04, 100)
+    if name == "weak":
+        return Loops("sharp", 0.0025, 100)
+    if name == "grid":
+        return Loops("grid", 0.04, 8)
+    if name == "first":
+        return First(4.0, compare=True)
+    if name == "compile":
+        return First(60.0, compare=False)
+    if name == "trace":
+        return Traces(0, 2.0)
+    if name == "pool":
+        return Traces(2, 8.0)
+    return Campaigns(3.0)
+
+
+# --------------------------------------------------------------------------------- processes
+
+
+def work(name: str, seed: int, numbers: range) -> None:
+    """Interrupt some times; a line of JSON for each."""
+    kind = kind_of(name)
+    for number in numbers:
+        rng = np.random.default_rng([seed, KINDS.index(name), number])
+        print(json.dumps([number, kind.once(rng)]), flush=True)
+
+
+def run(name: str, seed: int, numbers: range) -> dict[int, str]:
+    """Interrupt some times in a process of its own; what each ended in."""
+    ended: dict[int, str] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        environment = dict(os.environ)
+        if name == "compile":
+            environment |= {"NUMBA_OPT": "1", "ADHESIS_CACHE": folder}
+        words = ["--kind", name, "--seed", str(seed), "--count", str(len(numbers))]
+        words += ["--first", str(numbers.start), "--work"]
+        try:
+            done = subprocess.run(
+                [sys.executable, str(Path(__file__).resolve()), *words],
+                stdout=subprocess.PIPE,
+                text=True,
+                env=environment,
+                check=False,
+                timeout=LIMIT,
+            )
+            lines, code = done.stdout, done.returncode
+        except subprocess.TimeoutExpired as late:
+            lines, code = (late.stdout or b"").decode(), None
+    for line in lines.splitlines():
+        if line.startswith("["):
+            number, how = json.loads(line)
+            ended[number] = how
+    missing = [number for number in numbers if number not in ended]
+    if missing:
+        how = "hangs" if code is None else f"ended with {code}"
+        ended[missing[0]] = f"CRASH: the process {how}"
+    return ended
+
+
+def is_wrong(how: str) -> bool:
+    """Whether an interrupt ended in anything but itself."""
+    return how.split()[0] not in ("raised", "done")
+
+
+def main() -> int:
+    """Return 1 if an interrupt did not arrive as what it was."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--kind", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--count", type=int, default=100, help="of each kind")
+    parser.add_argument("--first", type=int, default=0, help="number of the first")
+    parser.add_argument("--seconds", type=float, default=np.inf, help="at most so long, in all")
+    parser.add_argument("--log", type=Path, help="a line of JSON for each")
+    parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    args.until = time.monotonic() + args.seconds
+    stop = args.first + args.count
+    if args.work:
+        work(args.kind[0], args.seed, range(args.first, stop))
+        return 0
+    wrong = 0
+    for place, name in enumerate(args.kind):
+        started = time.monotonic()
+        end = started + (args.until - started) / (len(args.kind) - place)
+        ended: dict[int, str] = {}
+        number = args.first
+        while number < stop and (time.monotonic() < end or not ended):
+            size = 1 if name in OF_ONE_PROCESS_EACH else AT_ONCE
+            ended |= run(name, args.seed, range(number, min(number + size, stop)))
+            number = max(ended) + 1
+        if args.log is not None:
+            with args.log.open("a") as log:
+                for number, how in ended.items():
+                    print(json.dumps([name, args.seed, number, how]), file=log)
+        count = Counter(ended.values())
+        bad = sum(is_wrong(how) for how in ended.values())
+        bad += name == "first" and len({how.split()[-1] for how in ended.values()}) > 1
+        wrong += bad
+        print(
+            f"interrupts: {name}, seed {args.seed}: {len(ended)} in "
+            f"{time.monotonic() - started:.0f} s, {bad} wrong; {dict(count)}",
+            flush=True,
+        )
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
