@@ -2,10 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
-class InputError(Exception):
-    """A bad value, file or option. The text names the value and the rule in one sentence."""
+
+class InputError(ValueError):
+    """A bad value, file or option. The text names the value and the rule in one sentence.
+
+    References
+    ----------
+    docs/python.md, "Bad input"
+    """
 
 
 class WriteError(Exception):
     """A row could not be written: the disk is full, say. What was written before is sound."""
+
+
+_of_a_command: ContextVar[bool] = ContextVar("of_a_command", default=False)
+
+
+@contextmanager
+def naming_options() -> Iterator[None]:
+    """Let messages name the options of a command instead of the parameters of functions."""
+    before = _of_a_command.set(True)
+    try:
+        yield
+    finally:
+        _of_a_command.reset(before)
+
+
+def parameter(name: str) -> str:
+    """Return the name by which a caller gave a parameter: longest_gap, or --longest-gap."""
+    return f"--{name.replace('_', '-')}" if _of_a_command.get() else name
+
+
+@contextmanager
+def refused_as_input() -> Iterator[None]:
+    """Raise an InputError where a value is refused by the solver; other errors pass."""
+    try:
+        yield
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error)) from None

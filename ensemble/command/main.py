@@ -11,7 +11,7 @@ import importlib
 import os
 import sys
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, naming_options
 from ensemble.run.launch import ONE_THREAD
 
 COMMANDS: dict[str, str] = {
@@ -49,7 +49,8 @@ def main(argv: list[str] | None = None) -> int:
     args = parser.parse_args(words[1:])
     args.words = words
     try:
-        code: int = module.execute(args)
+        with naming_options():
+            code: int = module.execute(args)
     except InputError as error:
         print(f"adhesis {name}: {error}", file=sys.stderr)
         return BAD_INPUT
