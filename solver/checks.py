@@ -8,8 +8,8 @@ command line and campaign files alike.
 from __future__ import annotations
 
 import math
-import os
 import numbers
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 T = TypeVar("T")
 
 _LONGEST = 80  # characters of a value that is shown
-_FIGURES = 12
 
 
 @dataclass(frozen=True)
@@ -67,25 +66,22 @@ class Bounds:
     @property
     def text(self) -> str:
         """The rule in words, after "it must be"."""
-        kind = "a number"
-        if self.whole:
-            kind = "a whole number"
-        elif self.low > 0:
-            kind = "a positive number"
         low, high = plain(self.low), plain(self.high)
+        kind = "a whole number" if self.whole else "a number"
         between = math.isfinite(self.low) and math.isfinite(self.high)
         if between and self.without_low and self.without_high:
             rule = f"{kind} between {low} and {high}, both excluded"
         elif between and not (self.without_low or self.without_high):
-            rule = f"{kind} from {low} to {high}"
+            positive = self.low > 0 and not self.whole
+            rule = f"{'a positive number' if positive else kind} from {low} to {high}"
         else:
             parts = []
             if math.isfinite(self.low):
                 parts.append(f"above {low}" if self.without_low else f"of at least {low}")
             if math.isfinite(self.high):
                 parts.append(f"below {high}" if self.without_high else f"at most {high}")
-            kind = kind if self.whole else "a finite number"
-            rule = " ".join([kind, " and ".join(parts)]).strip()
+            finite = not (between or self.whole)
+            rule = f"{'a finite number' if finite else kind} {' and '.join(parts)}".strip()
         if self.or_zero:
             rule = f"0 or {rule}"
         if self.or_infinite:
@@ -150,7 +146,9 @@ ACCURACY = Bounds(1e-10, 1.0, without_high=True)
 """The field is solved to a hundredth of it, and to no less than 1e-14 in double precision; at 1e-10
 both still leave two decimal digits between them."""
 
-NODES_PER_WAVE = Bounds(8, 100_000, whole=True)
+NODES_PER_WAVE = Bounds(
+    8, 100_000, whole=True, note="; fewer are too coarse for the shortest wave"
+)
 
 NODES = Bounds(1, 1 << 26, whole=True)
 """An array of so many nodes takes half a gigabyte."""
@@ -160,12 +158,16 @@ FINITE = Bounds()
 
 def plain(number: float) -> str:
     """Spell a number as one would write it: 1e9, not 1e+09."""
-    mantissa, e, exponent = f"{number:.{_FIGURES}g}".partition("e")
+    if isinstance(number, int):
+        return str(number)
+    mantissa, e, exponent = f"{number:.6g}".partition("e")
     return mantissa + (f"e{int(exponent)}" if e else "")
 
 
 def shown(value: object) -> str:
     """Return a value as Python spells it, on one line and short enough for a sentence."""
+    if isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and np.ma.is_masked(value):
+        return "masked"
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
         value = value.item()
     try:
@@ -258,7 +260,7 @@ def choice(name: str, value: T, choices: Iterable[T]) -> T:
 def instance(name: str, value: T, kind: type[Any], how: str) -> T:
     """Return an object of a class; a TypeError says ``how`` to make one."""
     if not isinstance(value, kind):
-        raise TypeError(_sentence(name, value, f"a {kind.__name__} ({how})"))
+        raise TypeError(_sentence(name, value, f"a {kind.__name__}; make one with {how}"))
     return value
 
 
@@ -328,6 +330,27 @@ def row(
         held = kinds.get(array.dtype.kind, str(array.dtype))
         raise TypeError(f"{name} holds {held}: every {entry} must be a real number")
     return np.asarray(array, dtype=np.complex128 if imaginary else np.float64)
+
+
+def reals(name: str, values: object) -> NDArray[np.float64]:
+    """Return real numbers of any shape as an array; NaN and ±∞ pass.
+
+    Raises
+    ------
+    TypeError
+        If it holds anything else: texts, booleans, complex numbers, objects.
+    ValueError
+        If an entry is masked, or rows differ in length.
+    """
+    if np.ma.is_masked(values):
+        raise ValueError(f"{name} holds masked values: every value must be given")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name} holds rows of different lengths") from None
+    if array.dtype.kind not in "fiu":
+        raise TypeError(_sentence(name, values, "a real number, or an array of them"))
+    return np.asarray(array, dtype=np.float64)
 
 
 def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np.float64]:

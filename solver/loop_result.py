@@ -14,7 +14,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.checks import choice
+from solver.checks import choice, reals
 from solver.control import Control
 from solver.jumps import BRANCHES, Branch, Jump
 from solver.method import Method, MethodReport
@@ -271,7 +271,7 @@ class LoopResult(ByValue):
         ValueError
             If the branch is unknown, or there are not as many values as states.
         """
-        values, drives = self._of_states(values), np.asarray(drives, dtype=float)
+        values, drives = self._of_states(values), reals("drives", drives)
         chosen = self.states(branch)
         control, h_max = self.problem.control, self.problem.profile.h_max
         control = Control() if control.is_load else control

@@ -72,11 +72,11 @@ class Problem(ByValue):
     control: Control = field(default_factory=Control)
 
     def __post_init__(self) -> None:
-        instance("profile", self.profile, Profile, "single_wave, profile_from_heights, …")
+        instance("profile", self.profile, Profile, "single_wave or profile_from_heights")
         instance("half_space", self.half_space, HalfSpace, "HalfSpace(young, poisson)")
         gamma = real("work_of_adhesion", self.work_of_adhesion, WORK_OF_ADHESION)
         object.__setattr__(self, "work_of_adhesion", gamma)
-        instance("control", self.control, Control, "Control(stiffness); Control(0) is a load")
+        instance("control", self.control, Control, "Control(stiffness), for a load Control(0)")
         check_slope(float(np.sqrt(self.profile.m2)))
 
     @property

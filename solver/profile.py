@@ -35,6 +35,7 @@ from solver.checks import (
     choice,
     finite_row,
     real,
+    reals,
     row,
     whole,
 )
@@ -183,7 +184,7 @@ class Profile(ByValue):
 
         Returns an array of the shape of ``x``, in m^(1 - derivative).
         """
-        x = np.asarray(x, dtype=float)
+        x = reals("x", x)
         derivative = whole("derivative", derivative, _ORDER)
         m = np.flatnonzero(self.coefficients)
         a = 2 * (self.coefficients * self._iq(derivative))[m]

@@ -261,9 +261,8 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
 
 def _several(name: str, value: Several) -> Sequence[float]:
     """Return one number as a row of one; its bounds are checked later."""
-    number = number_of(value)
-    if number is not None:
-        return (float(number),)
+    if number_of(value) is not None:
+        return (real(name, value),)
     return tuple(row(name, value, entry="value").tolist())
 
 
@@ -319,8 +318,8 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     races = answer.main["races"]
     if races:
         found.append(
-            f"{counted(int(races), 'jump')} would have ended elsewhere under another rule of descent "
-            f"({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
+            f"{counted(int(races), 'jump')} would have ended elsewhere under another rule of "
+            f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
     return found
 

@@ -26,6 +26,7 @@ from solver.values import ByValue
 
 MOST_DEGREE = 6
 _DEGREE = Bounds(0, MOST_DEGREE, whole=True)
+_LENGTH_OR_NONE = Bounds(0.0, LENGTH.high, unit="m")
 
 # A spike stands out of the four heights on either side by so many robust standard deviations.
 _SIDE, _SPIKE = 4, 10.0
@@ -169,9 +170,9 @@ def prepare_trace(
     with refused_as_input():
         if degree is not None:
             degree = whole(parameter("degree"), degree, _DEGREE)
-        cut_off = _length("cut_off", cut_off)
-        tip_radius = _length("tip_radius", tip_radius)
-        longest_gap = _length("longest_gap", longest_gap)
+        cut_off = _length("cut_off", cut_off, LENGTH)
+        tip_radius = _length("tip_radius", tip_radius, _LENGTH_OR_NONE)
+        longest_gap = _length("longest_gap", longest_gap, _LENGTH_OR_NONE)
     steps: list[Step] = []
     warnings: list[str] = []
     heights = -trace.heights if invert else trace.heights.copy()
@@ -208,8 +209,8 @@ def prepare_trace(
     )
 
 
-def _length(name: str, value: float | None) -> float | None:
-    return None if value is None else real(parameter(name), value, LENGTH)
+def _length(name: str, value: float | None, bounds: Bounds) -> float | None:
+    return None if value is None else real(parameter(name), value, bounds)
 
 
 # ---------------------------------------------------------------------- gaps and outliers

@@ -63,6 +63,7 @@ NOT_IN_SOLVER = {
 }
 # All that campaigns know of the mechanics.
 SOLVER_FOR_ENSEMBLE = {
+    "solver.checks",
     "solver.control",
     "solver.fields",
     "solver.jumps",
@@ -78,6 +79,7 @@ SOLVER_FOR_ENSEMBLE = {
     "solver.trace",
     "solver.turns",
     "solver.validate.claims",
+    "solver.values",
     "solver.warm",
 }
 
