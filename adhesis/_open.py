@@ -41,9 +41,10 @@ def open(
     ----------
     docs/python.md, "Results in Python"
     """
-    from ensemble.report.opened import CampaignResults  # xarray and pandas take half a second
-
     if isinstance(beside, str | os.PathLike):
         raise TypeError(f"beside is {str(beside)!r}: it must be a list of paths")
     others = [checks.path(f"beside[{place}]", other) for place, other in enumerate(beside)]
-    return CampaignResults(checks.path("path", path), others)
+    path = checks.path("path", path)
+    from ensemble.report.opened import CampaignResults  # xarray and pandas take half a second
+
+    return CampaignResults(path, others)

@@ -133,12 +133,13 @@ MAX_PENETRATION = Bounds(
 )
 FAR_DISPLACEMENT = Bounds(1e-12, 1e12, unit="units of h_max")
 HURST = Bounds(0.0, 1.0, without_low=True, without_high=True)
-HARMONIC = Bounds(1, whole=True)
 ROLLOFF = Bounds(1.0)
 SEED = Bounds(0, whole=True)
 
 MOST_WAVES = 100_000
 """Beyond this, memory is measured in gigabytes; loops have been tested to a tenth of it."""
+
+HARMONIC = Bounds(1, MOST_WAVES, whole=True)
 
 LOAD_STEPS = Bounds(1, 100_000, whole=True)
 
@@ -146,9 +147,7 @@ ACCURACY = Bounds(1e-10, 1.0, without_high=True)
 """The field is solved to a hundredth of it, and to no less than 1e-14 in double precision; at 1e-10
 both still leave two decimal digits between them."""
 
-NODES_PER_WAVE = Bounds(
-    8, 100_000, whole=True, note="; fewer are too coarse for the shortest wave"
-)
+NODES_PER_WAVE = Bounds(8, 100_000, whole=True, note="; fewer are too coarse for the shortest wave")
 
 NODES = Bounds(1, 1 << 26, whole=True)
 """An array of so many nodes takes half a gigabyte."""
@@ -182,7 +181,7 @@ def shown(value: object) -> str:
 def number_of(value: object) -> float | int | None:
     """Return a real number as Python's own, of a NumPy scalar too; None if it is none.
 
-    A bool is an int to Python, never to a user. What is too large for a float is infinite.
+    A bool is an int to Python, never to a user. A fraction too large for a float is NaN.
     """
     if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
         value = value.item()
@@ -193,9 +192,7 @@ def number_of(value: object) -> float | int | None:
     if isinstance(value, numbers.Real | Decimal):
         try:
             return float(value)
-        except OverflowError:
-            return math.copysign(math.inf, value)
-        except ValueError:  # a signalling NaN
+        except (OverflowError, ValueError):  # of a large fraction, of a signalling NaN
             return math.nan
     return None
 
@@ -215,8 +212,8 @@ def real(name: str, value: object, bounds: Bounds = FINITE) -> float:
         raise TypeError(_sentence(name, value, bounds.text))
     try:
         number = float(number)
-    except OverflowError:
-        number = math.inf if number > 0 else -math.inf
+    except OverflowError:  # so large that no bounds hold it
+        number = math.nan
     if not bounds.holds(number):
         raise ValueError(_sentence(name, value, bounds.text))
     return number + 0.0  # -0.0 becomes 0.0

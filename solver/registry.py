@@ -47,6 +47,10 @@ def make_method(
     if nodes_per_wave is not None:
         nodes_per_wave = whole("nodes_per_wave", nodes_per_wave, NODES_PER_WAVE)
         check_nodes(nodes_per_wave, problem.profile.highest_harmonic)
+        if name == "sharp":
+            raise ValueError(
+                f"nodes_per_wave is {nodes_per_wave}: it belongs to the method 'grid' alone"
+            )
     chosen = None
     if name == "auto":
         name, chosen = choose(problem, nodes_per_wave)
@@ -63,10 +67,6 @@ def make_method(
     else:
         from solver.sharp.method import SharpMethod
 
-        if nodes_per_wave is not None:
-            raise ValueError(
-                f"nodes_per_wave is {nodes_per_wave!r}: it belongs to the method 'grid' alone"
-            )
         method = SharpMethod(problem, accuracy=accuracy, chosen=chosen)
     return method
 

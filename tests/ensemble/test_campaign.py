@@ -123,7 +123,7 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         (campaign_text().replace("h_rms = 1e-6", "h_rms = 1e-6\nm2 = 0.1"), "h_rms and m2"),
         ("[profile\n", "is not valid TOML"),
         ("x = " + "[" * 5000, "is not valid TOML"),
-        (campaign_text(ratio="900000", n0="2"), "n0 · ratio is 1800000"),
+        (campaign_text(ratio="90000", n0="2"), "n0 · ratio is 180000"),
         (campaign_text(realisations="2000000000"), "tasks: at most"),
         (campaign_text(load_steps="100000", unloading_until="-1000"), "unloading curve has"),
         ("# " + "x" * 70_000, "bytes"),

@@ -197,12 +197,12 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "one number or two": (
         [f"{k % 7},{k % 3}" for k in range(99)],
         {"unit": "um"},
-        "give --decimal",
+        "give decimal",
     ),
     "four numbers or two": (
         [f"{k},5,1,{k % 3}" for k in range(99)],
         {"unit": "um"},
-        "give --decimal",
+        "give decimal",
     ),
     "no numbers": (["a trace", "of words"], {}, "no line of numbers"),
     "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),
