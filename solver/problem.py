@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from solver.checks import RMS_SLOPE, WORK_OF_ADHESION, instance, real
+from solver.checks import RMS_SLOPE, WORK_OF_ADHESION, instance, plain, real
 from solver.control import Control
 from solver.material import HalfSpace
 from solver.profile import Array, Profile
@@ -34,7 +34,8 @@ def check_slope(rms_slope: float) -> None:
         If the rms slope lies outside :data:`solver.checks.RMS_SLOPE`.
     """
     if not RMS_SLOPE.holds(rms_slope):
-        raise ValueError(f"rms slope is {rms_slope:,.4g}: it must be {RMS_SLOPE.text}")
+        shown = f"{rms_slope:,.4g}" if 1 < rms_slope < 1e6 else plain(float(f"{rms_slope:.4g}"))
+        raise ValueError(f"rms slope is {shown}: it must be {RMS_SLOPE.text}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -217,7 +217,7 @@ def no_computing(monkeypatch):
         (("--hurst", "nan"), "hurst is nan: it must be a number between"),
         ((*OK, "--period", -1e-3), "period is -0.001: it must be a positive number"),
         ((*OK, "--period", 0), "period is 0.0: it must be a positive number"),
-        ((*OK, "--n0", 0), "n0 is 0: it must be a whole number of at least 1"),
+        ((*OK, "--n0", 0), "n0 is 0: it must be a whole number from 1 to"),
         ((*OK, "--ratio", -2), "ratio is -2: it must be"),
         ((*OK, "--seed", -1), "seed is -1: it must be"),
         ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "give exactly one of h_rms, m2 and c0"),

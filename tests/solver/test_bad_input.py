@@ -236,13 +236,19 @@ OF_ROWS: dict[str, Callable[[Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", OF_ROWS)
-@pytest.mark.parametrize(("row", "error", "text"), ROWS, ids=range(len(ROWS)))
+@pytest.mark.parametrize(
+    ("name", "row", "error", "text"),
+    [
+        (name, *case)
+        for name in OF_ROWS
+        for case in ROWS
+        if name != "max_penetration" or case[0] is not None  # None is another control's
+    ],
+    ids=lambda v: repr(v)[:20],
+)
 def test_what_is_no_row_of_numbers_is_refused(
     name: str, row: Any, error: type[Exception], text: str
 ) -> None:
-    if name == "max_penetration" and row is None:
-        pytest.skip("None is another control's")  # see test_one_turning_point_is_wanted
     with pytest.raises(error) as caught:
         OF_ROWS[name](row)
     assert str(caught.value).startswith(name + text)
@@ -459,7 +465,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         "Problem",
         lambda: Problem(WAVE.scaled(1, 1e-9), SOLID, 0.04),
         ValueError,
-        "rms slope is 4.443e+06: it must be",
+        "rms slope is 4.443e6: it must be",
     ),
     (
         "Problem",
