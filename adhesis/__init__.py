@@ -2,10 +2,13 @@
 
 Everything that a user of the library needs is imported from here; other names may change without
 notice. Lengths in m, stresses in Pa (compression positive), energies per unit depth in J/m, losses
-per nominal area in J/m². Loads no MPI and no matplotlib.
+per nominal area in J/m². Loads no MPI and no matplotlib. A star import takes everything but
+``open``, which would replace the built-in one.
 """
 
-from adhesis._open import open
+from adhesis._open import open as open
+from adhesis._version import __version__ as __version__
+from ensemble.errors import InputError
 from ensemble.trace.answer import loss_of_trace
 from ensemble.trace.prepare import prepare_trace
 from ensemble.trace.read import read_trace
@@ -14,7 +17,7 @@ from solver.jumps import Jump
 from solver.loop import run_loop
 from solver.loop_result import LoopResult
 from solver.material import HalfSpace
-from solver.method import ContactState, Fields, Method, Opening, Path
+from solver.method import ContactState, Fields, Method, Opening, Path, PathError
 from solver.path import MinorLoop, PathResult, run_path
 from solver.problem import Problem
 from solver.profile import Profile, profile_from_heights, self_affine_profile, single_wave
@@ -26,18 +29,19 @@ __all__ = [
     "Control",
     "Fields",
     "HalfSpace",
+    "InputError",
     "Jump",
     "LoopResult",
     "Method",
     "MinorLoop",
     "Opening",
     "Path",
+    "PathError",
     "PathResult",
     "Problem",
     "Profile",
     "loss_of_trace",
     "make_method",
-    "open",
     "prepare_trace",
     "profile_from_heights",
     "read_trace",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import pathlib
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
+
+from solver import checks
 
 if TYPE_CHECKING:
     from ensemble.report.opened import CampaignResults
@@ -33,11 +34,17 @@ def open(
     ------
     InputError
         If the file is missing, foreign or damaged; one sentence.
+    TypeError
+        If ``path`` is no path, or ``beside`` no list of them.
 
     References
     ----------
     docs/python.md, "Results in Python"
     """
+    if isinstance(beside, str | os.PathLike):
+        raise TypeError(f"beside is {str(beside)!r}: it must be a list of paths")
+    others = [checks.path(f"beside[{place}]", other) for place, other in enumerate(beside)]
+    path = checks.path("path", path)
     from ensemble.report.opened import CampaignResults  # xarray and pandas take half a second
 
-    return CampaignResults(pathlib.Path(path), [pathlib.Path(other) for other in beside])
+    return CampaignResults(path, others)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 from ensemble.foreign import printable
 
 
@@ -12,8 +16,13 @@ class _Printable(Exception):
         return printable(super().__str__())
 
 
-class InputError(_Printable):
-    """A bad value, file or option. The text names the value and the rule in one sentence."""
+class InputError(_Printable, ValueError):
+    """A bad value, file or option. The text names the value and the rule in one sentence.
+
+    References
+    ----------
+    docs/python.md, "Bad input"
+    """
 
 
 class RankError(InputError):
@@ -22,3 +31,32 @@ class RankError(InputError):
 
 class WriteError(_Printable):
     """A row could not be written: the disk is full, say. What was written before is sound."""
+
+
+_of_a_command: ContextVar[bool] = ContextVar("of_a_command", default=False)
+
+
+@contextmanager
+def naming_options() -> Iterator[None]:
+    """Let messages name the options of a command instead of the parameters of functions."""
+    before = _of_a_command.set(True)
+    try:
+        yield
+    finally:
+        _of_a_command.reset(before)
+
+
+def parameter(name: str) -> str:
+    """Return the name by which a caller gave a parameter: longest_gap, or --longest-gap."""
+    return f"--{name.replace('_', '-')}" if _of_a_command.get() else name
+
+
+@contextmanager
+def refused_as_input() -> Iterator[None]:
+    """Raise an InputError where a value is refused by the solver; other errors pass."""
+    try:
+        yield
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(str(error)) from None

@@ -26,6 +26,7 @@ import math
 from dataclasses import dataclass
 from typing import TypeVar
 
+from solver.checks import STIFFNESS, real
 from solver.profile import Array
 
 Value = TypeVar("Value", float, Array)
@@ -43,7 +44,9 @@ class Control:
     Raises
     ------
     ValueError
-        If the stiffness is negative or no number.
+        If the stiffness is negative or NaN.
+    TypeError
+        If it is no number.
 
     References
     ----------
@@ -53,11 +56,7 @@ class Control:
     stiffness: float = math.inf
 
     def __post_init__(self) -> None:
-        if not self.stiffness >= 0:
-            raise ValueError(
-                f"stiffness is {self.stiffness!r}: it must be at least 0, in Pa/m of nominal area "
-                "(0 is load control)"
-            )
+        object.__setattr__(self, "stiffness", real("stiffness", self.stiffness, STIFFNESS))
 
     @property
     def is_fixed(self) -> bool:

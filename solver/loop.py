@@ -6,8 +6,16 @@ from collections.abc import Callable, Sequence
 from time import process_time
 from typing import TypeVar
 
-import numpy as np
-
+from solver.checks import (
+    FAR_DISPLACEMENT,
+    LOAD_STEPS,
+    MAX_PENETRATION,
+    MAX_STRESS,
+    function,
+    instance,
+    real,
+    whole,
+)
 from solver.control import Control
 from solver.jumps import Branch
 from solver.loop_result import LoopResult, result_of
@@ -16,6 +24,9 @@ from solver.problem import Problem
 from solver.record import Axis, Record
 
 T = TypeVar("T")
+
+HOW_METHOD = "make_method(name, problem)"
+"""How to make a method, for whoever gives something else."""
 
 Progress = Callable[[Branch, float, ContactState], None]
 """Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
@@ -30,29 +41,26 @@ _FARTHEST = 1000
 _FARTHEST_HEIGHTS = 1e6
 
 
-def check_cycle(turning_point: float, load_steps: int, control: Control | None = None) -> None:
-    """Refuse a cycle that cannot be run.
+def check_cycle(
+    turning_point: float, load_steps: int, control: Control | None = None
+) -> tuple[float, int]:
+    """Check a cycle; return its turning point and load steps as float and int.
 
     Raises
     ------
     ValueError
         Unless the turning point is positive and finite and, at fixed separation, below 1, and
-        load_steps is a whole number of at least 1.
+        load_steps is a whole number from 1 to 100,000.
+    TypeError
+        If one of them is no number.
     """
     control = control or Control()
-    sound = bool(np.isfinite(turning_point)) and turning_point > 0
-    if control.is_fixed and not (sound and turning_point < 1):
-        raise ValueError(
-            f"max_penetration is {turning_point!r}: it must lie between 0 and 1, both excluded "
-            "(in units of h_max; at 1 the mean gap would be zero, and no such state exists)"
-        )
-    if not sound:
-        name, unit = ("max_stress", "Pa") if control.is_load else ("max_penetration", "h_max")
-        raise ValueError(
-            f"{name} is {turning_point!r}: it must be positive and finite, in units of {unit}"
-        )
-    if load_steps != int(load_steps) or load_steps < 1:
-        raise ValueError(f"load_steps is {load_steps!r}: it must be a whole number of at least 1")
+    name, bounds = "max_penetration", FAR_DISPLACEMENT
+    if control.is_fixed:
+        bounds = MAX_PENETRATION
+    elif control.is_load:
+        name, bounds = "max_stress", MAX_STRESS
+    return real(name, turning_point, bounds), whole("load_steps", load_steps, LOAD_STEPS)
 
 
 def run_loop(
@@ -84,6 +92,8 @@ def run_loop(
     ------
     ValueError
         If the cycle cannot be run (:func:`check_cycle`).
+    TypeError
+        If the method is no Method, or a value no number.
     PathError
         If the path cannot be followed, or the contact has not detached after a thousand loading
         strokes.
@@ -92,8 +102,11 @@ def run_loop(
     ----------
     docs/theory.md, "3. The loop"
     """
+    control = instance("method", method, Method, HOW_METHOD).problem.control
     turning_point = turning_of(method.problem, max_penetration, max_stress)
-    check_cycle(turning_point, load_steps, method.problem.control)
+    turning_point, load_steps = check_cycle(turning_point, load_steps, control)
+    function("progress", progress)
+    function("on_state", on_state)
     started = process_time()
     record = Record(on_state)
     axis = Axis(turning_point, load_steps)

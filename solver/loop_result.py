@@ -14,12 +14,14 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.checks import choice, reals
 from solver.control import Control
-from solver.jumps import Branch, Jump
+from solver.jumps import BRANCHES, Branch, Jump
 from solver.method import Method, MethodReport
 from solver.problem import Problem
 from solver.profile import Array
 from solver.record import Record
+from solver.values import ByValue
 
 STEEP = 0.3
 """Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
@@ -29,9 +31,17 @@ STEEP = 0.3
 _LARGE = 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class LoopResult:
+def counted(count: int, thing: str) -> str:
+    """Return "1 jump", "2 jumps"."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopResult(ByValue):
     """A complete loop; arrays have the shape (states,), in the order of the path.
+
+    Immutable; two loops are equal if all is that they hold but ``seconds`` and ``method``: the same
+    problem followed twice by one method gives equal loops.
 
     Attributes
     ----------
@@ -101,8 +111,17 @@ class LoopResult:
     loss_error: float
     work_gained: float
     work_spent: float
-    seconds: float
-    method: MethodReport
+    seconds: float = field(compare=False)
+    method: MethodReport = field(compare=False)
+
+    def __repr__(self) -> str:
+        """Two lines: what was followed, and its loss; the first warnings are counted only."""
+        return (
+            f"LoopResult(turning_point={self.turning_point:g}, {self.load_steps} load steps, "
+            f"{len(self.separation)} states, method {self.method.name!r},\n"
+            f"  loss={self.loss:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
+            f"{counted(len(self.jumps), 'jump')}, {counted(len(self.warnings), 'warning')})"
+        )
 
     @property
     def energy(self) -> Array:
@@ -111,7 +130,13 @@ class LoopResult:
 
     @property
     def audit_residual(self) -> float:
-        """(loop integral - sum of drops) / loop integral; 0 for a loop without loss."""
+        """(loop integral - sum of drops) / loop integral; 0 for a loop without loss.
+
+        Without adhesion there is no loss: the loop integral is only rounding, and counts as such in
+        ``loss_error``.
+        """
+        if self.problem.work_of_adhesion == 0:
+            return 0.0
         return (self.loss - self.loss_from_drops) / self.loss if self.loss else 0.0
 
     @property
@@ -157,7 +182,7 @@ class LoopResult:
     @property
     def pull_off_stress(self) -> float:
         """Largest mean tension on unloading, -min p̄, in Pa."""
-        return float(-self.mean_stress[self.branch == "unloading"].min())
+        return float(0.0 - self.mean_stress[self.branch == "unloading"].min())
 
     @property
     def largest_contact_fraction(self) -> float:
@@ -175,7 +200,7 @@ class LoopResult:
         return self.work_spent / self.largest_contact_fraction
 
     def __str__(self) -> str:
-        """A few lines for a terminal: what was followed, its losses, its jumps, its pull-off."""
+        """A few lines for a terminal: what was followed, its losses, jumps, pull-off, warnings."""
         profile = self.problem.profile
         kinds = Counter(jump.kind for jump in self.jumps)
         several = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
@@ -193,6 +218,7 @@ class LoopResult:
                 f"pull-off   {self.pull_off_stress:.4g} Pa, "
                 f"out of contact at Δ/h_max = {self.pull_off_penetration:.4g}",
                 f"states     {len(self.separation)}, {self.seconds:.2g} s of CPU time",
+                *(f"WARNING    {text}" for text in self.warnings),
             )
         )
 
@@ -207,7 +233,13 @@ class LoopResult:
         Returns
         -------
         array, shape (load steps from the branch's first state on the axis to its last,)
+
+        Raises
+        ------
+        ValueError
+            If the branch is unknown, or there are not as many values as states.
         """
+        values = self._of_states(values)
         chosen = self.states(branch, load_steps_only=True)
         control, h_max = self.problem.control, self.problem.profile.h_max
         drive = -control.prescribed(self.separation[chosen], self.mean_stress[chosen])
@@ -233,7 +265,13 @@ class LoopResult:
         -------
         array, shape (places,)
             After a jump at the very place; 0 out of contact; NaN beyond the turning point.
+
+        Raises
+        ------
+        ValueError
+            If the branch is unknown, or there are not as many values as states.
         """
+        values, drives = self._of_states(values), reals("drives", drives)
         chosen = self.states(branch)
         control, h_max = self.problem.control, self.problem.profile.h_max
         control = Control() if control.is_load else control
@@ -249,9 +287,26 @@ class LoopResult:
         return np.where(beyond, np.nan, found)
 
     def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
-        """Indices of the states of one branch, optionally only those on the load-step axis."""
+        """Indices of the states of one branch, optionally only those on the load-step axis.
+
+        Raises
+        ------
+        ValueError
+            If the branch is neither "loading" nor "unloading".
+        """
+        choice("branch", branch, BRANCHES)
         chosen = self.branch == branch
         return np.flatnonzero(chosen & self.load_step if load_steps_only else chosen)
+
+    def _of_states(self, values: Array) -> Array:
+        """Refuse values that are not one for each state."""
+        array = np.asarray(values)
+        if array.shape != self.separation.shape:
+            raise ValueError(
+                f"values have the shape {array.shape}: there must be one for each of the "
+                f"{len(self.separation)} states"
+            )
+        return array
 
 
 def result_of(
@@ -274,7 +329,7 @@ def result_of(
         load_steps=load_steps,
         branch=np.array(record.branches),
         load_step=np.array(record.on_axis),
-        penetration=1.0 - separation / problem.profile.h_max,
+        penetration=problem.penetration(separation),
         separation=separation,
         mean_stress=record.column("mean_stress"),
         contact_fraction=record.column("contact_fraction"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
+from solver.checks import LENGTH, POISSON, YOUNG, real
 
 
 @dataclass(frozen=True)
@@ -14,7 +14,7 @@ class HalfSpace:
     Parameters
     ----------
     young : float
-        Young's modulus E, in Pa, positive.
+        Young's modulus E, in Pa, from 1e-3 to 1e15.
     poisson : float
         Poisson's ratio ν, -1 < ν ≤ 0.5.
 
@@ -22,6 +22,8 @@ class HalfSpace:
     ------
     ValueError
         If a value breaks the rules above.
+    TypeError
+        If a value is no number.
 
     References
     ----------
@@ -32,10 +34,8 @@ class HalfSpace:
     poisson: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.young) and self.young > 0):
-            raise ValueError(f"young is {self.young!r}: it must be positive and finite, in Pa")
-        if not -1 < self.poisson <= 0.5:
-            raise ValueError(f"poisson is {self.poisson!r}: it must lie in (-1, 0.5]")
+        object.__setattr__(self, "young", real("young", self.young, YOUNG))
+        object.__setattr__(self, "poisson", real("poisson", self.poisson, POISSON))
 
     @property
     def modulus(self) -> float:
@@ -51,15 +51,15 @@ class HalfSpace:
         Parameters
         ----------
         thickness : float
-            d in m, positive.
+            d in m, from 1e-12 to 1e6.
 
         Raises
         ------
         ValueError
-            If d is not positive, or ν = 0.5: an incompressible layer that cannot spread is rigid.
+            If d is out of its bounds, or ν = 0.5: an incompressible layer that cannot spread is
+            rigid.
         """
-        if not (np.isfinite(thickness) and thickness > 0):
-            raise ValueError(f"thickness is {thickness!r}: it must be positive and finite, in m")
+        thickness = real("thickness", thickness, LENGTH)
         nu = self.poisson
         if nu == 0.5:
             raise ValueError(

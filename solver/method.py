@@ -34,10 +34,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from solver.checks import instance
 from solver.jumps import BRANCHES, Branch, Jump
 from solver.problem import Problem
 from solver.profile import Array
 from solver.state import ContactState
+from solver.values import ByValue
 
 __all__ = [
     "BRANCHES",
@@ -52,11 +54,16 @@ __all__ = [
 
 
 class PathError(RuntimeError):
-    """A path that cannot be followed: there is no state to hand out, and so no number."""
+    """A path that cannot be followed: there is no state to hand out, and so no number.
+
+    References
+    ----------
+    docs/methods.md, "Rules of evolution"
+    """
 
 
-@dataclass(frozen=True)
-class Path:
+@dataclass(frozen=True, eq=False, repr=False)
+class Path(ByValue):
     """The states from the one that ``follow`` was given (excluded) to the wanted separation.
 
     Attributes
@@ -80,8 +87,8 @@ class Path:
     error: float = float("nan")
 
 
-@dataclass(frozen=True, eq=False)
-class Fields:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fields(ByValue):
     """Fields of one state on a grid of n nodes, each of shape (n,).
 
     Attributes
@@ -109,8 +116,8 @@ class Fields:
     gap: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Opening:
+@dataclass(frozen=True, eq=False, repr=False)
+class Opening(ByValue):
     """Opening of one gap, from edge to edge of contact; see :mod:`solver.fields`.
 
     Attributes
@@ -168,7 +175,8 @@ class Method(ABC):
     nodes: int | None = None
 
     def __init__(self, problem: Problem, *, chosen: str | None = None) -> None:
-        self.problem = problem
+        how = "Problem(profile, half_space, work_of_adhesion)"
+        self.problem = instance("problem", problem, Problem, how)
         self.chosen = chosen
 
     @abstractmethod

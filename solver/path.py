@@ -20,15 +20,18 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.checks import finite_row, flag, function, instance
 from solver.jumps import Branch, Jump
-from solver.loop import Progress, check_cycle
-from solver.loop_result import estimated_error
+from solver.loop import HOW_METHOD, Progress, check_cycle
+from solver.loop_result import counted, estimated_error
 from solver.method import ContactState, Method, MethodReport, PathError
 from solver.problem import Problem
 from solver.profile import Array
 from solver.record import Axis, Record
+from solver.values import ByValue
 
 _MAX_UNLOADING_STROKES = 1000  # as in a loop
+_SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # states whose stress and contact differ by less (of what they went through) are one
 
 
@@ -78,9 +81,11 @@ class MinorLoop:
         return self.loss - self.energy_change - self.loss_from_drops
 
 
-@dataclass(frozen=True, eq=False)
-class PathResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class PathResult(ByValue):
     """A path of several legs; arrays have the shape (states,), in the order of the path.
+
+    Immutable; two paths are equal if all is that they hold but ``seconds`` and ``method``.
 
     Attributes
     ----------
@@ -144,8 +149,20 @@ class PathResult:
     loss_from_drops: float
     energy_change: float
     loss_error: float
-    seconds: float
-    method: MethodReport
+    seconds: float = field(compare=False)
+    method: MethodReport = field(compare=False)
+
+    def __repr__(self) -> str:
+        """Two lines: what was followed, and its work."""
+        points = ", ".join(f"{point:g}" for point in self.turning_points[:_SHOWN])
+        points += ", …" if len(self.turning_points) > _SHOWN else ""
+        return (
+            f"PathResult({points}{', out' if self.ends_out else ''}; {self.load_steps} load steps, "
+            f"{len(self.separation)} states, method {self.method.name!r},\n"
+            f"  work={self.work:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
+            f"{counted(len(self.jumps), 'jump')}, "
+            f"{counted(len(self.minor_loops), 'minor loop')})"
+        )
 
     @property
     def energy(self) -> Array:
@@ -159,7 +176,12 @@ class PathResult:
 
     @property
     def audit_residual(self) -> float:
-        """(work - change of energy - sum of drops) / largest of their sizes; 0 without any."""
+        """(work - change of energy - sum of drops) / largest of their sizes; 0 without any.
+
+        Without adhesion a path that ends out of contact has none: its work is only rounding.
+        """
+        if self.problem.work_of_adhesion == 0 and self.ends_out:
+            return 0.0
         scale = max(abs(self.work), abs(self.energy_change), self.loss_from_drops)
         rest = self.work - self.energy_change - self.loss_from_drops
         return rest / scale if scale else 0.0
@@ -175,13 +197,13 @@ def check_path(
     ValueError
         Unless it starts with loading and turns at every point, and the largest turning point could
         be that of a loop (:func:`solver.loop.check_cycle`).
+    TypeError
+        If one of them, or load_steps, is no number.
     """
-    points = tuple(float(p) for p in turning_points)
+    found = finite_row("turning_points", turning_points, entry="turning point")
+    points: tuple[float, ...] = tuple(found.tolist())
     if not points:
         raise ValueError("a path needs at least one turning point")
-    for p in points:
-        if not np.isfinite(p):
-            raise ValueError(f"turning point {p!r} of the path is not a finite number")
     if points[0] <= 0:
         raise ValueError(
             f"the path starts with {points[0]:g}: it must start with loading, to a turning point "
@@ -227,6 +249,8 @@ def run_path(
     ------
     ValueError
         If the path cannot be followed (:func:`check_path`).
+    TypeError
+        If the method is no Method, or a value no number.
     PathError
         If there are no states to follow, or contact is lost before the path has ended.
 
@@ -234,8 +258,12 @@ def run_path(
     ----------
     docs/theory.md, "8. Paths and controls"
     """
+    instance("method", method, Method, HOW_METHOD)
     points = check_path(turning_points, load_steps, method.problem)
-    if out and len(points) % 2 == 0:
+    load_steps = int(load_steps)
+    function("progress", progress)
+    function("on_state", on_state)
+    if flag("out", out) and len(points) % 2 == 0:
         raise ValueError(
             f"the path ends with unloading to {points[-1]:g} and goes out: leave that turning "
             "point away"
@@ -368,7 +396,7 @@ class _Walk:
             leg=np.array(self.legs),
             branch=np.array(record.branches),
             load_step=np.array(record.on_axis),
-            penetration=1.0 - separation / problem.profile.h_max,
+            penetration=problem.penetration(separation),
             separation=separation,
             mean_stress=record.column("mean_stress"),
             contact_fraction=record.column("contact_fraction"),

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from solver.checks import RMS_SLOPE, WORK_OF_ADHESION, instance, plain, real
 from solver.control import Control
 from solver.material import HalfSpace
-from solver.profile import Profile
+from solver.profile import Array, Profile
 from solver.state import ContactState
+from solver.values import ByValue
+
+# Rounding of a separation over h_max: a penetration that is smaller is 0.
+Value = TypeVar("Value", float, Array)
+
+_ROUNDING = 8 * float(np.finfo(float).eps)
 
 
 def stress_scale(half_space: HalfSpace, period: float, h_max: Any) -> Any:
@@ -18,25 +25,42 @@ def stress_scale(half_space: HalfSpace, period: float, h_max: Any) -> Any:
     return 0.5 * half_space.modulus * (2 * np.pi / period) * h_max
 
 
-@dataclass(frozen=True, eq=False)
-class Problem:
+def check_slope(rms_slope: float) -> None:
+    """Refuse a profile so steep or so shallow that its heights and period have not one unit.
+
+    Raises
+    ------
+    ValueError
+        If the rms slope lies outside :data:`solver.checks.RMS_SLOPE`.
+    """
+    if not RMS_SLOPE.holds(rms_slope):
+        shown = f"{rms_slope:,.4g}" if 1 < rms_slope < 1e6 else plain(float(f"{rms_slope:.4g}"))
+        raise ValueError(f"rms slope is {shown}: it must be {RMS_SLOPE.text}")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Problem(ByValue):
     """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
+
+    Immutable; two problems are equal if all four parts are.
 
     Parameters
     ----------
     profile : Profile
-        Not flat.
+        With an rms slope of at most 100; the theory is for slopes far below 1.
     half_space : HalfSpace
     work_of_adhesion : float
-        γ in J/m², finite, not negative (γ = 0 is contact without adhesion).
+        γ in J/m², 0 (contact without adhesion) or from 1e-30 to 1e30.
     control : Control
         What holds the half-space; a fixed separation by default.
 
     Raises
     ------
     ValueError
-        If γ breaks the rule, or the profile is flat: two flat surfaces touch everywhere at once,
-        and a penetration in units of h_max has no meaning.
+        If γ breaks the rule, or the rms slope is one that no small-strain theory covers: heights
+        and period are not in one unit then.
+    TypeError
+        If a part is of another class, or γ no number.
 
     References
     ----------
@@ -49,16 +73,12 @@ class Problem:
     control: Control = field(default_factory=Control)
 
     def __post_init__(self) -> None:
-        gamma = self.work_of_adhesion
-        if not (np.isfinite(gamma) and gamma >= 0):
-            raise ValueError(
-                f"work_of_adhesion is {gamma!r}: it must be finite and not negative, in J/m²"
-            )
-        if self.profile.is_flat:
-            raise ValueError(
-                "the profile is flat (h_max = 0): two flat surfaces touch everywhere at once and "
-                "a penetration in units of h_max has no meaning"
-            )
+        instance("profile", self.profile, Profile, "single_wave or profile_from_heights")
+        instance("half_space", self.half_space, HalfSpace, "HalfSpace(young, poisson)")
+        gamma = real("work_of_adhesion", self.work_of_adhesion, WORK_OF_ADHESION)
+        object.__setattr__(self, "work_of_adhesion", gamma)
+        instance("control", self.control, Control, "Control(stiffness), for a load Control(0)")
+        check_slope(float(np.sqrt(self.profile.m2)))
 
     @property
     def stress_scale(self) -> float:
@@ -103,6 +123,9 @@ class Problem:
             where = f"before u_tot/h_max = {self.penetration(prescribed):g}"
         return f"the contact runs into full contact {where}: no state with a gap carries that"
 
-    def penetration(self, separation: float) -> float:
-        """Penetration Δ~ = 1 - s/h_max at the separation s in m."""
-        return 1.0 - separation / self.profile.h_max
+    def penetration(self, separation: Value) -> Value:
+        """Penetration Δ~ = 1 - s/h_max at separations s in m; 0 where it is only rounding."""
+        found = 1.0 - separation / self.profile.h_max
+        if isinstance(found, np.ndarray):
+            return np.where(np.abs(found) < _ROUNDING, 0.0, found)
+        return 0.0 if abs(found) < _ROUNDING else found

@@ -10,29 +10,57 @@ Lengths in m.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.checks import (
+    COEFFICIENT,
+    FINITE,
+    HARMONIC,
+    HEIGHT,
+    HEIGHT_SQUARE,
+    HURST,
+    LENGTH,
+    MEAN_SQUARE_SLOPE,
+    MOST_WAVES,
+    NODES,
+    ROLLOFF,
+    SEED,
+    Bounds,
+    choice,
+    finite_row,
+    real,
+    reals,
+    row,
+    whole,
+)
+from solver.values import ByValue
+
 Array = NDArray[np.float64]
 Amplitudes = Literal["deterministic", "rayleigh"]
 
-# Beyond this, memory is measured in gigabytes; loops have been tested to a tenth of it.
-MOST_WAVES = 100_000
+_HEIGHT_OR_NONE = Bounds(0.0, HEIGHT.high, unit="m")
+_SHARE = Bounds(0.0, math.inf)
+_ORDER = Bounds(0, 16, whole=True)
 
 # Nodes per shortest wave of the sampling that brackets every crest before Newton's iteration.
 _CREST_SAMPLING = 16
 _CREST_SWEEPS = 60
 
+NORMALISATIONS = {"h_rms": HEIGHT, "m2": MEAN_SQUARE_SLOPE, "c0": HEIGHT_SQUARE}
+"""How a self-affine spectrum may be scaled, each with its bounds."""
+
 EQUAL_CRESTS = 1e-9
 """Crests whose heights differ by less than this share of h_max are equal: they touch together."""
 
 
-@dataclass(frozen=True, eq=False)
-class Crests:
+@dataclass(frozen=True, eq=False, repr=False)
+class Crests(ByValue):
     """Crests of a profile, in the order of x; arrays of shape (crests,).
 
     Attributes
@@ -48,21 +76,27 @@ class Crests:
     curvature: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+@dataclass(frozen=True, eq=False, repr=False)
+class Profile(ByValue):
     """One period of a rigid profile with zero mean, pointing towards the elastic solid.
+
+    Immutable; two profiles are equal if their periods and all their coefficients are.
 
     Parameters
     ----------
     period : float
-        λ, in m, positive.
+        λ, in m, from 1e-12 to 1e6.
     coefficients : complex array, shape (M + 1,)
-        a_0 … a_M in m; ``coefficients[m]`` belongs to the wave number m q0. a_0 must be zero.
+        a_0 … a_M in m; ``coefficients[m]`` belongs to the wave number m q0. a_0 must be zero, and
+        another one must not.
 
     Raises
     ------
     ValueError
-        If the period is not positive and finite, or a coefficient is not finite, or a_0 is not 0.
+        If the period is out of its bounds, a coefficient is masked or not finite, or a_0 is not 0;
+        or the profile is flat: a loop needs a highest point.
+    TypeError
+        If the period is no number, or the coefficients are no row of numbers.
 
     References
     ----------
@@ -73,19 +107,38 @@ class Profile:
     coefficients: NDArray[np.complex128]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.period) and self.period > 0):
-            raise ValueError(f"period is {self.period!r}: it must be positive and finite, in m")
-        a = np.array(self.coefficients, dtype=np.complex128)
-        if a.ndim != 1 or a.size < 2:
+        object.__setattr__(self, "period", real("period", self.period, LENGTH))
+        a = row("coefficients", self.coefficients, entry="coefficient", imaginary=True).astype(
+            np.complex128
+        )
+        if a.size < 2:
             raise ValueError(
                 f"a profile has the coefficients a_0 … a_M, M ≥ 1; these have shape {a.shape}"
             )
-        if not np.all(np.isfinite(a)):
-            raise ValueError("every coefficient of a profile must be finite")
+        bad = np.flatnonzero(~np.isfinite(a))
+        if bad.size:
+            raise ValueError(
+                f"coefficients[{bad[0]}] is {a[bad[0]]}: every coefficient of a profile must be "
+                "finite"
+            )
         if a[0] != 0:
             raise ValueError(f"a_0 is {a[0]}: a profile has zero mean, so a_0 must be 0")
-        a.setflags(write=False)
+        if not a.any():
+            raise ValueError(
+                "the profile is flat (h_max = 0): two flat surfaces touch everywhere at once and "
+                "a penetration in units of h_max has no meaning"
+            )
+        real("largest coefficient", float(np.abs(a).max()), COEFFICIENT)
         object.__setattr__(self, "coefficients", a)
+        super().__post_init__()
+
+    def __repr__(self) -> str:
+        """One line: period, waves, heights and slope."""
+        return (
+            f"Profile(period={self.period:.6g} m, {len(self.coefficients)} coefficients, highest "
+            f"harmonic {self.highest_harmonic}, h_rms={self.h_rms:.6g} m, "
+            f"rms slope={math.sqrt(self.m2):.6g})"
+        )
 
     # ------------------------------------------------------------------ wave numbers
 
@@ -96,19 +149,13 @@ class Profile:
 
     @cached_property
     def highest_harmonic(self) -> int:
-        """Largest m with a_m ≠ 0; 0 for a flat profile."""
-        present = np.flatnonzero(self.coefficients)
-        return int(present[-1]) if present.size else 0
+        """Largest m with a_m ≠ 0."""
+        return int(np.flatnonzero(self.coefficients)[-1])
 
     @property
     def shortest_wavelength(self) -> float:
-        """λ_min = λ / (highest harmonic), in m; the period for a flat profile."""
-        return self.period / max(self.highest_harmonic, 1)
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether every coefficient is zero."""
-        return self.highest_harmonic == 0
+        """λ_min = λ / (highest harmonic), in m."""
+        return self.period / self.highest_harmonic
 
     # ------------------------------------------------------------------ values
 
@@ -119,6 +166,8 @@ class Profile:
         ------
         ValueError
             If the grid cannot carry the shortest wave (n must exceed twice the highest harmonic).
+        TypeError
+            If n is no number.
         """
         return self._sample(self.coefficients, n)
 
@@ -135,7 +184,8 @@ class Profile:
 
         Returns an array of the shape of ``x``, in m^(1 - derivative).
         """
-        x = np.asarray(x, dtype=float)
+        x = reals("x", x)
+        derivative = whole("derivative", derivative, _ORDER)
         m = np.flatnonzero(self.coefficients)
         a = 2 * (self.coefficients * self._iq(derivative))[m]
         phase = np.multiply.outer(x * self.q0, m)
@@ -148,6 +198,7 @@ class Profile:
         return powers
 
     def _sample(self, a: NDArray[np.complex128], n: int) -> Array:
+        n = whole("n", n, NODES)
         if n <= 2 * self.highest_harmonic:
             raise ValueError(
                 f"{n} nodes are too few: the shortest wave has harmonic {self.highest_harmonic}, "
@@ -166,6 +217,7 @@ class Profile:
         m0 is the mean square height, m2 the mean square slope, m4 the mean square curvature
         (Nayak 1971).
         """
+        order = whole("order", order, _ORDER)
         q = self.q0 * np.arange(self.coefficients.size)
         return float(2 * np.sum(q**order * np.abs(self.coefficients) ** 2))
 
@@ -192,16 +244,14 @@ class Profile:
     def crests(self, within: float = EQUAL_CRESTS) -> Crests:
         """Crests of the continuous function whose height is at least (1 - within) h_max.
 
-        Found between nodes by Newton's iteration, so they depend on no grid. A flat profile has
-        none.
+        Found between nodes by Newton's iteration, so they depend on no grid.
 
         Parameters
         ----------
         within : float
             Share of h_max, not negative.
         """
-        if self.is_flat:
-            return Crests(*np.empty((3, 0)))
+        within = real("within", within, _SHARE)
         n = _CREST_SAMPLING * 2 * self.highest_harmonic
         dx = self.period / n
         h = self.heights(n)
@@ -225,8 +275,6 @@ class Profile:
     @cached_property
     def highest_point(self) -> tuple[float, float]:
         """(x, h) of the highest point of the continuous function, in m, independent of any grid."""
-        if self.is_flat:
-            return 0.0, 0.0
         crests = self.crests(0.0)
         return float(crests.position[0] % self.period), float(crests.height[0])
 
@@ -239,6 +287,7 @@ class Profile:
 
     def shifted(self, distance: float) -> Profile:
         """Return the profile moved by ``distance`` (m) towards positive x."""
+        distance = real("distance", distance)
         m = np.arange(self.coefficients.size)
         return Profile(self.period, self.coefficients * np.exp(-1j * m * self.q0 * distance))
 
@@ -248,6 +297,7 @@ class Profile:
 
     def scaled(self, height: float, length: float = 1.0) -> Profile:
         """Return the profile with heights multiplied by ``height`` and the period by ``length``."""
+        height, length = real("height", height), real("length", length)
         return Profile(self.period * length, self.coefficients * height)
 
 
@@ -284,7 +334,8 @@ def self_affine_profile(
     seed : int
         Non-negative.
     h_rms, m2, c0 : float
-        Exactly one of: root mean square height in m; mean square slope; or C0 = |a_n0|² in m².
+        Exactly one of: root mean square height in m; mean square slope; or C0 = |a_n0|² in m²;
+        positive.
     amplitudes : {"deterministic", "rayleigh"}
         |a_m| fixed by the power law as in the paper, or Rayleigh distributed about it (a Gaussian
         process); in the latter case h_rms or m2 still hold exactly for every realisation.
@@ -293,36 +344,32 @@ def self_affine_profile(
     ------
     ValueError
         If a value breaks the rules above; the text names the value and the rule.
+    TypeError
+        If a value is no number.
 
     References
     ----------
     docs/theory.md, "2. Profiles"; Carbone, Pierro, Recchia, Phys. Rev. E 92, 062404 (2015),
     arXiv 1511.08891
     """
-    if not 0 < hurst < 1:
-        raise ValueError(f"hurst is {hurst!r}: it must lie between 0 and 1, both excluded")
-    for name, value in (("n0", n0), ("ratio", ratio)):
-        if value != int(value) or value < 1:
-            raise ValueError(f"{name} is {value!r}: it must be a whole number of at least 1")
-    if seed != int(seed) or seed < 0:
-        raise ValueError(f"seed is {seed!r}: it must be a whole number of at least 0")
-    if not 1 <= rolloff <= ratio:
-        raise ValueError(f"rolloff is {rolloff!r}: it must lie between 1 and ratio ({ratio})")
+    hurst, period = real("hurst", hurst, HURST), real("period", period, LENGTH)
+    n0, ratio = whole("n0", n0, HARMONIC), whole("ratio", ratio, HARMONIC)
+    seed = whole("seed", seed, SEED)
+    rolloff = real("rolloff", rolloff, ROLLOFF)
+    if rolloff > ratio:
+        raise ValueError(f"rolloff is {rolloff:g}: it must be at most ratio ({ratio})")
     given = {k: v for k, v in {"h_rms": h_rms, "m2": m2, "c0": c0}.items() if v is not None}
     if len(given) != 1:
         raise ValueError(
             f"give exactly one of h_rms, m2 and c0; given: {', '.join(given) or 'none'}"
         )
-    (norm, target), *_ = given.items()
-    if not (np.isfinite(target) and target >= 0):
-        raise ValueError(f"{norm} is {target!r}: it must be finite and not negative")
-    if amplitudes not in ("deterministic", "rayleigh"):
-        raise ValueError(f"amplitudes is {amplitudes!r}: it must be 'deterministic' or 'rayleigh'")
-
-    top = int(n0) * int(ratio)
+    (norm, value), *_ = given.items()
+    target = real(norm, value, NORMALISATIONS[norm])
+    choice("amplitudes", amplitudes, get_args(Amplitudes))
+    top = n0 * ratio
     if top > MOST_WAVES:
         raise ValueError(f"n0 · ratio is {top}: at most {MOST_WAVES} waves are supported")
-    phase_stream, size_stream = np.random.SeedSequence(int(seed)).spawn(2)
+    phase_stream, size_stream = np.random.SeedSequence(seed).spawn(2)
     phase = np.random.default_rng(phase_stream).uniform(-np.pi, np.pi, top)  # wave numbers 1 … top
     m = np.arange(n0, top + 1)
     size = (np.maximum(m / n0, rolloff) / rolloff) ** -(hurst + 0.5)
@@ -354,20 +401,19 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     Raises
     ------
     ValueError
-        If the heights are not a one-dimensional array of at least 3 finite numbers.
+        If the heights are not one row of at least 3 finite numbers, one of them is masked, or all
+        are equal.
+    TypeError
+        If they are no real numbers (booleans are none).
 
     References
     ----------
     docs/theory.md, "2. Profiles"
     """
-    h = np.asarray(heights, dtype=float)
-    if h.ndim != 1:
-        raise ValueError(f"heights have {h.ndim} dimensions: one period is one row of numbers")
+    h = finite_row("heights", heights, entry="height")
     if h.size < 3:
         raise ValueError(f"heights hold {h.size} value(s): at least 3 are needed for one period")
-    bad = np.flatnonzero(~np.isfinite(h))
-    if bad.size:
-        raise ValueError(f"heights[{bad[0]}] is {h[bad[0]]}: every height must be a finite number")
+    real("largest height", float(np.abs(h).max()), _HEIGHT_OR_NONE)
     a = np.fft.rfft(h - h.mean()) / h.size
     # Rounding noise is not roughness: a flat or a band-limited input must stay one.
     a[np.abs(a) < 1e-15 * max(float(np.max(np.abs(h))), 1e-300)] = 0
@@ -383,12 +429,18 @@ def single_wave(amplitude: float, period: float) -> Profile:
     Parameters
     ----------
     amplitude : float
-        A in m.
+        A in m, not 0.
     period : float
         λ in m.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :class:`Profile`.
 
     References
     ----------
     docs/theory.md, "2. Profiles"
     """
+    amplitude = real("amplitude", amplitude, FINITE)
     return Profile(period, np.array([0.0, amplitude / 2], dtype=np.complex128))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Literal, get_args
 
+from solver.checks import ACCURACY, NODES, NODES_PER_WAVE, choice, instance, real, whole
 from solver.method import Method
 from solver.problem import Problem
 from solver.uninterrupted import uninterrupted
@@ -27,7 +28,7 @@ def make_method(
     name : {"grid", "sharp", "auto"}
     problem : Problem
     accuracy : float
-        Wanted relative error of the loss, 0 < accuracy < 1.
+        Wanted relative error of the loss, 1e-10 ≤ accuracy < 1.
     nodes_per_wave : int, optional
         For ``grid``: nodes per shortest wave, instead of those that ``accuracy`` asks for.
 
@@ -35,15 +36,23 @@ def make_method(
     ------
     ValueError
         For an unknown name or a value outside its range.
+    TypeError
+        If the problem is no Problem, or a value no number.
 
     References
     ----------
     docs/methods.md, "Method `auto`"
     """
-    if name not in METHOD_NAMES:
-        raise ValueError(f"method is {name!r}: it must be one of {', '.join(METHOD_NAMES)}")
-    if not 0 < accuracy < 1:
-        raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1, both excluded")
+    choice("method", name, METHOD_NAMES)
+    instance("problem", problem, Problem, "Problem(profile, half_space, work_of_adhesion)")
+    accuracy = real("accuracy", accuracy, ACCURACY)
+    if nodes_per_wave is not None:
+        nodes_per_wave = whole("nodes_per_wave", nodes_per_wave, NODES_PER_WAVE)
+        check_nodes(nodes_per_wave, problem.profile.highest_harmonic)
+        if name == "sharp":
+            raise ValueError(
+                f"nodes_per_wave is {nodes_per_wave}: it belongs to the method 'grid' alone"
+            )
     chosen = None
     if name == "auto":
         name, chosen = choose(problem, nodes_per_wave)
@@ -58,10 +67,6 @@ def make_method(
     else:
         from solver.sharp.method import SharpMethod
 
-        if nodes_per_wave is not None:
-            raise ValueError(
-                f"nodes_per_wave is {nodes_per_wave!r}: it belongs to the method 'grid' alone"
-            )
         method = SharpMethod(problem, accuracy=accuracy, chosen=chosen)
     return method
 
@@ -73,6 +78,21 @@ def _load(name: Literal["grid", "sharp"]) -> None:
 
     tell_of_compiling()
     import_module(f"solver.{name}.method")
+
+
+def check_nodes(nodes_per_wave: int, waves: int) -> None:
+    """Refuse a grid that does not fit into memory.
+
+    Raises
+    ------
+    ValueError
+        If the nodes of all waves are more than :data:`solver.checks.NODES` allows.
+    """
+    if nodes_per_wave * waves > NODES.high:
+        raise ValueError(
+            f"nodes_per_wave is {nodes_per_wave}: with {waves} waves it must be at most "
+            f"{int(NODES.high) // waves}, {NODES.high} nodes in all"
+        )
 
 
 def choose(

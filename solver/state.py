@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from solver.profile import Array
+from solver.values import ByValue
 
 
-@dataclass(frozen=True, eq=False)
-class ContactState:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactState(ByValue):
     """An equilibrium contact state.
+
+    Immutable; two states are equal if all numbers but ``internal`` are.
 
     Attributes
     ----------
@@ -46,7 +49,7 @@ class ContactState:
     contact_fraction: float
     stiffness: float = float("nan")
     hold_energy: float = 0.0
-    internal: Any = field(default=None, repr=False)
+    internal: Any = field(default=None, repr=False, compare=False)
 
     @property
     def patches(self) -> int:

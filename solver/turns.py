@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from time import process_time
 
+from solver.checks import function, instance, row
 from solver.jumps import Branch
-from solver.loop import Progress, check_cycle, turning_of, unload
+from solver.loop import HOW_METHOD, Progress, check_cycle, turning_of, unload
 from solver.loop_result import LoopResult, result_of
 from solver.method import ContactState, Method, PathError
 from solver.record import Axis, Record
@@ -33,6 +34,8 @@ class LoadingBranch:
     ValueError
         If a cycle cannot be run (:func:`solver.loop.check_cycle`), or a turning point is given
         twice, or none.
+    TypeError
+        If the method is no Method, or a value no number.
 
     References
     ----------
@@ -47,13 +50,13 @@ class LoadingBranch:
         load_steps: int,
         marks: Sequence[float] = (),
     ) -> None:
-        turns = sorted(turning_points)
+        instance("method", method, Method, HOW_METHOD)
+        points = row("turning points", turning_points, entry="turning point").tolist()
+        turns = sorted(points)
         if not turns or len(set(turns)) < len(turns):
-            raise ValueError(
-                f"turning points are {list(turning_points)}: there must be some, all different"
-            )
+            raise ValueError(f"turning points are {points}: there must be some, all different")
         for turn in turns:
-            check_cycle(turn, load_steps, method.problem.control)
+            _, load_steps = check_cycle(turn, load_steps, method.problem.control)
         self.method = method
         self._axis = Axis(turns[-1], load_steps)
         further = self._axis.apart(marks, turns)
@@ -151,13 +154,14 @@ def run_loops(
     load_steps: int,
     progress: Progress | None = None,
 ) -> tuple[LoopResult, ...]:
-    """Loops that share one loading branch: it is followed once, and left at every turning point.
+    """Run loops that share one loading branch, followed once and left at every turning point.
 
     Parameters
     ----------
     method : Method
     max_penetration, max_stress : sequence of float, shape (loops,)
-        The turning points, different ones: Δ/h_max or u_tot/h_max, or Pa under a load.
+        The turning points, different ones: Δ/h_max or u_tot/h_max, or Pa under a load. Any iterable
+        of numbers will do.
     load_steps : int
         Equal steps up to the largest turning point; every unloading branch goes on with that step.
     progress : callable, optional
@@ -166,14 +170,17 @@ def run_loops(
     Returns
     -------
     tuple of LoopResult
-        One a turning point, ascending. ``load_steps`` counts those of its own loading branch, and
-        ``seconds`` holds that branch up to the turning point and the unloading from there.
+        One a turning point, in the order in which they were given. ``load_steps`` counts those of
+        its own loading branch, and ``seconds`` holds that branch up to the turning point and the
+        unloading from there.
 
     Raises
     ------
     ValueError
         If a cycle cannot be run (:func:`solver.loop.check_cycle`), or a turning point is given
         twice, or none.
+    TypeError
+        If the method is no Method, or a value no number.
     PathError
         As in :func:`solver.loop.run_loop`.
 
@@ -181,6 +188,11 @@ def run_loops(
     ----------
     docs/theory.md, "8. Paths and controls"
     """
-    points = turning_of(method.problem, max_penetration, max_stress)
+    instance("method", method, Method, HOW_METHOD)
+    name = "max_stress" if method.problem.control.is_load else "max_penetration"
+    given = turning_of(method.problem, max_penetration, max_stress)
+    points = row(name, given, entry="turning point").tolist()
+    function("progress", progress)
     branch = LoadingBranch(method, points, load_steps=load_steps)
-    return tuple(branch.loop(turn, progress=progress) for turn in sorted(points))
+    loops = {turn: branch.loop(turn, progress=progress) for turn in sorted(points)}
+    return tuple(loops[turn] for turn in points)

@@ -5,7 +5,9 @@ A file that breaks a rule is refused with the key, the value and the rule in one
 
 from __future__ import annotations
 
+import math
 import tomllib
+from collections.abc import Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,10 @@ from typing import Any
 from ensemble.campaign.rules import list_of, shown
 from ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from ensemble.errors import InputError
-from solver.profile import MOST_WAVES
+from solver.checks import MOST_WAVES
+from solver.problem import check_slope
+from solver.profile import self_affine_profile
+from solver.registry import check_nodes
 
 # HDF5 keeps an attribute of at most 64 KiB, and the text is one.
 _LONGEST_TEXT = 60_000
@@ -151,6 +156,17 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [profile] n0 · ratio is {round(n0 * ratio)}: "
             f"it must be at most {MOST_WAVES} harmonics"
         )
+    if _largest(campaign, "rolloff", profile.rolloff) > profile.ratio:
+        raise InputError(
+            f"{source}: [profile] rolloff is {_largest(campaign, 'rolloff', profile.rolloff):g}: "
+            f"it must be at most ratio ({profile.ratio})"
+        )
+    _check_slopes(source, campaign)
+    if campaign.solver.nodes_per_wave is not None:
+        try:
+            check_nodes(campaign.solver.nodes_per_wave, round(n0 * ratio))
+        except ValueError as error:
+            raise InputError(f"{source}: [solver] {error}") from None
     if (
         campaign.stop.relative_error is not None
         and campaign.stop.most < campaign.sweep.realisations
@@ -163,11 +179,6 @@ def _check_together(source: str, campaign: Campaign) -> None:
         raise InputError(
             f"{source}: [sweep] makes {campaign.task_count} tasks: "
             f"at most {_MOST_TASKS} are allowed"
-        )
-    if _largest(campaign, "rolloff", profile.rolloff) > profile.ratio:
-        raise InputError(
-            f"{source}: [profile] rolloff is {_largest(campaign, 'rolloff', profile.rolloff):g}: "
-            f"it must be at most ratio ({profile.ratio})"
         )
     if campaign.output.field_penetrations and campaign.has_axis("max_penetration"):
         raise InputError(
@@ -192,6 +203,45 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [cycle] unloading_until is {cycle.unloading_until}: with these load steps "
             f"the unloading curve has {length:.6g} values, and at most {_LONGEST_AXIS} are allowed"
         )
+
+
+def _check_slopes(source: str, campaign: Campaign) -> None:
+    """Check that heights and period are in one unit: by the rms slope of every spectrum.
+
+    Where amplitudes are scattered, the slope of their mean stands for all realisations.
+    """
+    table = campaign.profile
+    (norm,) = table.normalisation
+    names = ("period", "n0", "ratio", "rolloff", norm)
+    lists = {name: values for _, name, values in campaign.lists}
+    axes = [campaign.sweep.hurst, *(lists.get(n, (getattr(table, n),)) for n in names)]
+    rising = (-1, -1, 1, 1, 1, 1)  # how the slope changes along each
+    corners = [
+        tuple(max(axis, key=lambda v: sign * v) for axis, sign in zip(axes, signs, strict=True))
+        for signs in (rising, [-sign for sign in rising])
+    ]
+    try:
+        for corner in corners:
+            _check_slope(names, corner)
+    except ValueError:  # keys that vary together need not meet in a corner
+        keys = [axis.name for axis in campaign.axes]
+        for cell in campaign.cells:
+            here = dict(zip(keys, cell, strict=True))
+            values = (here["hurst"], *(here.get(name, getattr(table, name)) for name in names))
+            try:
+                _check_slope(names, values)
+            except ValueError as error:
+                raise InputError(
+                    f"{source}: [profile] {norm} is {shown(values[-1])} with period "
+                    f"{shown(values[1])}: {error}"
+                ) from None
+
+
+def _check_slope(names: Sequence[str], values: Sequence[float]) -> None:
+    """Check the slope of the spectrum with these values of H and of the keys of these names."""
+    hurst, *rest = values
+    spectrum: dict[str, Any] = dict(zip(names, rest, strict=True))
+    check_slope(math.sqrt(self_affine_profile(hurst, seed=0, **spectrum).m2))
 
 
 def _check_turning_point(source: str, campaign: Campaign) -> None:

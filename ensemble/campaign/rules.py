@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from ensemble.errors import InputError
+from solver import checks
+from solver.checks import Bounds
 
 
 @dataclass(frozen=True)
@@ -41,79 +42,40 @@ class Rule:
 
 def shown(value: object) -> str:
     """Return a value as TOML would spell it, short enough for a sentence."""
-    try:
-        text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
-    except ValueError:  # an integer of thousands of digits
-        text = "a number of thousands of digits"
-    text = "".join(c if c.isprintable() else "?" for c in text)
-    return text if len(text) <= 80 else f"{text[:60]} … {text[-10:]}"
+    return str(value).lower() if isinstance(value, bool) else checks.shown(value)
 
 
-def _number(value: object) -> float:
-    # bool is an int to Python, never to a user.
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError
-    try:
-        number = float(value)
-    except OverflowError:
-        raise ValueError from None
-    if not math.isfinite(number):
-        raise ValueError
-    return number
+def number_in(bounds: Bounds) -> Rule:
+    """A number between the solver's bounds; a whole one, where they say so, without a point."""
 
-
-def _number_rule(text: str, holds: Callable[[float], bool]) -> Rule:
     def read(value: object) -> float:
-        number = _number(value)
-        if not holds(number):
+        # TOML has numbers of two types and bool; Python takes the latter for a number too.
+        kinds = int if bounds.whole else int | float
+        if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError
-        return number + 0.0  # -0.0 becomes 0.0
+        return (checks.whole if bounds.whole else checks.real)("", value, bounds)
 
-    return Rule(text, read)
+    return Rule(bounds.text, read)
 
 
 def positive_number(unit: str) -> Rule:
-    """0 < value, finite."""
-    suffix = "" if unit == "1" else f", in {unit}"
-    return _number_rule(f"a positive, finite number{suffix}", lambda x: x > 0)
-
-
-def not_negative_number(unit: str) -> Rule:
-    """0 ≤ value, finite."""
-    return _number_rule(f"a finite number that is not negative, in {unit}", lambda x: x >= 0)
+    """A number that is positive and of a size that one can compute with."""
+    return number_in(Bounds(1e-30, 1e30, unit=unit))
 
 
 def negative_number(least: float) -> Rule:
     """Least ≤ value < 0."""
-    return _number_rule(f"a negative number of at least {least:g}", lambda x: least <= x < 0)
+    return number_in(Bounds(least, 0.0, without_high=True))
 
 
-def number_between(low: float, high: float, *, upper_included: bool = False) -> Rule:
+def number_between(low: float, high: float) -> Rule:
     """Low < value < high."""
-    if upper_included:
-        return _number_rule(
-            f"a number above {low:g} and at most {high:g}", lambda x: low < x <= high
-        )
-    return _number_rule(
-        f"a number between {low:g} and {high:g}, both excluded", lambda x: low < x < high
-    )
-
-
-def number_from(least: float) -> Rule:
-    """Least ≤ value, finite."""
-    return _number_rule(f"a finite number of at least {least:g}", lambda x: x >= least)
+    return number_in(Bounds(low, high, without_low=True, without_high=True))
 
 
 def whole_number(least: int, most: int = 2**63 - 1) -> Rule:
     """Least ≤ value ≤ most, an integer."""
-
-    def read(value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise ValueError
-        return value
-
-    limit = f" and at most {most}" if most < 2**63 - 1 else ""
-    return Rule(f"a whole number of at least {least}{limit}", read)
+    return number_in(Bounds(least, most, whole=True))
 
 
 def choice(*names: str) -> Rule:

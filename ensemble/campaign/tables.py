@@ -22,14 +22,28 @@ from ensemble.campaign.rules import (
     list_of,
     list_of_names,
     negative_number,
-    not_negative_number,
     number_between,
-    number_from,
+    number_in,
     positive_number,
     whole_number,
 )
 from ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
-from solver.profile import Amplitudes, Array
+from solver.checks import (
+    ACCURACY,
+    HARMONIC,
+    HURST,
+    LENGTH,
+    LOAD_STEPS,
+    MAX_PENETRATION,
+    MAX_STRESS,
+    NODES_PER_WAVE,
+    POISSON,
+    ROLLOFF,
+    SPRING,
+    WORK_OF_ADHESION,
+    YOUNG,
+)
+from solver.profile import NORMALISATIONS, Amplitudes, Array
 from solver.registry import METHOD_NAMES, MethodName
 
 
@@ -54,18 +68,24 @@ def _key(
 class ProfileTable:
     """``[profile]``: the rough profile, by the spectral method."""
 
-    period: float = _key(positive_number("m"), "period λ in m", axis="m")
-    n0: int = _key(whole_number(1), "lowest harmonic: its wave number is n0 · 2π/λ", axis="1")
-    ratio: int = _key(whole_number(1), "highest over lowest wave number, q_max/q_min", axis="1")
+    period: float = _key(number_in(LENGTH), "period λ in m", axis="m")
+    n0: int = _key(number_in(HARMONIC), "lowest harmonic: its wave number is n0 · 2π/λ", axis="1")
+    ratio: int = _key(number_in(HARMONIC), "highest over lowest wave number, q_max/q_min", axis="1")
     rolloff: float = _key(
-        number_from(1),
+        number_in(ROLLOFF),
         "roll-off over lowest wave number, q_r/q_min: the spectrum is flat below",
         1.0,
         axis="1",
     )
-    h_rms: float | None = _key(positive_number("m"), "root mean square height in m", None, axis="m")
-    m2: float | None = _key(positive_number("1"), "mean square slope", None, axis="1")
-    c0: float | None = _key(positive_number("m²"), "C0 = |a_n0|² in m²", None, axis="m2")
+    h_rms: float | None = _key(
+        number_in(NORMALISATIONS["h_rms"]), "root mean square height in m", None, axis="m"
+    )
+    m2: float | None = _key(
+        number_in(NORMALISATIONS["m2"]), "mean square slope", None, axis="1"
+    )
+    c0: float | None = _key(
+        number_in(NORMALISATIONS["c0"]), "C0 = |a_n0|² in m²", None, axis="m2"
+    )
     amplitudes: Amplitudes = _key(  # noqa: RUF009  # a field
         choice(*get_args(Amplitudes)),
         "amplitudes fixed by the power law, or scattered about it (a Gaussian process)",
@@ -83,9 +103,9 @@ class ProfileTable:
 class MaterialTable:
     """``[material]``: the elastic half-space."""
 
-    young: float = _key(positive_number("Pa"), "Young's modulus E in Pa", axis="Pa")
+    young: float = _key(number_in(YOUNG), "Young's modulus E in Pa", axis="Pa")
     poisson: float = _key(
-        number_between(-1, 0.5, upper_included=True), "Poisson's ratio ν", axis="1"
+        number_in(POISSON), "Poisson's ratio ν", axis="1"
     )
 
 
@@ -93,9 +113,9 @@ class MaterialTable:
 class SweepTable:
     """``[sweep]``: one task for every H, γ (and what else is a list) and realisation."""
 
-    hurst: tuple[float, ...] = _key(list_of(number_between(0, 1)), "Hurst exponents H")
+    hurst: tuple[float, ...] = _key(list_of(number_in(HURST)), "Hurst exponents H")
     work_of_adhesion: tuple[float, ...] = _key(
-        list_of(not_negative_number("J/m²")), "works of adhesion γ in J/m²"
+        list_of(number_in(WORK_OF_ADHESION)), "works of adhesion γ in J/m²"
     )
     realisations: int = _key(
         whole_number(1, 2**31 - 1), "profiles for every cell; with [stop] the first of them"
@@ -116,13 +136,13 @@ class CycleTable:
     """``[cycle]``: the loading path."""
 
     max_penetration: float | None = _key(
-        number_between(0, 1),
+        number_in(MAX_PENETRATION),
         "Δ~max, the penetration in units of h_max at which unloading starts",
         None,
         axis="1",
     )
     max_stress: float | None = _key(
-        positive_number("Pa"),
+        number_in(MAX_STRESS),
         "under a load, instead: mean stress in Pa at which unloading starts",
         None,
         axis="Pa",
@@ -130,9 +150,9 @@ class CycleTable:
     control: PathControl = _key(  # noqa: RUF009  # a field
         choice(*get_args(PathControl)), "what is prescribed along the path", "separation"
     )
-    load_steps: int = _key(whole_number(1, 100_000), "equal steps of the loading branch")
+    load_steps: int = _key(number_in(LOAD_STEPS), "equal steps of the loading branch")
     stiffness: float | None = _key(
-        positive_number("Pa/m"),
+        number_in(SPRING),
         "stiffness k of what holds the half-space, in Pa/m of nominal area; by default the "
         "separation is fixed. With it, penetrations of the path and of curves are u_tot/h_max",
         None,
@@ -169,9 +189,9 @@ class SolverTable:
     method: MethodName = _key(  # noqa: RUF009  # a field
         choice(*METHOD_NAMES), "how contact states are found; auto chooses", "auto"
     )
-    accuracy: float = _key(number_between(0, 1), "wanted relative error of the loss", 1e-3)
+    accuracy: float = _key(number_in(ACCURACY), "wanted relative error of the loss", 1e-3)
     nodes_per_wave: int | None = _key(
-        whole_number(8, 100_000), "nodes per shortest wave, instead of those of accuracy", None
+        number_in(NODES_PER_WAVE), "nodes per shortest wave, instead of those of accuracy", None
     )
     time_limit: float | None = _key(
         positive_number("s"), "longest time of one task in s", None, free=True

@@ -20,7 +20,7 @@ from types import FrameType
 
 from ensemble.command.parser import Parser
 from ensemble.command.streams import OutputError, standard_streams, write_line
-from ensemble.errors import InputError, RankError
+from ensemble.errors import InputError, RankError, naming_options
 from ensemble.run.launch import ONE_THREAD, hand_over
 from ensemble.run.ranks import launched
 
@@ -130,7 +130,8 @@ def _execute(name: str, words: Sequence[str]) -> int:
     except SystemExit:  # --help
         return 0
     args.words = list(words)
-    code: int = importlib.import_module(f"ensemble.command.{name}").execute(args)
+    with naming_options():
+        code: int = importlib.import_module(f"ensemble.command.{name}").execute(args)
     return code
 
 

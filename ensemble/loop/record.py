@@ -18,6 +18,7 @@ from typing import IO, Any
 import numpy as np
 
 from ensemble.errors import InputError
+from ensemble.trace.units import counted
 from solver.jumps import Jump
 from solver.loop_result import LoopResult
 from solver.method import BRANCHES, Branch, ContactState, Fields, Method
@@ -162,7 +163,7 @@ def path_summary(result: PathResult) -> str:
         f"path        {way}{', out' if result.ends_out else ''} in {result.load_steps} load steps "
         "to the largest",
         f"work        {result.work:.6g} J/m², of which {result.energy_change:.6g} J/m² are stored",
-        f"audit       {result.loss_from_drops:.6g} J/m² in {len(result.jumps)} jumps, "
+        f"audit       {result.loss_from_drops:.6g} J/m² in {counted(len(result.jumps), 'jump')}, "
         f"residual {result.audit_residual:.2e}",
     ]
     for part in result.minor_loops:
@@ -196,10 +197,10 @@ def loop_summary(result: LoopResult) -> str:
             f"largest contact fraction {result.contact_fraction.max():.4g}, "
             f"most patches {result.patches.max()}",
             f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
-            f"audit       {result.loss_from_drops:.6g} J/m² in {len(result.jumps)} jumps, "
-            f"residual {result.audit_residual:.2e}",
-            f"error       {result.loss_error:.2g} J/m² (numerical); {result.races} jumps raced, "
-            f"{result.energy_at_stake:.3g} J/m² at stake",
+            f"audit       {result.loss_from_drops:.6g} J/m² in "
+            f"{counted(len(result.jumps), 'jump')}, residual {result.audit_residual:.2e}",
+            f"error       {result.loss_error:.2g} J/m² (numerical); "
+            f"{counted(result.races, 'jump')} raced, {result.energy_at_stake:.3g} J/m² at stake",
             f"jumps       {kinds}",
             f"pull-off    mean tension {result.pull_off_stress:.6g} Pa",
             f"method      {result.method.name}, {result.seconds:.1f} s",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,24 @@ import numpy as np
 from ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
 from ensemble.trace.pool import Pool, Result, Watch
 from ensemble.trace.prepare import Prepared
+from ensemble.trace.units import counted
+from solver.checks import (
+    ACCURACY,
+    Bounds,
+    choice,
+    flag,
+    function,
+    instance,
+    number_of,
+    real,
+    row,
+    whole,
+)
 from solver.loop import check_cycle
 from solver.material import HalfSpace
 from solver.problem import Problem
-from solver.registry import MethodName
+from solver.registry import METHOD_NAMES, MethodName
+from solver.values import ByValue
 
 QUANTITIES = {
     "loss": "J/m²",
@@ -30,6 +44,7 @@ COVERAGE = 2.0
 _LEAST = 0.02
 
 _NOT_CONVERGED = 0.10
+_PROCESSES = Bounds(0, 4096, whole=True)
 _DOUBTS = {
     "cut-off": "the shortest wave kept",
     "continuation": "how the period is closed",
@@ -69,8 +84,8 @@ class Quantity:
         return self.uncertainty / abs(self.value) if self.value else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
+@dataclass(frozen=True, eq=False, repr=False)
+class Answer(ByValue):
     """Loss, pull-off stress and contact fraction of a trace, with their doubts.
 
     Attributes
@@ -91,7 +106,14 @@ class Answer:
     pull_off_stress: Quantity
     contact_fraction: Quantity
     warnings: tuple[str, ...]
-    seconds: float
+    seconds: float = field(compare=False)
+
+    def __repr__(self) -> str:
+        """One line: the loss with its uncertainty, and the warnings counted."""
+        return (
+            f"Answer(loss={self.loss.value:.6g} ± {self.loss.uncertainty:.2g} J/m², "
+            f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
+        )
 
     def result(self, name: str) -> Result | None:
         """Numbers of a loop, or None if it failed or was not run."""
@@ -163,6 +185,8 @@ def loss_of_trace(
     ------
     ValueError
         If a value breaks the solver's rules.
+    TypeError
+        If ``prepared`` is no Prepared, or a value of the wrong type.
     NoAnswer
         If the loop itself failed; a failed variant is a warning.
 
@@ -172,6 +196,10 @@ def loss_of_trace(
     """
     cycle = make_cycle(half_space, work_of_adhesion, max_penetration, load_steps, method, accuracy)
     check(prepared, cycle)
+    flag("quick", quick)
+    function("watch", watch)
+    if processes is not None:
+        processes = whole("processes", processes, _PROCESSES)
     return run_plan(
         prepared, cycle, make_plan(prepared, cycle, quick=quick, processes=processes), watch
     )
@@ -186,19 +214,28 @@ def make_cycle(
     accuracy: float,
 ) -> Cycle:
     """Contact and cycle, with the values of both tables."""
-    gammas, depths = default_tables(_several(work_of_adhesion), _several(max_penetration))
+    gammas, depths = default_tables(
+        _several("work_of_adhesion", work_of_adhesion), _several("max_penetration", max_penetration)
+    )
     return Cycle(half_space, gammas, depths, load_steps, method, accuracy)
 
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
-    """Refuse, before any work, what the solver would refuse (ValueError)."""
+    """Refuse, before any work, what the solver would refuse (ValueError or TypeError)."""
+    instance("prepared", prepared, Prepared, "prepare_trace(read_trace(path))")
+    choice("method", cycle.method, METHOD_NAMES)
+    real("accuracy", cycle.accuracy, ACCURACY)
+    for name, values in (
+        ("work_of_adhesion", cycle.works_of_adhesion),
+        ("max_penetration", cycle.max_penetrations),
+    ):
+        if not values:
+            raise ValueError(f"{name} is empty: it must hold one number at least")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
         Problem(profile, cycle.half_space, gamma)
     for depth in cycle.max_penetrations:
         check_cycle(depth, cycle.load_steps)
-    if not 0 < cycle.accuracy < 1:
-        raise ValueError(f"accuracy is {cycle.accuracy!r}: it must lie between 0 and 1")
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
@@ -222,8 +259,11 @@ def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None =
     )
 
 
-def _several(value: Several) -> Sequence[float]:
-    return value if isinstance(value, Sequence) else (float(value),)
+def _several(name: str, value: Several) -> Sequence[float]:
+    """Return one number as a row of one; its bounds are checked later."""
+    if number_of(value) is not None:
+        return (real(name, value),)
+    return tuple(row(name, value, entry="value").tolist())
 
 
 # ---------------------------------------------------------------------- doubts
@@ -278,8 +318,8 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     races = answer.main["races"]
     if races:
         found.append(
-            f"{races:.0f} jumps would have ended elsewhere under another rule of descent "
-            f"({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
+            f"{counted(int(races), 'jump')} would have ended elsewhere under another rule of "
+            f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
     return found
 

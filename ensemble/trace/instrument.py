@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, parameter
 from ensemble.trace.units import METRES, unit_named
 from solver.profile import Array
 
@@ -71,7 +71,9 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
         except Exception as error:
             raise InputError(f"{path} cannot be read as heights: {_one_line(error)}") from None
     if topography.unit is None or topography.physical_sizes is None:
-        raise InputError(f"{path} tells no unit of its lengths: export it as text and give --unit")
+        raise InputError(
+            f"{path} tells no unit of its lengths: export it as text and give {parameter('unit')}"
+        )
     metres = METRES[unit_named(str(topography.unit))]
     name = getattr(type(reader), "_name", None) or reader.format()
     label = f"{name}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
@@ -100,7 +102,8 @@ def _channel(path: Path, channels: list[Any], wanted: int | None) -> Any:
     if wanted is not None:
         if not 0 <= wanted < len(channels):
             raise InputError(
-                f"--channel is {wanted}: {path} has the channels 0 to {len(channels) - 1}"
+                f"{parameter('channel')} is {wanted}: {path} has the channels 0 to "
+                f"{len(channels) - 1}"
             )
         return channels[wanted]
     heights = [c for c in channels if "height" in str(getattr(c, "data_kind", "height")).lower()]
@@ -114,17 +117,17 @@ def _line(path: Path, topography: Any, heights: Array, row: int | None) -> tuple
     """Positions and heights of the line scan, or of one row of a map, in the file's unit."""
     if heights.ndim == 1:
         if row is not None:
-            raise InputError(f"--row is {row}: {path} holds a line, no map")
+            raise InputError(f"{parameter('row')} is {row}: {path} holds a line, no map")
         return np.asarray(topography.positions(), dtype=float), heights, ""
     points, rows = heights.shape
     if row is None and rows > 1:
         raise InputError(
-            f"{path} holds a map of {points} × {rows} heights: --row K takes one of its "
-            f"rows, 0 to {rows - 1}, as the trace"
+            f"{path} holds a map of {points} × {rows} heights: {parameter('row')} K takes one of "
+            f"its rows, 0 to {rows - 1}, as the trace"
         )
     row = row or 0
     if not 0 <= row < rows:
-        raise InputError(f"--row is {row}: {path} has the rows 0 to {rows - 1}")
+        raise InputError(f"{parameter('row')} is {row}: {path} has the rows 0 to {rows - 1}")
     step = topography.physical_sizes[0] / points
     where = f", row {row} of {rows}" if rows > 1 else ""
     return step * np.arange(points), heights[:, row], where

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ensemble.errors import parameter
 from ensemble.run.launch import cores
 from ensemble.trace.prepare import Prepared
 from ensemble.trace.units import length_text
@@ -275,13 +276,14 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
     hints = []
     if plan.waves / factor >= _FEWEST_WAVES:
         hints.append(
-            f"--cut-off {factor * prepared.cut_off * 1e6:.2g}um ({plan.waves / factor:.0f} waves) "
-            f"would take about {clock(plan.wall * factor**-_WAVES_POWER)}"
+            f"{parameter('cut_off')} {factor * prepared.cut_off * 1e6:.2g}um "
+            f"({plan.waves / factor:.0f} waves) would take about "
+            f"{clock(plan.wall * factor**-_WAVES_POWER)}"
         )
     if not quick:
         tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]
         saved = sum(plan.seconds[name] for name in tables) / max(plan.processes, 1)
-        hints.append(f"--quick leaves the tables out and saves about {clock(saved)}")
+        hints.append(f"{parameter('quick')} leaves the tables out and saves about {clock(saved)}")
     return tuple(hints)
 
 

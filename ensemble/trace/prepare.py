@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, parameter, refused_as_input
 from ensemble.trace.read import Trace
 from ensemble.trace.units import counted, length_text
+from solver.checks import LENGTH, Bounds, flag, instance, real, whole
 from solver.profile import Array, Profile
 from solver.trace import (
     Continuation,
@@ -21,8 +22,11 @@ from solver.trace import (
     trace_spectrum,
     trusted_wavelength,
 )
+from solver.values import ByValue
 
 MOST_DEGREE = 6
+_DEGREE = Bounds(0, MOST_DEGREE, whole=True)
+_LENGTH_OR_NONE = Bounds(0.0, LENGTH.high, unit="m")
 
 # A spike stands out of the four heights on either side by so many robust standard deviations.
 _SIDE, _SPIKE = 4, 10.0
@@ -47,8 +51,8 @@ class Step:
     numbers: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class Prepared:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prepared(ByValue):
     """A trace ready for the loop, with everything that was decided on the way.
 
     Attributes
@@ -81,6 +85,13 @@ class Prepared:
     spectrum: TraceSpectrum
     steps: tuple[Step, ...]
     warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """One line: the file, its points and what was decided."""
+        return (
+            f"Prepared({str(self.trace.path)!r}, {self.filled.size} points, degree={self.degree}, "
+            f"cut_off={length_text(self.cut_off)}, {counted(len(self.warnings), 'warning')})"
+        )
 
     @property
     def step(self) -> float:
@@ -146,11 +157,22 @@ def prepare_trace(
     ------
     InputError
         If a gap is too long, too much is missing, or a value breaks its rule.
+    TypeError
+        If the trace is no Trace, or a value of the wrong type.
 
     References
     ----------
     docs/measured-profile.md, "What is done to it"
     """
+    instance("trace", trace, Trace, "read_trace(path)")
+    flag(parameter("keep_outliers"), keep_outliers)
+    flag(parameter("invert"), invert)
+    with refused_as_input():
+        if degree is not None:
+            degree = whole(parameter("degree"), degree, _DEGREE)
+        cut_off = _length("cut_off", cut_off, LENGTH)
+        tip_radius = _length("tip_radius", tip_radius, _LENGTH_OR_NONE)
+        longest_gap = _length("longest_gap", longest_gap, _LENGTH_OR_NONE)
     steps: list[Step] = []
     warnings: list[str] = []
     heights = -trace.heights if invert else trace.heights.copy()
@@ -187,12 +209,18 @@ def prepare_trace(
     )
 
 
+def _length(name: str, value: float | None, bounds: Bounds) -> float | None:
+    return None if value is None else real(parameter(name), value, bounds)
+
+
 # ---------------------------------------------------------------------- gaps and outliers
 
 
 def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
     """Cut missing heights off both ends: there is nothing to interpolate between."""
     good = np.flatnonzero(np.isfinite(heights))
+    if good.size < 2:
+        raise InputError(f"{trace.path} has {counted(good.size, 'height')}: a trace needs more")
     first, last = int(good[0]), int(good[-1]) + 1
     lost = heights.size - (last - first)
     if lost:
@@ -261,7 +289,7 @@ def _filled(
         raise InputError(
             f"{trace.path} has a gap of {length_text(longest_here)} at {length_text(at)}: "
             f"up to {length_text(allowed)} "
-            "is interpolated (--longest-gap)"
+            f"is interpolated ({parameter('longest_gap')} allows more)"
         )
     share = float(gaps.mean())
     if share > _MOST_MISSING:
@@ -289,8 +317,6 @@ def _filled(
 
 def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list[str]) -> int:
     """Degree of the form, chosen or given, with its step; a form left in is warned of."""
-    if wanted is not None and not 0 <= wanted <= MOST_DEGREE:
-        raise InputError(f"--degree is {wanted}: it must lie between 0 and {MOST_DEGREE}")
     shares = form_shares(filled)
     stands_out = [d for d in range(2, _FORM_TO + 1) if _is_form(shares, d)]
     found = max(stands_out, default=1)
@@ -317,7 +343,7 @@ def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list
         left = float(np.sqrt(shares[wanted + 1 : found + 1].sum()))
         warnings.append(
             f"a form of degree {found} remains ({length_text(left)} rms, as of a curved sample "
-            f"or guide): it counts as roughness with --degree {wanted}"
+            f"or guide): it counts as roughness with {parameter('degree')} {wanted}"
         )
     elif degree < found + 1 <= _FORM_TO and wanted is None and _is_form(shares, found + 1):
         warnings.append("a form of a higher degree may remain")
@@ -342,7 +368,8 @@ def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> Non
         warnings.append(
             f"waves longer than a third of the trace hold {100 * min(share, 1.0):.0f} % of the "
             "mean square height: they decide the loss, and one trace has only one or two of them; "
-            "measure a longer one, or several, or take the form off (--degree)"
+            "measure a longer one, or several, or take the form off "
+            f"({parameter('degree')})"
         )
 
 
@@ -371,7 +398,7 @@ def _cut_off(
     if wanted is not None:
         if not 2.2 * trace.step <= wanted <= length / 2:
             raise InputError(
-                f"--cut-off is {length_text(wanted)}: it must lie between 2.2 steps "
+                f"{parameter('cut_off')} is {length_text(wanted)}: it must lie between 2.2 steps "
                 f"({length_text(2.2 * trace.step)}) and half the length ({length_text(length / 2)})"
             )
         if wanted < shortest * (1 - 1e-9):
@@ -385,14 +412,15 @@ def _cut_off(
         if shortest > length / 4 and by != "noise":
             raise InputError(
                 f"{trace.path} is {length_text(length)} long, and waves can be trusted from "
-                f"{length_text(shortest)} on ({why}): --cut-off goes on all the same"
+                f"{length_text(shortest)} on ({why}): give {parameter('cut_off')} to go on all the "
+                "same"
             )
         if shortest > length / 4 or rms < _ALL_NOISE * spectrum.noise:
             raise InputError(
                 f"{trace.path} holds no roughness above its noise: of {length_text(rms)} rms "
                 f"{length_text(spectrum.noise)} are noise, waves can be trusted from "
                 f"{length_text(shortest)} on, and it is {length_text(length)} long "
-                "(--cut-off to go on)"
+                f"(give {parameter('cut_off')} to go on)"
             )
     noise = f"; white noise of {length_text(spectrum.noise)} rms" if spectrum.floor > 0 else ""
     steps.append(

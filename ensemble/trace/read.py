@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, parameter, refused_as_input
 from ensemble.trace.instrument import HINT, available, read_scan
 from ensemble.trace.text import Table, read_table
 from ensemble.trace.units import (
@@ -19,9 +19,11 @@ from ensemble.trace.units import (
     step_of_header,
     units_of_header,
 )
+from solver import checks
 from solver.profile import Array
 
 FEWEST_POINTS = 32
+_COLUMN = checks.Bounds(1, 1_000_000, whole=True)
 MOST_POINTS = 5_000_000
 TEXT = frozenset(("txt", "csv", "tsv", "dat", "asc", "prn", "xy", "xyz", "tab", "text", "prf"))
 
@@ -120,26 +122,33 @@ def read_trace(
     ----------
     docs/measured-profile.md, "What is read"
     """
-    path = Path(path)
+    path = checks.path("path", path)
+    with refused_as_input():
+        if step is not None:
+            step = checks.real(parameter("step"), step, checks.LENGTH)
+        if columns is not None:
+            columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
     if path.is_dir():
         raise InputError(f"{path} is a directory: a trace is a file")
     if not path.exists():
         raise InputError(f"cannot read {path}: there is no such file")
     is_text = path.suffix.lower() == ".npy" or _is_text(path)
-    for name, number in (("--row", row), ("--channel", channel)):
+    for name, number in ((parameter("row"), row), (parameter("channel"), channel)):
         if is_text and number is not None:
             raise InputError(
                 f"{name} is {number}: {path} holds columns of numbers, no map and no channels "
-                "(--columns chooses columns)"
+                f"({parameter('columns')} chooses columns)"
             )
     if path.suffix.lower() == ".npy":
         return _from_array(path, unit, step)
     if is_text:
         table = read_table(path, delimiter, decimal)
         return _from_table(path, table, unit, step, columns)
-    for name, value in (("--unit", unit), ("--step", step), ("--columns", columns)):
+    for name, value in (("unit", unit), ("step", step), ("columns", columns)):
         if value is not None:
-            raise InputError(f"{name} belongs to texts: an instrument's file tells its own lengths")
+            raise InputError(
+                f"{parameter(name)} belongs to texts: an instrument's file tells its own lengths"
+            )
     if not available():
         # Say which of both is missing: the extra, or any sense in the file.
         raise InputError(
@@ -197,14 +206,15 @@ def _from_table(
     if wanted is not None:
         if len(wanted) != 2 or not all(1 <= w <= len(columns) for w in wanted):
             raise InputError(
-                f"--columns is {','.join(map(str, wanted))}: positions and heights, two of the "
-                f"{len(columns)} columns of {path}"
+                f"{parameter('columns')} is {','.join(map(str, wanted))}: positions and heights, "
+                f"two of the {len(columns)} columns of {path}"
             )
         columns = columns[[w - 1 for w in wanted]]
         fields = [tuple(row[w - 1] for w in wanted) for row in fields]
     elif len(columns) > 2:
         raise InputError(
-            f"{path} has {len(columns)} columns: --columns X,Z says which are positions and heights"
+            f"{path} has {len(columns)} columns: {parameter('columns')} X,Z says which are "
+            "positions and heights"
         )
     if columns.shape[1] < FEWEST_POINTS:
         raise InputError(
@@ -225,14 +235,17 @@ def _from_table(
         said.append(gaps)
     if len(columns) == 2:
         if step is not None:
-            raise InputError(f"--step belongs to heights without positions: {path} has positions")
+            raise InputError(
+                f"{parameter('step')} belongs to heights without positions: {path} has positions"
+            )
         heights, step, more = _even(path, columns[0] * METRES[x_unit], heights, table.lines)
         said.extend(more)
     elif step is None:
         step = step_of_header(table.header, table.decimal)
         if step is None:
             raise InputError(
-                f"{path} has heights without positions, and its header tells no step: give --step"
+                f"{path} has heights without positions, and its header tells no step: "
+                f"give {parameter('step')}"
             )
         said.append(f"step {length_text(step, 6)} (header)")
     return _checked(Trace(path, heights, float(step), tuple(said)), told=source != "numbers")
@@ -256,17 +269,17 @@ def _units(
         for name, known, wanted in zip(("positions", "heights"), told, given, strict=True):
             if known not in (None, wanted) and not (len(columns) == 1 and name == "positions"):
                 raise InputError(
-                    f"--unit says {wanted} and the header of {path} {known} for the {name}: take "
-                    "the wrong one out"
+                    f"{parameter('unit')} says {wanted} and the header of {path} {known} for the "
+                    f"{name}: take the wrong one out"
                 )
-        return given, "--unit"
+        return given, parameter("unit")
     if told[0] is not None and told[1] is not None:
         return (told[0], told[1]), "header"
     if told[0] is not None or told[1] is not None:
         known = "positions" if told[0] else "heights"
         raise InputError(
-            f"the header of {path} tells the unit of the {known} alone: give --unit X,Z, "
-            "as in --unit mm,um"
+            f"the header of {path} tells the unit of the {known} alone: give {parameter('unit')} "
+            "X,Z, as in mm,um"
         )
     if _sure_to_be_metres(columns, step):
         return ("m", "m"), "numbers"
@@ -277,7 +290,7 @@ def _units(
         else (f"heights from {np.nanmin(x):g} to {np.nanmax(x):g}")
     )
     raise InputError(
-        f"{path} tells no unit, and {size} need not be metres: give --unit, as in --unit um"
+        f"{path} tells no unit, and {size} need not be metres: give {parameter('unit')}, as in um"
     )
 
 
@@ -386,13 +399,14 @@ def _checked(trace: Trace, told: bool) -> Trace:
         raise InputError(f"{trace.path}: every height is {good[0]:g} m: a flat trace has no loss")
     if not _SHORTEST <= trace.length <= _LONGEST:
         raise InputError(
-            f"{trace.path} would be {trace.length:.3g} m long: is its unit right (--unit)?"
+            f"{trace.path} would be {trace.length:.3g} m long: is its unit right "
+            f"({parameter('unit')})?"
         )
     steps = np.abs(np.diff(trace.heights))
     slope = float(np.nanmedian(steps) / trace.step)
     if slope > _STEEPEST:
         raise InputError(
             f"{trace.path} would rise by {slope:.3g} times its step from point to point: are "
-            "positions and heights in the same unit (--unit X,Z)?"
+            f"positions and heights in the same unit ({parameter('unit')} X,Z)?"
         )
     return trace

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, parameter
 from solver.profile import Array
 
 MOST_BYTES = 200_000_000
@@ -146,7 +146,8 @@ def _form(
         comma, point = any("," in f for f in rows), any("." in f for f in rows)
         if comma and point:
             raise InputError(
-                f"{path} has commas and points within its numbers: give --decimal and --delimiter, "
+                f"{path} has commas and points within its numbers: give "
+                f"{parameter('decimal')} and {parameter('delimiter')}, "
                 "and take signs of thousands out"
             )
         decimal = "," if comma else "."
@@ -177,7 +178,7 @@ def _delimiter(path: Path, sample: Sequence[str], decimal: str | None) -> str:
     if commas == 3:
         raise InputError(
             f"{path} has rows such as {sample[0].strip()!r}, which can be two numbers or four: "
-            "give --decimal"
+            f"give {parameter('decimal')}"
         )
     return ","
 
@@ -196,7 +197,7 @@ def _one_comma(path: Path, sample: Sequence[str]) -> str:
         return " "
     raise InputError(
         f"{path} has rows such as {sample[0].strip()!r}, which can be one number with a decimal "
-        "comma or two: give --decimal"
+        f"comma or two: give {parameter('decimal')}"
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, parameter
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "Å": 1e-10, "inch": 25.4e-3}
 
@@ -84,10 +84,12 @@ def unit_named(name: str) -> str:
 
 
 def parse_units(text: str) -> tuple[str, str]:
-    """Units of positions and heights of ``--unit``: "um" for both, or "mm,um"."""
+    """Units of positions and heights of the parameter ``unit``: "um" for both, or "mm,um"."""
     words = text.split(",")
     if len(words) > 2:
-        raise InputError(f"--unit is {text!r}: one unit for both columns, or two as in mm,um")
+        raise InputError(
+            f"{parameter('unit')} is {text!r}: one unit for both columns, or two as in mm,um"
+        )
     return unit_named(words[0]), unit_named(words[-1])
 
 

@@ -96,6 +96,17 @@ BAD_VALUES = [
     ("method", "3"),
     ("nodes_per_wave", "1"),
     ("jumps", "0"),
+    # the bounds of solver/checks.py, which functions and commands have as well
+    ("period", "1e300"),
+    ("period", "1e-300"),
+    ("h_rms", "1e200"),
+    ("h_rms", "1e-200"),
+    ("young", "1e30"),
+    ("young", "1e-30"),
+    ("work_of_adhesion", "[1e300]"),
+    ("work_of_adhesion", "[1e-300]"),
+    ("load_steps", "1000000000"),
+    ("nodes_per_wave", "100000000"),
 ]
 
 
@@ -103,6 +114,40 @@ BAD_VALUES = [
 def test_bad_values_are_named_with_their_rule(key, value):
     sentence = refused(campaign_text(**{key: value}))
     assert re.match(rf"c\.toml: \[\w+\] {key} is .+: it must be ", sentence), sentence
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"h_rms": "1.0"}, r"h_rms is 1\.0 with period 0\.001: rms slope is .+ it must be .+; are"),
+        ({"h_rms": "1e-18"}, r"h_rms is 1e-18 with period 0\.001: rms slope is .+: it must be"),
+        ({"h_rms": "[1e-6, 1.0]"}, r"h_rms is 1\.0 with period 0\.001: rms slope is"),
+        ({"period": "[1e-3, 1e-9]"}, r"h_rms is 1e-06 with period 1e-09: rms slope is"),
+        ({"ratio": "50000", "h_rms": "1e-3"}, r"h_rms is 0\.001 with period 0\.001: rms slope is"),
+    ],
+)
+def test_heights_and_period_in_different_units_are_refused_with_the_key(changes, sentence):
+    """Before any work: set up, such a profile would fill the memory."""
+    assert re.match(rf"c\.toml: \[profile\] {sentence}", refused(campaign_text(**changes)))
+
+
+def test_keys_that_vary_together_are_not_refused_for_what_they_never_are_together():
+    """The smallest period and the largest height: neither value of the one meets the other's."""
+    lists = {"period": "[1e-9, 1e-3]", "h_rms": "[1e-12, 1e-6]"}
+    zipped = campaign_text(**lists).replace("[sweep]", '[sweep]\nzip = [["period", "h_rms"]]')
+    assert parse_campaign(zipped).task_count
+    assert "h_rms is 1e-06 with period 1e-09: rms slope is" in refused(campaign_text(**lists))
+
+
+def test_a_grid_that_fills_the_memory_is_refused():
+    text = campaign_text(ratio="50000", h_rms="1e-9", nodes_per_wave="100000")
+    sentence = refused(text)
+    assert "[solver] nodes_per_wave is 100000: with 50000 waves it must be at most 1342" in sentence
+
+
+def test_an_accuracy_below_that_of_numbers_is_refused():
+    text = campaign_text().replace("[solver]", "[solver]\naccuracy = 1e-20")
+    assert "[solver] accuracy is 1e-20: it must be a number of at least 1e-10" in refused(text)
 
 
 def test_a_number_of_any_length_is_refused_in_one_short_sentence():
@@ -123,7 +168,7 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         (campaign_text().replace("h_rms = 1e-6", "h_rms = 1e-6\nm2 = 0.1"), "h_rms and m2"),
         ("[profile\n", "is not valid TOML"),
         ("x = " + "[" * 5000, "is not valid TOML"),
-        (campaign_text(ratio="900000", n0="2"), "n0 · ratio is 1800000"),
+        (campaign_text(ratio="90000", n0="2"), "n0 · ratio is 180000"),
         (campaign_text(realisations="2000000000"), "tasks: at most"),
         (campaign_text(load_steps="100000", unloading_until="-1000"), "unloading curve has"),
         ("# " + "x" * 70_000, "bytes"),

@@ -53,12 +53,12 @@ def test_the_tip_radius_of_the_file_is_known(tmp_path: Path) -> None:
 def test_a_map_needs_a_row(tmp_path: Path) -> None:
     path = tmp_path / "map.sdf"
     instrument_files.sdf(path, STEP, Z, rows=4)
-    with pytest.raises(InputError, match=r"150 × 4 heights: --row K takes one .* 0 to 3"):
+    with pytest.raises(InputError, match=r"150 × 4 heights: row K takes one .* 0 to 3"):
         read_trace(path)
     np.testing.assert_allclose(read_trace(path, row=3).heights, Z, atol=1e-12)
     with pytest.raises(InputError, match="has the rows 0 to 3"):
         read_trace(path, row=4)
-    with pytest.raises(InputError, match="--channel is 2"):
+    with pytest.raises(InputError, match="channel is 2"):
         read_trace(path, row=0, channel=2)
 
 
@@ -76,7 +76,7 @@ def test_half_a_file_is_one_sentence_and_code_2(
 
 def test_units_of_texts_do_not_belong_to_instruments(tmp_path: Path) -> None:
     instrument_files.mahr(tmp_path / "a.qep", STEP, Z)
-    with pytest.raises(InputError, match="--unit belongs to texts"):
+    with pytest.raises(InputError, match="unit belongs to texts"):
         read_trace(tmp_path / "a.qep", unit="um")
 
 

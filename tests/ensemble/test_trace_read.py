@@ -104,13 +104,13 @@ def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path)
     assert_right(read(tmp_path, ["Spacing 0.0005 mm", "Z [µm]", *heights]))
     commas = [z.replace(".", ",") for z in heights]
     assert_right(read(tmp_path, ["Schrittweite: 0,5 µm", "Höhe (µm)", *commas]))
-    with pytest.raises(InputError, match="give --step"):
+    with pytest.raises(InputError, match="give step"):
         read(tmp_path, ["Height (µm)", *heights])
 
 
 def test_columns_are_chosen_where_there_are_more(tmp_path: Path) -> None:
     lines = [f"{k},{row}" for k, row in enumerate(rows(",", "."))]
-    with pytest.raises(InputError, match=r"3 columns: --columns"):
+    with pytest.raises(InputError, match=r"3 columns: columns"):
         read(tmp_path, ["n,x (um),z (um)", *lines])
     assert_right(read(tmp_path, ["n,x (um),z (um)", *lines], columns=(2, 3)))
 
@@ -163,11 +163,11 @@ def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
 
 SPIKED = [*rows(" ", ".")[:60], "25.0 0.1", *rows(" ", ".")[60:]]
 REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
-    "no unit": (rows(" ", "."), {}, "tells no unit.*--unit um"),
+    "no unit": (rows(" ", "."), {}, "tells no unit.*give unit, as in um"),
     "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "tells no unit"),
     "a unit of one column": (["x (mm),z", *rows(",", ".")], {}, "of the positions alone"),
-    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "--unit says mm and the hea"),
-    "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "--row is 3: .* no map and no channels"),
+    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit says mm and the hea"),
+    "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* no map and no channels"),
     "two rows": ([UM, "1;2", "2;3"], {}, "holds 2 rows of numbers"),
     "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
     "kilometres": ([UM.replace("µm", "m"), *rows(";", ".")], {}, "m long: is its unit right"),
@@ -197,12 +197,12 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "one number or two": (
         [f"{k % 7},{k % 3}" for k in range(99)],
         {"unit": "um"},
-        "give --decimal",
+        "give decimal",
     ),
     "four numbers or two": (
         [f"{k},5,1,{k % 3}" for k in range(99)],
         {"unit": "um"},
-        "give --decimal",
+        "give decimal",
     ),
     "no numbers": (["a trace", "of words"], {}, "no line of numbers"),
     "too few": (rows(" ", ".")[:9], {"unit": "um"}, "9 rows of numbers: at least 32"),

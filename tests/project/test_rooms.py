@@ -65,6 +65,7 @@ NOT_IN_SOLVER = {
 THREADS = {"solver.uninterrupted"}
 # All that campaigns know of the mechanics.
 SOLVER_FOR_ENSEMBLE = {
+    "solver.checks",
     "solver.control",
     "solver.fields",
     "solver.jumps",
@@ -80,6 +81,7 @@ SOLVER_FOR_ENSEMBLE = {
     "solver.trace",
     "solver.turns",
     "solver.validate.claims",
+    "solver.values",
     "solver.warm",
 }
 

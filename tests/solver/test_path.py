@@ -125,7 +125,7 @@ def test_a_path_may_end_in_contact():
         ([0.5, 0.6], "after loading it must unload"),
         ([0.5, 0.3, 0.2], "after unloading it must load"),
         ([0.5, 0.5], "after loading it must unload"),
-        ([0.5, np.nan, 0.6], "not a finite number"),
+        ([0.5, np.nan, 0.6], "must be a finite number"),
         ([1.2], "max_penetration is 1.2"),
         ([0.5, 0.3], "leave that turning point away"),
     ],

@@ -1,0 +1,380 @@
+"""Checks of arguments: each returns the value as it will be used, or refuses it in one sentence.
+
+A value of the wrong type raises a TypeError, a wrong value of the right type a ValueError; the
+sentence is "NAME is VALUE: it must be RULE" for both. Each bound stands here once, for Python, the
+command line and campaign files alike.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+T = TypeVar("T")
+
+_LONGEST = 80  # characters of a value that is shown
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Between which bounds a number must lie.
+
+    Parameters
+    ----------
+    low, high : float
+    without_low, without_high : bool
+        Whether the bound itself is excluded.
+    or_zero : bool
+        Whether 0 is allowed as well.
+    or_infinite : bool
+        Whether +∞ is allowed as well.
+    whole : bool
+        Whether it must be a whole number.
+    unit : str
+        Empty for a number without a unit.
+    note : str
+        What else helps who reads the rule.
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    without_low: bool = False
+    without_high: bool = False
+    or_zero: bool = False
+    or_infinite: bool = False
+    whole: bool = False
+    unit: str = ""
+    note: str = ""
+
+    def holds(self, number: float) -> bool:
+        """Whether a number lies between the bounds; NaN does not, nor ±∞ unless it may."""
+        if (self.or_zero and number == 0) or (self.or_infinite and number == math.inf):
+            return True
+        above = number > self.low if self.without_low else number >= self.low
+        below = number < self.high if self.without_high else number <= self.high
+        return above and below and abs(number) != math.inf
+
+    @property
+    def text(self) -> str:
+        """The rule in words, after "it must be"."""
+        low, high = plain(self.low), plain(self.high)
+        kind = "a whole number" if self.whole else "a number"
+        between = math.isfinite(self.low) and math.isfinite(self.high)
+        if between and self.without_low and self.without_high:
+            rule = f"{kind} between {low} and {high}, both excluded"
+        elif between and not (self.without_low or self.without_high):
+            positive = self.low > 0 and not self.whole
+            rule = f"{'a positive number' if positive else kind} from {low} to {high}"
+        else:
+            parts = []
+            if math.isfinite(self.low):
+                parts.append(f"above {low}" if self.without_low else f"of at least {low}")
+            if math.isfinite(self.high):
+                parts.append(f"below {high}" if self.without_high else f"at most {high}")
+            finite = not (between or self.whole)
+            rule = f"{'a finite number' if finite else kind} {' and '.join(parts)}".strip()
+        if self.or_zero:
+            rule = f"0 or {rule}"
+        if self.or_infinite:
+            rule = f"infinite, {rule}" if self.or_zero else f"infinite or {rule}"
+        return rule + (f", in {self.unit}" if self.unit else "") + self.note
+
+
+# Beyond these, fourth powers of wave numbers times squares of heights, and quotients of energies,
+# leave the range of floating-point numbers.
+_LEAST, _MOST = 1e-30, 1e30
+
+LENGTH = Bounds(1e-12, 1e6, unit="m")
+"""A period, or a thickness: from a hundredth of an atom to a thousand kilometres."""
+
+HEIGHT = Bounds(_LEAST, _MOST, unit="m")
+COEFFICIENT = Bounds(1e-6 * _LEAST, 1e6 * _MOST, unit="m")
+HEIGHT_SQUARE = Bounds(_LEAST**2, _MOST**2, unit="m²")
+
+RMS_SLOPE = Bounds(1e-12, 100.0, note="; are heights and period both in m?")
+"""Small-strain theory is for slopes far below 1, and a loop is warned of from 0.3 on. Profiles
+that are used to test methods reach some tens. At 100 flanks stand at 89.4° to the mean line.
+Heights in µm that are taken as m make it 1e6 times too large, and surfaces have slopes of 1e-4 and
+more.
+A slope of 1e-12 is the size of an atomic nucleus on a millimetre."""
+
+MEAN_SQUARE_SLOPE = Bounds(RMS_SLOPE.low**2, RMS_SLOPE.high**2)
+
+YOUNG = Bounds(1e-3, 1e15, unit="Pa")
+"""A thousandth of the modulus of the softest gels, and a thousand times that of diamond."""
+
+POISSON = Bounds(-1.0, 0.5, without_low=True)
+WORK_OF_ADHESION = Bounds(_LEAST, _MOST, or_zero=True, unit="J/m²")
+STIFFNESS = Bounds(
+    _LEAST,
+    _MOST,
+    or_zero=True,
+    or_infinite=True,
+    unit="Pa/m of nominal area",
+    note=" (0 is load control, infinite a fixed separation)",
+)
+SPRING = Bounds(_LEAST, _MOST, unit="Pa/m of nominal area")
+MAX_STRESS = Bounds(_LEAST, _MOST, unit="Pa")
+MAX_PENETRATION = Bounds(
+    0.0,
+    1.0,
+    without_low=True,
+    without_high=True,
+    note=" (in units of h_max; at 1 the mean gap would be zero, and no such state exists)",
+)
+FAR_DISPLACEMENT = Bounds(1e-12, 1e12, unit="units of h_max")
+HURST = Bounds(0.0, 1.0, without_low=True, without_high=True)
+ROLLOFF = Bounds(1.0)
+SEED = Bounds(0, whole=True)
+
+MOST_WAVES = 100_000
+"""Beyond this, memory is measured in gigabytes; loops have been tested to a tenth of it."""
+
+HARMONIC = Bounds(1, MOST_WAVES, whole=True)
+
+LOAD_STEPS = Bounds(1, 100_000, whole=True)
+
+ACCURACY = Bounds(1e-10, 1.0, without_high=True)
+"""The field is solved to a hundredth of it, and to no less than 1e-14 in double precision; at 1e-10
+both still leave two decimal digits between them."""
+
+NODES_PER_WAVE = Bounds(8, 100_000, whole=True, note="; fewer are too coarse for the shortest wave")
+
+NODES = Bounds(1, 1 << 26, whole=True)
+"""An array of so many nodes takes half a gigabyte."""
+
+FINITE = Bounds()
+
+
+def plain(number: float) -> str:
+    """Spell a number as one would write it: 1e9, not 1e+09."""
+    if isinstance(number, int):
+        return str(number)
+    mantissa, e, exponent = f"{number:.6g}".partition("e")
+    return mantissa + (f"e{int(exponent)}" if e else "")
+
+
+def shown(value: object) -> str:
+    """Return a value as Python spells it, on one line and short enough for a sentence."""
+    if isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and np.ma.is_masked(value):
+        return "masked"
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        value = value.item()
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits
+        text = "a number of thousands of digits"
+    text = "".join(c if c.isprintable() else " " for c in text)
+    text = " ".join(text.split()) if "\n" in text or "  " in text else text
+    return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
+
+
+def number_of(value: object) -> float | int | None:
+    """Return a real number as Python's own, of a NumPy scalar too; None if it is none.
+
+    A bool is an int to Python, never to a user. A fraction too large for a float is NaN.
+    """
+    if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
+        value = value.item()
+    if isinstance(value, bool | np.bool_) or value is np.ma.masked:
+        return None
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real | Decimal):
+        try:
+            return float(value)
+        except (OverflowError, ValueError):  # of a large fraction, of a signalling NaN
+            return math.nan
+    return None
+
+
+def real(name: str, value: object, bounds: Bounds = FINITE) -> float:
+    """Return a real number between its bounds as a float.
+
+    Raises
+    ------
+    TypeError
+        If it is no real number: a bool, a text, None, a complex number, an array of several.
+    ValueError
+        If it breaks its bounds or is not finite.
+    """
+    number = number_of(value)
+    if number is None:
+        raise TypeError(_sentence(name, value, bounds.text))
+    try:
+        number = float(number)
+    except OverflowError:  # so large that no bounds hold it
+        number = math.nan
+    if not bounds.holds(number):
+        raise ValueError(_sentence(name, value, bounds.text))
+    return number + 0.0  # -0.0 becomes 0.0
+
+
+def whole(name: str, value: object, bounds: Bounds) -> int:
+    """Return a whole number between its bounds as an int; 10.0 is one too.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`real`.
+    """
+    number = number_of(value)
+    if number is None:
+        raise TypeError(_sentence(name, value, bounds.text))
+    sound = isinstance(number, int) or (math.isfinite(number) and number == int(number))
+    if not sound or not bounds.holds(int(number)):
+        raise ValueError(_sentence(name, value, bounds.text))
+    return int(number)
+
+
+def flag(name: str, value: object) -> bool:
+    """Return True or False; TypeError for anything else."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(_sentence(name, value, "True or False"))
+    return bool(value)
+
+
+def choice(name: str, value: T, choices: Iterable[T]) -> T:
+    """Return one of several names; TypeError if it is no text, ValueError for another one."""
+    names = tuple(choices)
+    rule = f"one of {', '.join(map(str, names))}"
+    if not isinstance(value, str):
+        raise TypeError(_sentence(name, value, rule))
+    if value not in names:
+        raise ValueError(_sentence(name, value, rule))
+    return value
+
+
+def instance(name: str, value: T, kind: type[Any], how: str) -> T:
+    """Return an object of a class; a TypeError says ``how`` to make one."""
+    if not isinstance(value, kind):
+        raise TypeError(_sentence(name, value, f"a {kind.__name__}; make one with {how}"))
+    return value
+
+
+def function(name: str, value: T) -> T:
+    """Return a function, or None; TypeError for anything else."""
+    if value is not None and not callable(value):
+        raise TypeError(_sentence(name, value, "a function, or None"))
+    return value
+
+
+def path(name: str, value: object) -> Path:
+    """Return a path; TypeError for what is none."""
+    if not isinstance(value, str | os.PathLike):
+        raise TypeError(_sentence(name, value, "a path"))
+    return Path(value)
+
+
+def row(
+    name: str, values: object, *, entry: str = "value", imaginary: bool = False
+) -> NDArray[Any]:
+    """Return a row of numbers as an array of float64 (complex128 if ``imaginary``), shape (n,).
+
+    Lists, arrays, what NumPy makes an array of (a column of a table), and iterators; entries may be
+    of any real type. Whether they are finite, and how many, is left to the caller.
+
+    Raises
+    ------
+    TypeError
+        If it is no row of numbers: a text, a mapping, booleans, complex numbers, objects.
+    ValueError
+        If an entry is masked, or it has several dimensions.
+    """
+    if isinstance(values, str | bytes | Mapping | set | frozenset) or values is None:
+        raise TypeError(_sentence(name, values, "a row of numbers"))
+    if not hasattr(values, "__array__") and not isinstance(values, list | tuple):
+        if not isinstance(values, Iterable):
+            raise TypeError(_sentence(name, values, "a row of numbers"))
+        values = list(values)
+    masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
+    if masked is not None and masked.any():
+        first = int(np.flatnonzero(masked)[0])
+        raise ValueError(
+            f"{name}[{first}] is masked ({int(masked.sum())} in all): every {entry} must be given; "
+            "fill what is missing first"
+        )
+    if isinstance(values, list | tuple):  # to NumPy [True, 2] is [1, 2], and ["1", 2] are texts
+        for place, value in enumerate(values):
+            of_row = isinstance(value, list | tuple | np.ndarray) and np.ndim(value) > 0
+            if not of_row and number_of(value) is None:
+                if imaginary and isinstance(value, numbers.Complex) and not _is_bool(value):
+                    continue
+                raise TypeError(_sentence(f"{name}[{place}]", value, "a real number"))
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name} holds rows of different lengths: it must be one row") from None
+    if array.ndim != 1:
+        raise ValueError(f"{name} has {array.ndim} dimensions: it must be one row of numbers")
+    if array.dtype.kind == "O":
+        found = [number_of(value) for value in array]
+        if None in found:
+            place = found.index(None)
+            raise TypeError(_sentence(f"{name}[{place}]", array[place], "a real number"))
+        return np.array(found, dtype=np.float64)
+    if array.dtype.kind not in ("fiuc" if imaginary else "fiu"):
+        kinds = {"b": "booleans", "c": "complex numbers", "U": "texts", "S": "texts"}
+        held = kinds.get(array.dtype.kind, str(array.dtype))
+        raise TypeError(f"{name} holds {held}: every {entry} must be a real number")
+    return np.asarray(array, dtype=np.complex128 if imaginary else np.float64)
+
+
+def reals(name: str, values: object) -> NDArray[np.float64]:
+    """Return real numbers of any shape as an array; NaN and ±∞ pass.
+
+    Raises
+    ------
+    TypeError
+        If it holds anything else: texts, booleans, complex numbers, objects.
+    ValueError
+        If an entry is masked, or rows differ in length.
+    """
+    if np.ma.is_masked(values):
+        raise ValueError(f"{name} holds masked values: every value must be given")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name} holds rows of different lengths") from None
+    if array.dtype.kind not in "fiu":
+        raise TypeError(_sentence(name, values, "a real number, or an array of them"))
+    return np.asarray(array, dtype=np.float64)
+
+
+def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np.float64]:
+    """Return a row of finite numbers, as :func:`row`; ValueError for one that is not finite."""
+    array = row(name, values, entry=entry)
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise ValueError(
+            f"{name}[{bad[0]}] is {array[bad[0]]}: every {entry} must be a finite number"
+        )
+    return array
+
+
+def _is_bool(value: object) -> bool:
+    return isinstance(value, bool | np.bool_)
+
+
+def _sentence(name: str, value: object, rule: str) -> str:
+    return f"{name} is {_described(value)}: it must be {rule}"
+
+
+def _described(value: object) -> str:
+    """Return a value as it stands in a sentence; objects by their class alone."""
+    plainly = (str, bytes, numbers.Number, np.generic, np.ndarray, list, tuple, dict, set)
+    if value is None or isinstance(value, plainly):
+        return shown(value)
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    kind = type(value).__name__
+    return f"{'an' if kind[0] in 'AEIOUaeiou' else 'a'} {kind}"

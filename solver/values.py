@@ -1,0 +1,88 @@
+"""What the dataclasses that hold inputs and results have in common."""
+
+from __future__ import annotations
+
+from dataclasses import Field, fields
+from typing import Any
+
+import numpy as np
+
+_MANY = 4  # entries of a tuple that are shown
+
+
+class ByValue:
+    """Read-only arrays, equality by value and a short repr, for a frozen dataclass.
+
+    The dataclass is made with ``eq=False, repr=False``. Two objects are equal if they are of one
+    class and every field agrees that is not left out of comparisons (``compare=False``): arrays in
+    shape and every entry, NaN being equal to NaN. Equal objects have equal hashes.
+    """
+
+    def __post_init__(self) -> None:
+        """Make every array read-only; the owner of its memory may still write to it."""
+        for name, value in list(self.__dict__.items()):
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                view = value.view()
+                view.setflags(write=False)
+                self.__dict__[name] = view
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Copies and pickles are read-only as well."""
+        self.__dict__.update(state)
+        ByValue.__post_init__(self)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are of one class and agree in every field that is compared."""
+        if self is other:
+            return True
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(
+            _equal(getattr(self, entry.name), getattr(other, entry.name))
+            for entry in _compared(self)
+        )
+
+    def __hash__(self) -> int:
+        """Hash of the fields that are compared."""
+        return hash((type(self), *(_hashable(getattr(self, e.name)) for e in _compared(self))))
+
+    def __repr__(self) -> str:
+        """One line; of arrays and long tuples the size alone."""
+        shown = (
+            f"{entry.name}={_brief(getattr(self, entry.name))}"
+            for entry in fields(self)  # type: ignore[arg-type]  # every subclass is a dataclass
+            if entry.repr
+        )
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def _compared(value: ByValue) -> list[Field[Any]]:
+    return [entry for entry in fields(value) if entry.compare]  # type: ignore[arg-type]
+
+
+def _equal(one: Any, two: Any) -> bool:
+    if isinstance(one, np.ndarray) and isinstance(two, np.ndarray):
+        numeric = one.dtype.kind in "fc" and two.dtype.kind in "fc"
+        return bool(np.array_equal(one, two, equal_nan=numeric))
+    if isinstance(one, float) and isinstance(two, float):
+        return one == two or (one != one and two != two)
+    return bool(one == two)
+
+
+def _hashable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        numeric = value.dtype.kind in "fc"
+        return value.shape, (value + 0.0 if numeric else value).tobytes()  # -0.0 is equal to 0.0
+    if isinstance(value, float) and value != value:
+        return "nan"
+    return value
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"<array of {' × '.join(map(str, value.shape))}>"
+    if isinstance(value, tuple) and len(value) > _MANY:
+        return f"<{len(value)} in all>"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return repr(value)

@@ -1,0 +1,1039 @@
+"""Bad input of every public function and class: one sentence with name, value and rule."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from decimal import Decimal
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import adhesis
+from adhesis import (
+    ContactState,
+    Control,
+    Fields,
+    HalfSpace,
+    InputError,
+    Jump,
+    LoopResult,
+    Method,
+    MinorLoop,
+    Opening,
+    PathError,
+    PathResult,
+    Problem,
+    Profile,
+    loss_of_trace,
+    make_method,
+    prepare_trace,
+    profile_from_heights,
+    read_trace,
+    run_loop,
+    run_loops,
+    run_path,
+    self_affine_profile,
+    single_wave,
+)
+from ensemble.errors import naming_options
+from ensemble.trace.prepare import Prepared
+from ensemble.trace.read import Trace
+from solver.checks import Bounds, plain, real, shown, whole
+from solver.loop import check_cycle
+from solver.loop_result import counted
+from solver.method import MethodReport
+from solver.references.exact_wave import ExactWave
+
+PERIOD, AMPLITUDE = 1e-3, 1e-6
+WAVE = single_wave(AMPLITUDE, PERIOD)
+SOLID = HalfSpace(1e6, 0.5)
+PROBLEM = Problem(WAVE, SOLID, 0.04)
+METHOD = ExactWave(PROBLEM)
+UNDER_LOAD = ExactWave(Problem(WAVE, SOLID, 0.04, Control(0.0)))
+SPECTRUM: dict[str, Any] = {
+    "hurst": 0.8,
+    "period": 2e-3,
+    "n0": 2,
+    "ratio": 4,
+    "seed": 1,
+    "h_rms": 1e-6,
+}
+TRACE = Trace(Path("t.csv"), self_affine_profile(**SPECTRUM).heights(400), 5e-6)
+
+
+def spectral(**change: Any) -> Profile:
+    return self_affine_profile(**{**SPECTRUM, **change})
+
+
+def loop(**change: Any) -> LoopResult:
+    return run_loop(
+        change.pop("method", METHOD), **{"max_penetration": 0.5, "load_steps": 4} | change
+    )
+
+
+def loops(turns: Any, **change: Any) -> tuple[LoopResult, ...]:
+    return run_loops(
+        change.pop("method", METHOD), max_penetration=turns, **{"load_steps": 4} | change
+    )
+
+
+def path(points: Any, **change: Any) -> PathResult:
+    return run_path(change.pop("method", METHOD), points, **{"load_steps": 4} | change)
+
+
+def answer(**change: Any) -> Any:
+    prepared = change.pop("prepared", None) or prepare_trace(TRACE)
+    return loss_of_trace(prepared, **{"half_space": SOLID, "work_of_adhesion": 0.04} | change)
+
+
+NOT_NUMBERS: list[Any] = [
+    True,
+    np.bool_(False),
+    "1",
+    b"1",
+    None,
+    1j,
+    [1.0],
+    (1.0,),
+    np.array([1.0]),
+    np.array([]),
+    {},
+    object(),
+    np.ma.masked,
+]
+# what each parameter that is one number is refused for, besides those; its rule in words
+NUMBERS: dict[str, tuple[Callable[[Any], Any], list[Any], str]] = {
+    "young": (
+        lambda v: HalfSpace(v, 0.5),
+        [0, -1e6, 1e30, 1e-30],
+        "a positive number from 0.001 to",
+    ),
+    "poisson": (lambda v: HalfSpace(1e6, v), [-1, 0.51, 2], "a number above -1 and at most 0.5"),
+    "thickness": (
+        lambda v: HalfSpace(1e6, 0.3).layer_stiffness(v),
+        [0, -1, 1e300],
+        "a positive num",
+    ),
+    "stiffness": (lambda v: Control(v), [-1, 1e300, 1e-300], "infinite, 0 or a positive number"),
+    "work_of_adhesion": (
+        lambda v: Problem(WAVE, SOLID, v),
+        [-0.04, 1e300, 1e-300],
+        "0 or a positive number from 1e-30 to 1e30, in J/m²",
+    ),
+    "amplitude": (lambda v: single_wave(v, 1e-3), [], "a finite number"),
+    "period": (
+        lambda v: single_wave(1e-6, v),
+        [0, -1, 1e300, 1e-300],
+        "a positive number from 1e-12",
+    ),
+    "hurst": (lambda v: spectral(hurst=v), [0, 1, -0.2], "a number between 0 and 1, both excluded"),
+    "n0": (lambda v: spectral(n0=v), [0, -1, 1.5], "a whole number from 1 to 100000"),
+    "ratio": (lambda v: spectral(ratio=v), [0, -1, 2.5], "a whole number from 1 to 100000"),
+    "seed": (lambda v: spectral(seed=v), [-1, 0.5], "a whole number of at least 0"),
+    "rolloff": (lambda v: spectral(rolloff=v), [0.5, -1], "a finite number of at least 1"),
+    "accuracy": (
+        lambda v: make_method("grid", PROBLEM, accuracy=v),
+        [0, 1, -1e-3, 1e-20],
+        "a number of at least 1e-10 and below 1",
+    ),
+    "load_steps": (
+        lambda v: loop(load_steps=v),
+        [0, -3, 2.5, 10**9],
+        "a whole number from 1 to 100000",
+    ),
+    "max_penetration": (
+        lambda v: loop(max_penetration=v),
+        [0, 1, -0.2, 400],
+        "a number between 0 and 1, both excluded (in units of h_max",
+    ),
+    "max_stress": (
+        lambda v: loop(method=UNDER_LOAD, max_penetration=None, max_stress=v),
+        [0, -5, 1e300],
+        "a positive number from 1e-30 to 1e30, in Pa",
+    ),
+    "n": (lambda v: WAVE.heights(v), [0, -4, 8.5, 10**12], "a whole number from 1 to 67108864"),
+    "derivative": (lambda v: WAVE.at(0.0, v), [-1, 0.5, 99], "a whole number from 0 to 16"),
+    "order": (lambda v: WAVE.moment(v), [-1, 0.5, 99], "a whole number from 0 to 16"),
+    "within": (lambda v: WAVE.crests(v), [-1], "a finite number of at least 0"),
+    "distance": (lambda v: WAVE.shifted(v), [], "a finite number"),
+    "height": (lambda v: WAVE.scaled(v), [], "a finite number"),
+    "length": (lambda v: WAVE.scaled(1.0, v), [], "a finite number"),
+}
+PASSING: dict[str, Any] = {"stiffness": np.inf, "seed": 10**400}
+OPTIONAL = {"max_penetration", "max_stress"}  # None is another control's
+
+
+def numbers() -> Iterator[tuple[str, Any]]:
+    for name, (_, wrong, _) in NUMBERS.items():
+        for value in [*NOT_NUMBERS, *wrong, np.nan, np.inf, -np.inf, 10**400]:
+            allowed = isinstance(value, int | float) and value == PASSING.get(name)
+            if not allowed and not (value is None and name in OPTIONAL):
+                yield name, value
+
+
+@pytest.mark.parametrize(("name", "value"), list(numbers()), ids=lambda v: repr(v)[:20])
+def test_what_is_no_number_or_breaks_its_bounds_is_refused(name: str, value: Any) -> None:
+    call, _, rule = NUMBERS[name]
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    with pytest.raises(ValueError if is_number else TypeError) as caught:
+        call(value)
+    sentence = str(caught.value)
+    assert sentence.startswith(f"{name} is ")
+    assert f": it must be {rule}" in sentence
+    assert len(sentence) < 300
+    assert "\n" not in sentence
+    if is_number and name != "length":
+        assert shown(value) in sentence
+
+
+@pytest.mark.parametrize(
+    "two",
+    [2, 2.0, np.float32(2), np.float64(2), np.int64(2), np.array(2.0), Fraction(2), Decimal(2)],
+)
+def test_whatever_is_a_number_is_taken_as_one(two: Any) -> None:
+    assert real("x", two) == 2.0
+    assert type(real("x", two)) is float
+    assert whole("x", two, Bounds(0, 9, whole=True)) == 2
+    assert HalfSpace(two, 0.5) == HalfSpace(2.0, 0.5)
+    assert spectral(n0=two) == spectral(n0=2)
+    assert check_cycle(0.5, two) == (0.5, 2)
+
+
+MASKED = np.ma.array([1.0, 2.0, 4.0], mask=[False, True, False])
+ROWS: list[tuple[Any, type[Exception], str]] = [
+    (MASKED, ValueError, "[1] is masked (1 in all): every"),
+    ([0.0, np.ma.masked, 1.0], TypeError, "[1] is masked: it must be a real number"),
+    ([True, False, True], TypeError, "[0] is True: it must be a real number"),
+    ([0.0, True, 2.0], TypeError, "[1] is True: it must be a real number"),
+    (np.array([True, False, True]), TypeError, " holds booleans: every"),
+    (np.array(["1", "2", "3"]), TypeError, " holds texts: every"),
+    (["0", "1", "2"], TypeError, "[0] is '0': it must be a real number"),
+    ([0.0, None, 2.0], TypeError, "[1] is None: it must be a real number"),
+    (np.array([0.0, None, 2.0]), TypeError, "[1] is None: it must be a real number"),
+    (np.array([0, 1, 2], dtype="m8[s]"), TypeError, " holds timedelta64[s]: every"),
+    ("0,1,2", TypeError, " is '0,1,2': it must be a row of numbers"),
+    (None, TypeError, " is None: it must be a row of numbers"),
+    (3.0, TypeError, " is 3.0: it must be a row of numbers"),
+    ({0: 1.0}, TypeError, " is {0: 1.0}: it must be a row of numbers"),
+    ([[0.0, 1.0], [2.0]], ValueError, " holds rows of different lengths"),
+    (np.ones((3, 3)), ValueError, " has 2 dimensions: it must be one row of numbers"),
+    (np.array(1.0), ValueError, " has 0 dimensions: it must be one row of numbers"),
+]
+OF_ROWS: dict[str, Callable[[Any], Any]] = {
+    "heights": lambda v: profile_from_heights(v, PERIOD),
+    "coefficients": lambda v: Profile(PERIOD, v),
+    "max_penetration": loops,
+    "turning_points": path,
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "error", "text"),
+    [
+        (name, *case)
+        for name in OF_ROWS
+        for case in ROWS
+        if name != "max_penetration" or case[0] is not None  # None is another control's
+    ],
+    ids=lambda v: repr(v)[:20],
+)
+def test_what_is_no_row_of_numbers_is_refused(
+    name: str, row: Any, error: type[Exception], text: str
+) -> None:
+    with pytest.raises(error) as caught:
+        OF_ROWS[name](row)
+    assert str(caught.value).startswith(name + text)
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        [0, 1, 4],
+        (0.0, 1.0, 4.0),
+        np.array([0, 1, 4], dtype=np.int16),
+        np.ma.array([0.0, 1.0, 4.0]),
+        pd.Series([0.0, 1.0, 4.0], index=[7, 8, 9]),
+        np.array([0, Fraction(1), Decimal(4)], dtype=object),
+        [0.0, np.float32(1), np.array(4.0)],
+        iter([0.0, 1.0, 4.0]),
+    ],
+    ids=lambda row: type(row).__name__,
+)
+def test_whatever_is_a_row_of_numbers_is_taken_as_one(row: Any) -> None:
+    assert profile_from_heights(row, 1.0) == profile_from_heights(np.array([0.0, 1.0, 4.0]), 1.0)
+
+
+STATES = METHOD.follow(METHOD.detached(AMPLITUDE), 0.5 * AMPLITUDE).states
+
+
+@cache
+def one_loop() -> LoopResult:
+    return loop()
+
+
+@cache
+def one_path() -> PathResult:
+    return path([0.5, 0.3, 0.4])
+
+
+OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
+    # wrong order, wrong kind
+    (
+        "Problem",
+        lambda: Problem(SOLID, WAVE, 0.04),
+        TypeError,
+        "profile is a HalfSpace: it must be a Profile; make one",
+    ),
+    (
+        "Problem",
+        lambda: Problem(WAVE, 1e6, 0.04),
+        TypeError,
+        "half_space is 1000000.0: it must be a HalfSpace",
+    ),
+    (
+        "Problem",
+        lambda: Problem(WAVE, SOLID, 0.04, "load"),
+        TypeError,
+        "control is 'load': it must be a Control",
+    ),
+    (
+        "Problem",
+        lambda: Problem(WAVE, HalfSpace, 0.04),
+        TypeError,
+        "half_space is the class HalfSpace: it",
+    ),
+    (
+        "make_method",
+        lambda: make_method("auto", WAVE),
+        TypeError,
+        "problem is a Profile: it must be a Problem; make one with",
+    ),
+    (
+        "make_method",
+        lambda: make_method(PROBLEM, "auto"),
+        TypeError,
+        "method is a Problem: it must be one of grid, sharp",
+    ),
+    (
+        "make_method",
+        lambda: make_method("magic", PROBLEM),
+        ValueError,
+        "method is 'magic': it must be one of grid, sharp, auto",
+    ),
+    (
+        "make_method",
+        lambda: make_method("grid", PROBLEM, nodes_per_wave=10**8),
+        ValueError,
+        "nodes_per_wave is 100000000: it must be a whole number from 8 to 100000",
+    ),
+    (
+        "make_method",
+        lambda: make_method("grid", PROBLEM, nodes_per_wave=4),
+        ValueError,
+        "nodes_per_wave is 4: it must be a whole number from 8 to 100000; fewer are too coarse",
+    ),
+    (
+        "make_method",
+        lambda: make_method("grid", Problem(spectral(ratio=1000), SOLID, 1), nodes_per_wave=10**5),
+        ValueError,
+        "nodes_per_wave is 100000: with 2000 waves it must be at most 33554, 67108864 nodes in all",
+    ),
+    (
+        "make_method",
+        lambda: make_method("sharp", PROBLEM, nodes_per_wave=32),
+        ValueError,
+        "nodes_per_wave is 32: it belongs to the method 'grid' alone",
+    ),
+    ("Method", lambda: ExactWave(WAVE), TypeError, "problem is a Profile: it must be a Problem"),
+    ("Method", lambda: Method(PROBLEM), TypeError, "Can't instantiate abstract class Method"),
+    (
+        "run_loop",
+        lambda: loop(method=PROBLEM),
+        TypeError,
+        "method is a Problem: it must be a Method; make one with make_method(name, problem)",
+    ),
+    (
+        "run_loops",
+        lambda: loops([0.5], method="grid"),
+        TypeError,
+        "method is 'grid': it must be a Method; make one with",
+    ),
+    (
+        "run_path",
+        lambda: path([0.5], method=None),
+        TypeError,
+        "method is None: it must be a Method; make one with",
+    ),
+    (
+        "run_loop",
+        lambda: loop(progress=3),
+        TypeError,
+        "progress is 3: it must be a function, or None",
+    ),
+    (
+        "run_loop",
+        lambda: loop(on_state="print"),
+        TypeError,
+        "on_state is 'print': it must be a function, or None",
+    ),
+    (
+        "run_loop",
+        lambda: loop(max_stress=5.0),
+        ValueError,
+        "a path under a separation or a stiffness turns at max_penetration",
+    ),
+    (
+        "run_loop",
+        lambda: loop(max_penetration=None),
+        ValueError,
+        "a path under a separation or a stiffness turns at max_penetration",
+    ),
+    (
+        "run_loops",
+        lambda: loops(None),
+        ValueError,
+        "a path under a separation or a stiffness turns at max_penetration",
+    ),
+    (
+        "run_loops",
+        lambda: loops([]),
+        ValueError,
+        "turning points are []: there must be some, all different",
+    ),
+    (
+        "run_loops",
+        lambda: loops([0.5, 0.5]),
+        ValueError,
+        "turning points are [0.5, 0.5]: there must be some, all",
+    ),
+    (
+        "run_loops",
+        lambda: loops([0.5, 1.5]),
+        ValueError,
+        "max_penetration is 1.5: it must be a number between 0 and 1",
+    ),
+    (
+        "run_loops",
+        lambda: loops([0.5], load_steps=10**9),
+        ValueError,
+        "load_steps is 1000000000: it must be a whole",
+    ),
+    ("run_path", lambda: path([]), ValueError, "a path needs at least one turning point"),
+    (
+        "run_path",
+        lambda: path([0.5, np.nan, 0.6]),
+        ValueError,
+        "turning_points[1] is nan: every turning point must be a finite number",
+    ),
+    (
+        "run_path",
+        lambda: path([0.3, 0.5]),
+        ValueError,
+        "the path goes from 0.3 to 0.5: after loading it must unload",
+    ),
+    (
+        "run_path",
+        lambda: path([-0.3]),
+        ValueError,
+        "the path starts with -0.3: it must start with loading",
+    ),
+    ("run_path", lambda: path([0.5], out="no"), TypeError, "out is 'no': it must be True or False"),
+    (
+        "run_path",
+        lambda: path([0.5], load_steps=10**9),
+        ValueError,
+        "load_steps is 1000000000: it must be a whole",
+    ),
+    # units
+    (
+        "Problem",
+        lambda: Problem(WAVE.scaled(1e6), SOLID, 0.04),
+        ValueError,
+        "rms slope is 4,443: it must be a positive number from 1e-12 to 100; are heights and "
+        "period both in m?",
+    ),
+    (
+        "Problem",
+        lambda: Problem(WAVE.scaled(1, 1e-9), SOLID, 0.04),
+        ValueError,
+        "rms slope is 4.443e6: it must be",
+    ),
+    (
+        "Problem",
+        lambda: Problem(WAVE.scaled(1e-12), SOLID, 0.04),
+        ValueError,
+        "rms slope is 4.443e-15: it must be",
+    ),
+    # profiles
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights([2.0, 2.0, 2.0], 1.0),
+        ValueError,
+        "the profile is flat (h_max = 0)",
+    ),
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights([1.0, 2.0], 1.0),
+        ValueError,
+        "heights hold 2 value(s): at least 3",
+    ),
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights(pd.Series([0, None, 2], dtype="Int64"), 1.0),
+        ValueError,
+        "heights[1] is nan: every height must be a finite number",
+    ),
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights([1.0, np.inf, 2.0], 1.0),
+        ValueError,
+        "heights[1] is inf: every height must be a finite number",
+    ),
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights([0.0, 1e200, 0.0], 1.0),
+        ValueError,
+        "largest height is 1e+200: it must be",
+    ),
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights([0.0, 1e-200, 0.0], 1.0),
+        ValueError,
+        "largest coefficient is 3.3",
+    ),
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights(np.array([1, 2j, 3]), 1.0),
+        TypeError,
+        "heights holds complex numbers: every height",
+    ),
+    (
+        "profile_from_heights",
+        lambda: profile_from_heights([1, 2j, 3], 1.0),
+        TypeError,
+        "heights[1] is 2j: it must be a real number",
+    ),
+    ("Profile", lambda: Profile(1.0, np.zeros(3)), ValueError, "the profile is flat"),
+    (
+        "Profile",
+        lambda: Profile(1.0, [0, np.nan]),
+        ValueError,
+        "coefficients[1] is (nan+0j): every coefficient",
+    ),
+    ("Profile", lambda: Profile(1.0, [1, 1]), ValueError, "a_0 is (1+0j): a profile has zero mean"),
+    (
+        "Profile",
+        lambda: Profile(1.0, [0]),
+        ValueError,
+        "a profile has the coefficients a_0 … a_M, M ≥ 1",
+    ),
+    (
+        "Profile",
+        lambda: WAVE.at("a"),
+        TypeError,
+        "x is 'a': it must be a real number, or an array of them",
+    ),
+    ("Profile", lambda: WAVE.at(MASKED), ValueError, "x holds masked values"),
+    ("Profile", lambda: WAVE.heights(2), ValueError, "2 nodes are too few"),
+    ("single_wave", lambda: single_wave(0.0, 1.0), ValueError, "the profile is flat"),
+    (
+        "self_affine_profile",
+        lambda: spectral(h_rms=0),
+        ValueError,
+        "h_rms is 0: it must be a positive number from 1e-30 to 1e30, in m",
+    ),
+    (
+        "self_affine_profile",
+        lambda: spectral(h_rms=1e-200),
+        ValueError,
+        "h_rms is 1e-200: it must be",
+    ),
+    (
+        "self_affine_profile",
+        lambda: spectral(h_rms=1e200),
+        ValueError,
+        "h_rms is 1e+200: it must be",
+    ),
+    ("self_affine_profile", lambda: spectral(h_rms=True), TypeError, "h_rms is True: it must be"),
+    (
+        "self_affine_profile",
+        lambda: spectral(h_rms=None, m2=1e9),
+        ValueError,
+        "m2 is 1000000000.0: it must be a positive number from 1e-24 to 10000",
+    ),
+    (
+        "self_affine_profile",
+        lambda: spectral(h_rms=None, c0="1"),
+        TypeError,
+        "c0 is '1': it must be a positive",
+    ),
+    (
+        "self_affine_profile",
+        lambda: spectral(h_rms=None),
+        ValueError,
+        "give exactly one of h_rms, m2 and c0; given: none",
+    ),
+    (
+        "self_affine_profile",
+        lambda: spectral(ratio=10**5),
+        ValueError,
+        "n0 · ratio is 200000: at most 100000 waves",
+    ),
+    (
+        "self_affine_profile",
+        lambda: spectral(rolloff=9),
+        ValueError,
+        "rolloff is 9: it must be at most ratio (4)",
+    ),
+    (
+        "self_affine_profile",
+        lambda: spectral(amplitudes="gauss"),
+        ValueError,
+        "amplitudes is 'gauss': it must be one of deterministic, rayleigh",
+    ),
+    (
+        "HalfSpace",
+        lambda: SOLID.layer_stiffness(1e-3),
+        ValueError,
+        "poisson is 0.5: a layer that is incompressible",
+    ),
+    (
+        "Control",
+        lambda: Control("load"),
+        TypeError,
+        "stiffness is 'load': it must be infinite, 0 or",
+    ),
+    # results
+    (
+        "LoopResult",
+        lambda: one_loop().states("up"),
+        ValueError,
+        "branch is 'up': it must be one of loading, unloading",
+    ),
+    (
+        "LoopResult",
+        lambda: one_loop().on_axis("loading", one_loop().energy[:3]),
+        ValueError,
+        "values have the shape (3,): there must be one for each",
+    ),
+    (
+        "LoopResult",
+        lambda: one_loop().at("loading", "a", one_loop().energy),
+        TypeError,
+        "drives is 'a': it must be a real number",
+    ),
+    (
+        "LoopResult",
+        lambda: one_loop().mean_stress.__setitem__(0, 1.0),
+        ValueError,
+        "assignment destination is read-only",
+    ),
+    (
+        "LoopResult",
+        lambda: setattr(one_loop(), "loss", 0.0),
+        AttributeError,
+        "cannot assign to field 'loss'",
+    ),
+    (
+        "PathResult",
+        lambda: one_path().potential.__setitem__(0, 1.0),
+        ValueError,
+        "assignment destination is read-only",
+    ),
+    (
+        "ContactState",
+        lambda: STATES[-1].edges.__setitem__((0, 0), 1.0),
+        ValueError,
+        "assignment destination is read-only",
+    ),
+    (
+        "Fields",
+        lambda: METHOD.fields(STATES[-1], 16).gap.__setitem__(0, 1.0),
+        ValueError,
+        "assignment destination is read-only",
+    ),
+    (
+        "Opening",
+        lambda: METHOD.openings(STATES[-1])[0].gap.__setitem__(0, 1.0),
+        ValueError,
+        "assignment destination is read-only",
+    ),
+    (
+        "Jump",
+        lambda: setattr(one_loop().jumps[0], "energy_drop", 0.0),
+        AttributeError,
+        "cannot assign to field 'energy_drop'",
+    ),
+    (
+        "MinorLoop",
+        lambda: setattr(one_path().minor_loops[0], "loss", 0.0),
+        AttributeError,
+        "cannot assign to field 'loss'",
+    ),
+    (
+        "Path",
+        lambda: setattr(adhesis.Path((), ()), "states", ()),
+        AttributeError,
+        "cannot assign to field 'states'",
+    ),
+    (
+        "Profile",
+        lambda: WAVE.coefficients.__setitem__(1, 1.0),
+        ValueError,
+        "assignment destination is read-only",
+    ),
+    # traces
+    (
+        "prepare_trace",
+        lambda: prepare_trace("file.csv"),
+        TypeError,
+        "trace is 'file.csv': it must be a Trace; make one with read_trace(path)",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, degree=-1),
+        InputError,
+        "degree is -1: it must be a whole number from 0 to 6",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, degree="1"),
+        TypeError,
+        "degree is '1': it must be a whole number",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, cut_off=-1e-6),
+        InputError,
+        "cut_off is -1e-06: it must be a positive",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, cut_off=1.0),
+        InputError,
+        "cut_off is 1 m: it must lie between 2.2 steps",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, tip_radius=np.nan),
+        InputError,
+        "tip_radius is nan: it must be",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, longest_gap=-1),
+        InputError,
+        "longest_gap is -1: it must be a number from 0",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, invert="yes"),
+        TypeError,
+        "invert is 'yes': it must be True or False",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(TRACE, keep_outliers=1),
+        TypeError,
+        "keep_outliers is 1: it must be True or",
+    ),
+    (
+        "prepare_trace",
+        lambda: prepare_trace(replace(TRACE, heights=np.full(400, np.nan))),
+        InputError,
+        "t.csv has 0 heights",
+    ),
+    ("read_trace", lambda: read_trace(3), TypeError, "path is 3: it must be a path"),
+    (
+        "read_trace",
+        lambda: read_trace("no such file"),
+        InputError,
+        "cannot read no such file: there is no such file",
+    ),
+    (
+        "read_trace",
+        lambda: read_trace(Path(__file__).parent),
+        InputError,
+        f"{Path(__file__).parent} is a directory",
+    ),
+    (
+        "read_trace",
+        lambda: read_trace(__file__, step=-1),
+        InputError,
+        "step is -1: it must be a positive number",
+    ),
+    (
+        "read_trace",
+        lambda: read_trace(__file__, columns=["a", 1]),
+        TypeError,
+        "columns is 'a': it must be a whole number",
+    ),
+    ("read_trace", lambda: read_trace(__file__, row=1), InputError, "row is 1: "),
+    (
+        "loss_of_trace",
+        lambda: answer(prepared=TRACE),
+        TypeError,
+        "prepared is a Trace: it must be a Prepared; make one with prepare_trace",
+    ),
+    (
+        "loss_of_trace",
+        lambda: answer(half_space=1e6),
+        TypeError,
+        "half_space is 1000000.0: it must be a HalfSpace",
+    ),
+    (
+        "loss_of_trace",
+        lambda: answer(work_of_adhesion=-1),
+        ValueError,
+        "work_of_adhesion is -1.0: it must be 0 or",
+    ),
+    (
+        "loss_of_trace",
+        lambda: answer(work_of_adhesion="0.04"),
+        TypeError,
+        "work_of_adhesion is '0.04': it must be a row of numbers",
+    ),
+    (
+        "loss_of_trace",
+        lambda: answer(work_of_adhesion=[]),
+        ValueError,
+        "work_of_adhesion is empty: it must hold one number",
+    ),
+    (
+        "loss_of_trace",
+        lambda: answer(max_penetration=[0.5, 1.0]),
+        ValueError,
+        "max_penetration is 1.0: it must be",
+    ),
+    (
+        "loss_of_trace",
+        lambda: answer(load_steps=10**9),
+        ValueError,
+        "load_steps is 1000000000: it must be",
+    ),
+    ("loss_of_trace", lambda: answer(accuracy=1e-20), ValueError, "accuracy is 1e-20: it must be"),
+    (
+        "loss_of_trace",
+        lambda: answer(method="magic"),
+        ValueError,
+        "method is 'magic': it must be one of",
+    ),
+    (
+        "loss_of_trace",
+        lambda: answer(processes=-1),
+        ValueError,
+        "processes is -1: it must be a whole number from 0 to 4096",
+    ),
+    ("loss_of_trace", lambda: answer(quick=1), TypeError, "quick is 1: it must be True or False"),
+    (
+        "loss_of_trace",
+        lambda: answer(watch=1),
+        TypeError,
+        "watch is 1: it must be a function, or None",
+    ),
+    # files
+    ("open", lambda: adhesis.open(3), TypeError, "path is 3: it must be a path"),
+    (
+        "open",
+        lambda: adhesis.open("a.h5", beside="b.h5"),
+        TypeError,
+        "beside is 'b.h5': it must be a list of paths",
+    ),
+    ("open", lambda: adhesis.open("no such file.h5"), InputError, "no such file.h5"),
+    ("InputError", lambda: adhesis.open("no such file.h5"), ValueError, "no such file.h5"),
+    ("PathError", lambda: path([0.5, -50.0, 0.6]), PathError, "contact is lost on the way to -50"),
+]
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "sentence"),
+    [case[1:] for case in OTHERS],
+    ids=[f"{case[0]}: {case[3][:30]}" for case in OTHERS],
+)
+def test_bad_input_is_refused_in_one_sentence(
+    call: Callable[[], Any], error: type[Exception], sentence: str
+) -> None:
+    with pytest.raises(error) as caught:
+        call()
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert "--" not in str(caught.value)
+
+
+def test_every_public_name_is_in_the_table() -> None:
+    """Of each name of adhesis some bad input, or for a result something that would change it."""
+    assert {case[0] for case in OTHERS} == {*adhesis.__all__, "open"}
+
+
+@pytest.mark.parametrize("name", [*adhesis.__all__, "open"])
+def test_what_is_missing_or_unknown_is_named(name: str) -> None:
+    """Python's own sentence: it names the function and the argument."""
+    public = getattr(adhesis, name)
+    if name in ("InputError", "PathError"):
+        return
+    if name != "Control":  # a fixed separation by default
+        with pytest.raises(TypeError, match=r"missing \d+ required|abstract class"):
+            public()
+    with pytest.raises(TypeError, match=r"unexpected keyword argument|abstract class"):
+        public(nonsense=1)
+
+
+def test_heights_in_micrometres_are_refused_at_once() -> None:
+    """Taken as metres their grid would fill the memory: nothing is set up."""
+    heights = np.random.default_rng(0).standard_normal(4096)  # µm
+    started = time.process_time()
+    with pytest.raises(ValueError, match=r"^rms slope is .*; are heights and period both in m\?$"):
+        make_method("sharp", Problem(profile_from_heights(heights, 2e-3), SOLID, 0.04))
+    assert time.process_time() - started < 1.0
+
+
+def test_the_steepest_profiles_that_methods_are_tested_with_are_not_refused() -> None:
+    Problem(spectral(h_rms=None, m2=99.99**2), SOLID, 0.04)
+    with pytest.raises(ValueError, match=r"rms slope is 100\.1: it must be"):
+        Problem(spectral(h_rms=None, m2=99.99**2).scaled(1.001), SOLID, 0.04)
+
+
+def test_a_generator_of_turning_points_is_followed_and_the_order_is_kept() -> None:
+    found = loops((turn for turn in (0.6, 0.3)), load_steps=2)
+    assert [result.turning_point for result in found] == [0.6, 0.3]
+    assert path(iter([0.5, 0.4]), load_steps=1, out=False).turning_points == (0.5, 0.4)
+
+
+# ---------------------------------------------------------------------- values
+
+
+def test_equal_values_are_equal_and_have_equal_hashes() -> None:
+    other = Problem(single_wave(AMPLITUDE, PERIOD), HalfSpace(1e6, 0.5), 0.04)
+    pairs: list[tuple[Any, Any]] = [
+        (WAVE, single_wave(AMPLITUDE, PERIOD)),
+        (SOLID, HalfSpace(1e6, 0.5)),
+        (PROBLEM, other),
+        (one_loop(), run_loop(ExactWave(other), max_penetration=0.5, load_steps=4)),
+        (one_path(), replace(one_path(), seconds=0.0)),
+        (STATES[-1], METHOD.follow(METHOD.detached(AMPLITUDE), 0.5 * AMPLITUDE).states[-1]),
+        (METHOD.fields(STATES[-1], 16), METHOD.fields(STATES[-1], 16)),
+        (METHOD.openings(STATES[-1])[0], METHOD.openings(STATES[-1])[0]),
+        (prepare_trace(TRACE).spectrum.noise, prepare_trace(TRACE).spectrum.noise),
+    ]
+    for one, two in pairs:
+        assert one is not two or isinstance(one, float)
+        assert (one == two) is True
+        assert hash(one) == hash(two)
+        assert one != 3
+        for copied in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+            assert copied == one
+
+
+def test_different_values_are_not_equal() -> None:
+    pairs: list[tuple[Any, Any]] = [
+        (WAVE, single_wave(AMPLITUDE, 2 * PERIOD)),
+        (WAVE, WAVE.scaled(1 + 1e-15)),
+        (WAVE, profile_from_heights(WAVE.heights(8), PERIOD).mirrored().shifted(0.1 * PERIOD)),
+        (PROBLEM, Problem(WAVE, SOLID, 0.05)),
+        (PROBLEM, Problem(WAVE, SOLID, 0.04, Control(1e9))),
+        (one_loop(), loop(load_steps=5)),
+        (one_loop(), replace(one_loop(), loss=2 * one_loop().loss)),
+        (STATES[-1], STATES[0]),
+        (one_loop(), one_loop().problem),
+    ]
+    for one, two in pairs:
+        assert (one == two) is False
+
+
+def test_a_copy_cannot_be_written_to_either() -> None:
+    for copied in (
+        copy.deepcopy(one_loop()),
+        pickle.loads(pickle.dumps(one_loop())),
+        replace(one_loop(), seconds=0.0),
+    ):
+        with pytest.raises(ValueError, match="read-only"):
+            copied.separation[0] = 0.0
+
+
+def test_an_array_that_was_given_stays_the_callers() -> None:
+    given = np.array([0.0, 1e-6])
+    profile = Profile(PERIOD, given)
+    given[1] = 5.0
+    assert profile.coefficients[1] == 1e-6
+
+
+# ---------------------------------------------------------------------- what is printed
+
+
+def test_a_repr_is_short_and_tells_the_loss() -> None:
+    for thing in (
+        WAVE,
+        PROBLEM,
+        one_loop(),
+        one_path(),
+        STATES[-1],
+        METHOD.fields(STATES[-1], 4096),
+    ):
+        assert len(repr(thing)) < 400
+        assert repr(thing).count("\n") <= 1
+        assert repr(thing).startswith(type(thing).__name__)
+    assert f"loss={one_loop().loss:.6g} J/m²" in repr(one_loop())
+    assert "2 jumps, 0 warnings" in repr(one_loop())
+    assert isinstance(prepare_trace(TRACE), Prepared)
+    assert len(repr(prepare_trace(TRACE))) < 200
+
+
+def test_warnings_are_printed_with_the_loop() -> None:
+    doubtful = replace(one_loop(), loss_error=one_loop().loss)
+    assert doubtful.warnings
+    assert all(text in str(doubtful) for text in doubtful.warnings)
+    assert "WARNING" not in str(one_loop())
+
+
+def test_without_adhesion_there_is_no_residual_and_no_tension() -> None:
+    """The integral is rounding: in units of itself it would be a residual of 1."""
+    none = loop(method=ExactWave(Problem(WAVE, SOLID, 0.0)))
+    rounding = replace(none, loss=1e-20, loss_from_drops=0.0)
+    assert rounding.audit_residual == 0
+    assert str(none.pull_off_stress) == "0.0"
+    assert path([0.5], method=ExactWave(none.problem)).audit_residual == 0
+
+
+def test_a_penetration_within_rounding_of_first_touch_is_0() -> None:
+    h_max = WAVE.h_max
+    for s in (h_max, np.nextafter(h_max, 1), np.nextafter(h_max, 0)):
+        assert str(PROBLEM.penetration(s)) == "0.0"
+        assert PROBLEM.penetration(np.array([s, 0.5 * h_max])).tolist() == [0.0, 0.5]
+    assert PROBLEM.penetration(h_max * (1 - 1e-12)) == pytest.approx(1e-12, rel=1e-3)
+
+
+def test_one_is_not_several() -> None:
+    assert [counted(n, "jump") for n in (0, 1, 2)] == ["0 jumps", "1 jump", "2 jumps"]
+
+
+def test_bounds_are_spelt_as_one_would_write_them() -> None:
+    assert [plain(x) for x in (1e9, 1e-12, 0.5, 100_000, 1e6)] == [
+        "1e9",
+        "1e-12",
+        "0.5",
+        "100000",
+        "1e6",
+    ]
+
+
+def test_a_command_is_answered_in_its_own_words() -> None:
+    with naming_options(), pytest.raises(InputError, match=r"^--degree is 9: it must be"):
+        prepare_trace(TRACE, degree=9)
+    with pytest.raises(InputError, match=r"^degree is 9: it must be"):
+        prepare_trace(TRACE, degree=9)
+
+
+def test_a_report_of_a_method_is_no_part_of_what_a_loop_found() -> None:
+    assert replace(one_loop(), method=MethodReport("other", None), seconds=9.0) == one_loop()
+    assert isinstance(STATES[-1], ContactState)
+    assert issubclass(InputError, ValueError)
+    assert {Fields, Jump, MinorLoop, Opening} <= {getattr(adhesis, n) for n in adhesis.__all__}
