@@ -16,6 +16,7 @@ import shutil
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -23,8 +24,11 @@ import numpy as np
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
+from ensemble.results.checksum import attributes_checksum, checksum
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
+    CHECKSUM,
+    DAMAGED,
     DATASETS,
     FILE_TYPE,
     FILE_VERSION,
@@ -38,6 +42,9 @@ from ensemble.results.schema import (
 from ensemble.results.write import reason
 from ensemble.task.dataset import KEPT, Dataset, sizes_of
 
+# Headers in the format of HDF5 1.8 have checksums, which HDF5 itself checks; those of older formats
+# have none, and from 1.10 on a file whose writer was killed counts as open.
+_FORMAT = ("v108", "v110")
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
 
 
@@ -77,13 +84,11 @@ def create(
             raise InputError(
                 f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
             )
-        with h5py.File(unfinished, "w", locking=False, track_order=False) as file:
+        with h5py.File(unfinished, "w", libver=_FORMAT, locking=False, track_order=False) as file:
             _lay_out(file, campaign, part)
-            _describe(file, campaign, versions or {}, grown_from)
-            if part != WHOLE:
-                file.attrs["part"] = str(part)
+            _describe(file, campaign, part, versions or {}, grown_from)
             if grown_from is not None:
-                _copy_rows(grown_from, file, campaign)
+                _copy_rows(grown_from, file, campaign, part)
         with unfinished.open("rb") as handle:
             os.fsync(handle.fileno())
         unfinished.replace(path)
@@ -101,6 +106,7 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
         dataset.make_scale(scale.name)
         dataset.attrs["units"] = scale.unit
         dataset.attrs["long_name"] = scale.meaning
+        dataset.attrs[CHECKSUM.name] = np.uint32(checksum([scale.values]))
     for column in datasets(campaign):
         dataset = _allocate(file, column, shape_of(column, sizes))
         dataset.attrs["units"] = column.unit
@@ -123,6 +129,7 @@ def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
+    plist.set_obj_track_times(False)
     if dtype.kind != "S":  # texts are filled with zeros; h5py hands a text over as garbage
         plist.set_fill_value(np.array(column.fill, dtype))
     space = h5py.h5s.create_simple(shape)
@@ -131,34 +138,48 @@ def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.
 
 
 def _describe(
-    file: h5py.File, campaign: Campaign, versions: Mapping[str, str], old: Results | None
+    file: h5py.File,
+    campaign: Campaign,
+    part: Part,
+    versions: Mapping[str, str],
+    old: Results | None,
 ) -> None:
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    file.attrs["file_type"] = FILE_TYPE
-    file.attrs["file_version"] = np.array(FILE_VERSION, "i4")
-    file.attrs["Conventions"] = "CF-1.11"
-    file.attrs["title"] = "Loading-unloading hysteresis loops of rough adhesive contacts"
-    file.attrs["campaign"] = campaign.text
-    file.attrs["seed"] = campaign.sweep.seed
-    file.attrs["created"] = now if old is None else old.attributes.get("created", now)
-    file.attrs["laid_out"] = now
-    for name, text in versions.items():
-        file.attrs[name] = text
+    attributes: dict[str, Any] = {
+        "file_type": FILE_TYPE,
+        "file_version": np.array(FILE_VERSION, "i4"),
+        "Conventions": "CF-1.11",
+        "title": "Loading-unloading hysteresis loops of rough adhesive contacts",
+        "campaign": campaign.text,
+        "seed": campaign.sweep.seed,
+        "created": now if old is None else old.attributes.get("created", now),
+        "laid_out": now,
+        **({} if part == WHOLE else {"part": str(part)}),
+        **versions,
+    }
+    for name, value in attributes.items():
+        file.attrs[name] = value
+    file.attrs[CHECKSUM.name] = np.uint32(attributes_checksum(attributes))
 
 
-def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
-    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks())}
-    target = np.array([place[old.campaign.identity(task)] for task in old.tasks()])
+def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) -> None:
+    """Copy every row but those that are damaged: in the new file they are pending."""
+    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks(part))}
+    target = np.array([place[old.campaign.identity(task)] for task in old.tasks()], np.intp)
+    sound = old.status() != DAMAGED
     # A task that kept its fields does so in the grown campaign: realisations are only added.
-    kept = np.searchsorted(file[KEPT][:], target[old.column(KEPT)])
+    of_kept = old.column(KEPT)
+    kept = np.searchsorted(file[KEPT][:], target[of_kept])
     for column in DATASETS:
         if column in TASK_DATASETS:
             continue
         dataset = file[column.name]
         targets = kept if column.dims[0] == KEPT else target
+        taken = sound[of_kept] if column.dims[0] == KEPT else sound
         width = max(1, int(np.prod(dataset.shape[1:])) * dataset.dtype.itemsize)
         for first in range(0, len(targets), max(1, _COPY_BYTES // width)):
             block = old.column(column.name, slice(first, first + max(1, _COPY_BYTES // width)))
-            rows = targets[first : first + len(block)]
+            chosen = taken[first : first + len(block)]
+            block, rows = block[chosen], targets[first : first + len(chosen)][chosen]
             for i, (start, stop) in stretches(rows):
                 dataset[start:stop] = block[i : i + stop - start]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,19 +15,44 @@ from numpy.typing import NDArray
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
+from ensemble.results.checksum import attributes_checksum, checksum, row_checksums
 from ensemble.results.schema import (
+    CHECKSUM,
+    DAMAGED,
+    LATER_DATASETS,
+    NOT_NEEDED,
+    ORIGIN,
+    ORIGIN_LENGTH,
+    PENDING,
+    ROOT_ATTRIBUTES,
+    STATUS,
     TASK_DATASETS,
     axis_datasets,
     check_version,
     datasets,
+    encode_text,
+    file_size,
+    origin_of,
     scales,
     shape_of,
 )
-from ensemble.task.dataset import sizes_of
+from ensemble.task.dataset import KEPT, sizes_of
 
+_MOST_MEMBERS = 1000  # of the root; a campaign with ten further axes has some 80
+_MOST_BESIDES = 16 * 2**20  # bytes beside the datasets; texts and headers take some 50,000
+_LONGEST_ATTRIBUTE = 2**16  # bytes of a root attribute, of a text those of a reference to it
+_NUMBERS = ("file_version", "seed")  # root attributes that are no texts
+# Exponential functions of numpy differ between processors by the last bits.
+_SCALE_ROUNDING = 1e-12
+_LOOKS = 3
+_INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 class Results:
     """A results file, read with plain h5py, at any moment of a run.
+
+    Opening it checks everything but the rows: the root attributes, the shapes and types of the
+    datasets, the dimension scales, and that the tasks are those of the campaign. The rows are
+    checked by :meth:`status`.
 
     Parameters
     ----------
@@ -40,6 +66,8 @@ class Results:
         Which rows of the campaign it holds; part 1 of 1 is the whole.
     attributes : dict
         The root attributes (docs/results-file.md).
+    has_checksums : bool
+        Whether damage of its rows can be found; not so in files of version 1.0.
 
     Raises
     ------
@@ -49,25 +77,81 @@ class Results:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
+        self._status: NDArray[np.uint8] | None = None
         with _damage(self.path):
             self._file = h5py.File(self.path, "r", locking=False)
         try:
             with _damage(self.path):
-                self.attributes: dict[str, Any] = dict(self._file.attrs)
-                check_version(
+                self._check_size()
+                self.attributes = self._root_attributes()
+                self.has_checksums = check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
+                self._check_head()
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
                 self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
-                self._check_shapes()
+                self._datasets = datasets(self.campaign)
+                self._check_layout()
+                self._check_scales()
+                self._tasks = self._checked_tasks()
         except BaseException:
             self._file.close()
             raise
 
-    def _check_shapes(self) -> None:
+    def _check_size(self) -> None:
+        """Refuse a file with more than a campaign can have beside its datasets, before reading.
+
+        Texts are stored beside the datasets, with no limit to their length.
+        """
+        if len(self._file) > _MOST_MEMBERS:
+            raise ValueError(f"{len(self._file)} members")
+        size = os.path.getsize(self.path)
+        stored = 0
+        for name in self._file:
+            found = self._file.get(name) if self._is_here(name) else None
+            if isinstance(found, h5py.Dataset):
+                stored += found.id.get_storage_size()
+        if size - stored > _MOST_BESIDES:
+            raise InputError(
+                f"{self.path} holds {(size - stored) / 1e6:.0f} MB beside its datasets: a results "
+                f"file holds at most {_MOST_BESIDES / 1e6:.0f} MB of texts"
+            )
+
+    def _is_here(self, name: str) -> bool:
+        """Whether a member of the root is in this file, not a link to somewhere else."""
+        return isinstance(self._file.get(name, getlink=True), h5py.HardLink)
+
+    def _root_attributes(self) -> dict[str, Any]:
+        found = {}
+        for name in ROOT_ATTRIBUTES:
+            if name not in self._file.attrs:
+                continue
+            if self._file.attrs.get_id(name).get_storage_size() > _LONGEST_ATTRIBUTE:
+                raise ValueError(name)
+            value = self._file.attrs[name]
+            if isinstance(value, str) == (name in _NUMBERS):
+                raise ValueError(name)
+            found[name] = value
+        return found
+
+    def _check_head(self) -> None:
+        """Check the root attributes against their checksum."""
+        has = CHECKSUM.name in self._file.attrs
+        if has != self.has_checksums:
+            raise ValueError(CHECKSUM.name)
+        if has and attributes_checksum(self.attributes) != int(self._file.attrs[CHECKSUM.name]):
+            raise InputError(
+                f"{self.path} is damaged: its root attributes do not have their checksum; "
+                f"{_INSTEAD}"
+            )
+
+    def _check_layout(self) -> None:
+        """Compare shapes and types with those of the campaign, before anything of them is read."""
+        if file_size(self.campaign, self.part) > os.path.getsize(self.path):
+            raise ValueError("truncated")
         wanted = scales(self.campaign, self.part)
-        names = [scale.name for scale in wanted] + [d.name for d in datasets(self.campaign)]
-        missing = [name for name in names if name not in self._file]
+        known = [d for d in self._datasets if self.has_checksums or d.name not in LATER_DATASETS]
+        missing = [d.name for d in (*wanted, *known) if d.name not in self._file]
         if missing:
             by = str(self.attributes.get("adhesis_version", "an unknown version"))
             commit = str(self.attributes.get("commit", "unknown"))
@@ -79,14 +163,49 @@ class Results:
                 f"{', '.join(missing[:3])}{more}: read it with that version, or compute the "
                 "campaign again into another file"
             )
-        for scale in wanted:
-            if self._file[scale.name].shape != scale.values.shape:
-                raise ValueError(scale.name)
         sizes = sizes_of(wanted)
-        for known in datasets(self.campaign):
-            found = self._file[known.name]
-            if found.shape != shape_of(known, sizes) or found.dtype != np.dtype(known.dtype):
-                raise ValueError(known.name)
+        for scale in wanted:
+            self._check_dataset(scale.name, scale.values.shape, scale.values.dtype)
+        for column in known:
+            self._check_dataset(column.name, shape_of(column, sizes), np.dtype(column.dtype))
+
+    def _check_dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+        found = self._file[name]
+        if found.shape != shape or found.dtype != dtype or not self._is_here(name):
+            raise ValueError(name)
+        if found.is_virtual or found.external:
+            raise ValueError(name)  # its numbers would be those of other files
+
+    def _check_scales(self) -> None:
+        """Compare the dimension scales with their checksums and with the campaign."""
+        for scale in scales(self.campaign, self.part):
+            dataset = self._file[scale.name]
+            values = dataset[:]
+            sound = np.allclose(values, scale.values, rtol=_SCALE_ROUNDING, atol=0.0)
+            if self.has_checksums:
+                sound = sound and checksum([values]) == int(dataset.attrs[CHECKSUM.name])
+            if not sound:
+                raise InputError(
+                    f"{self.path} is damaged: its {scale.name} is not that of its campaign; "
+                    f"{_INSTEAD}"
+                )
+
+    def _checked_tasks(self) -> list[Task]:
+        """Return the tasks of the campaign, which those of the file must be."""
+        tasks = self.campaign.tasks(self.part)
+        columns = [(d.name, [getattr(task, d.name) for task in tasks]) for d in TASK_DATASETS]
+        for place, axis in enumerate(axis_datasets(self.campaign)):
+            columns.append((axis.name, [task.others[place][1] for task in tasks]))
+        for name, wanted in columns:
+            found = self._file[name][:]
+            wrong = np.flatnonzero(found != np.asarray(wanted))
+            if wrong.size:
+                row = int(wrong[0])
+                raise InputError(
+                    f"{self.path} is damaged: its tasks are not those of its campaign ({name} of "
+                    f"row {row} is {found[row]} instead of {wanted[row]}); {_INSTEAD}"
+                )
+        return tasks
 
     def __enter__(self) -> Self:
         return self
@@ -115,12 +234,18 @@ class Results:
     def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Return a dataset, or some rows of it.
 
+        Checksum and origin of the rows of a file that has none are made up.
+
         Parameters
         ----------
         name : str
         rows : slice or ascending int array, optional
             All rows if not given. Memory is that of the result.
         """
+        if not self.has_checksums and name in LATER_DATASETS:
+            every = np.arange(len(self))
+            chosen = every if rows is None else every[rows]
+            return self._checksums(chosen) if name == CHECKSUM.name else self._origins(chosen)
         with _damage(self.path):
             dataset = self._file[name]
             if rows is None or isinstance(rows, slice):
@@ -131,18 +256,58 @@ class Results:
             return out
 
     def status(self) -> NDArray[np.uint8]:
-        """Return the status of every task: PENDING, DONE or FAILED (ensemble.results.schema)."""
-        return self.column("status")
+        """Return the status of every task: PENDING, DONE, … (ensemble.results.schema).
+
+        DAMAGED is that of a row which does not have its checksum, or whose status is none. All rows
+        with a result are read for it, once.
+        """
+        if self._status is None:
+            self._status = self._checked_status()
+        return self._status.copy()
+
+    def damaged(self) -> NDArray[np.intp]:
+        """Return the rows that are damaged."""
+        return np.flatnonzero(self.status() == DAMAGED)
+
+    def _checked_status(self) -> NDArray[np.uint8]:
+        status = self.column(STATUS.name)
+        suspects = np.flatnonzero(status != PENDING)
+        suspects = suspects[self._differ(suspects, status[suspects])]
+        # A row that a run empties and computes again at this moment looks damaged, once.
+        for _ in range(_LOOKS):
+            if not suspects.size:
+                break
+            status[suspects] = self.column(STATUS.name, suspects)
+            suspects = suspects[status[suspects] != PENDING]
+            suspects = suspects[self._differ(suspects, status[suspects])]
+        status[suspects] = DAMAGED
+        return status
+
+    def _differ(self, rows: NDArray[np.intp], status: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Whether rows that are not pending cannot be what was written."""
+        out = status > NOT_NEEDED
+        if self.has_checksums:
+            out |= self.column(CHECKSUM.name, rows) != self._checksums(rows)
+            return out
+        for dataset in self._datasets:
+            names = dataset.attributes.get("flag_values")
+            if names is not None and dataset is not STATUS:
+                values = self.column(dataset.name, rows)
+                out |= np.any((values < dataset.fill) | (values >= len(names)), axis=1)
+        return out
+
+    def _checksums(self, rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+        """Compute the checksums of some rows (ascending) from what they hold."""
+        return row_checksums(self.column, self._datasets, self.column(KEPT), rows)
+
+    def _origins(self, rows: NDArray[np.intp]) -> NDArray[np.bytes_]:
+        """Take the versions that laid the file out for those that computed its rows."""
+        text = encode_text(origin_of(self.attributes), ORIGIN_LENGTH)
+        return np.full(rows.size, text, ORIGIN.dtype)
 
     def tasks(self) -> list[Task]:
         """Return every task, row by row."""
-        columns = [self.column(d.name).tolist() for d in TASK_DATASETS]
-        names = [axis.name for axis in self.campaign.axes[2:]]
-        axes = [self.column(d.name).tolist() for d in axis_datasets(self.campaign)]
-        return [
-            Task(hurst, gamma, realisation, seed, tuple(zip(names, others, strict=True)))
-            for hurst, gamma, realisation, seed, *others in zip(*columns, *axes, strict=True)
-        ]
+        return self._tasks.copy()
 
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""
