@@ -1,6 +1,7 @@
-"""Checksums of a results file: of each row, of its root attributes, of each dimension scale.
+"""Checksums of the rows of a results file.
 
-A checksum is the CRC-32 of bytes in an order that ``docs/results-file.md`` states. It finds every
+The checksum of a row is the CRC-32 of what it holds, in the order
+that ``docs/results-file.md`` states. It finds every
 damage of up to 32 successive bits, and any other with a chance of all but one in 4·10⁹. Damage is
 an accident here, not an attack, so that no cryptographic digest is needed: readers compute the
 checksum of every row, and BLAKE2b takes more than four times as long.
@@ -9,7 +10,7 @@ checksum of every row, and BLAKE2b takes more than four times as long.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -108,24 +109,3 @@ def _side_by_side(
         out[:, place : place + size] = little.reshape(-1).view(np.uint8).reshape(count, size)
         place += size
     return out
-
-
-def attributes_checksum(attributes: Mapping[str, Any]) -> int:
-    """Return the checksum of root attributes, by their names and values.
-
-    Parameters
-    ----------
-    attributes : mapping
-        Those of :data:`ensemble.results.schema.ROOT_ATTRIBUTES` that the file has.
-    """
-    parts: list[NDArray[Any]] = []
-    for name in sorted(attributes):
-        value = attributes[name]
-        text = isinstance(value, str)
-        parts += [_bytes(name), _bytes(value) if text else np.ravel(np.asarray(value, np.int64))]
-    return checksum(parts)
-
-
-def _bytes(text: str) -> NDArray[np.uint8]:
-    """Return a text as UTF-8 with a zero at its end."""
-    return np.frombuffer(text.encode("utf-8", "surrogateescape") + b"\0", np.uint8)

@@ -24,10 +24,9 @@ import numpy as np
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
-from ensemble.results.checksum import attributes_checksum, checksum
+from ensemble.results.head import SIZE, write_head
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
-    CHECKSUM,
     DAMAGED,
     DATASETS,
     FILE_TYPE,
@@ -42,9 +41,6 @@ from ensemble.results.schema import (
 from ensemble.results.write import reason
 from ensemble.task.dataset import KEPT, Dataset, sizes_of
 
-# Headers in the format of HDF5 1.8 have checksums, which HDF5 itself checks; those of older formats
-# have none, and from 1.10 on a file whose writer was killed counts as open.
-_FORMAT = ("v108", "v110")
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
 
 
@@ -84,11 +80,12 @@ def create(
             raise InputError(
                 f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
             )
-        with h5py.File(unfinished, "w", libver=_FORMAT, locking=False, track_order=False) as file:
+        with h5py.File(unfinished, "w", userblock_size=SIZE, locking=False) as file:
             _lay_out(file, campaign, part)
             _describe(file, campaign, part, versions or {}, grown_from)
             if grown_from is not None:
                 _copy_rows(grown_from, file, campaign, part)
+        write_head(unfinished)
         with unfinished.open("rb") as handle:
             os.fsync(handle.fileno())
         unfinished.replace(path)
@@ -106,7 +103,6 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
         dataset.make_scale(scale.name)
         dataset.attrs["units"] = scale.unit
         dataset.attrs["long_name"] = scale.meaning
-        dataset.attrs[CHECKSUM.name] = np.uint32(checksum([scale.values]))
     for column in datasets(campaign):
         dataset = _allocate(file, column, shape_of(column, sizes))
         dataset.attrs["units"] = column.unit
@@ -129,7 +125,6 @@ def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     plist.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
-    plist.set_obj_track_times(False)
     if dtype.kind != "S":  # texts are filled with zeros; h5py hands a text over as garbage
         plist.set_fill_value(np.array(column.fill, dtype))
     space = h5py.h5s.create_simple(shape)
@@ -159,7 +154,6 @@ def _describe(
     }
     for name, value in attributes.items():
         file.attrs[name] = value
-    file.attrs[CHECKSUM.name] = np.uint32(attributes_checksum(attributes))
 
 
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) -> None:

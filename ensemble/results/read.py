@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
-from ensemble.results.checksum import attributes_checksum, checksum, row_checksums
+from ensemble.results.checksum import row_checksums
+from ensemble.results.head import check_head
 from ensemble.results.schema import (
     CHECKSUM,
     DAMAGED,
+    DATASETS,
     LATER_DATASETS,
     NOT_NEEDED,
     ORIGIN,
@@ -38,13 +40,15 @@ from ensemble.results.schema import (
 )
 from ensemble.task.dataset import KEPT, sizes_of
 
-_MOST_MEMBERS = 1000  # of the root; a campaign with ten further axes has some 80
-_MOST_BESIDES = 16 * 2**20  # bytes beside the datasets; texts and headers take some 50,000
+_MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
 _LONGEST_ATTRIBUTE = 2**16  # bytes of a root attribute, of a text those of a reference to it
 _NUMBERS = ("file_version", "seed")  # root attributes that are no texts
 # Exponential functions of numpy differ between processors by the last bits.
 _SCALE_ROUNDING = 1e-12
 _LOOKS = 3
+_MOST_NAMED = 10
+# What is wrong with a file of version 1.0, after its name.
+NO_CHECKSUMS = "was written before rows had checksums: damage of its rows cannot be found"
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 class Results:
@@ -79,6 +83,13 @@ class Results:
         self.path = Path(path)
         self._status: NDArray[np.uint8] | None = None
         with _damage(self.path):
+            # HDF5 can crash over damaged bytes of its own: it reads none that are known to be.
+            sound = check_head(self.path)
+            if sound is False:
+                raise InputError(
+                    f"{self.path} is damaged or truncated, or another program has changed it: the "
+                    f"bytes beside its rows do not have their checksum; {_INSTEAD}"
+                )
             self._file = h5py.File(self.path, "r", locking=False)
         try:
             with _damage(self.path):
@@ -87,7 +98,8 @@ class Results:
                 self.has_checksums = check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
-                self._check_head()
+                if self.has_checksums != (sound is True):
+                    raise ValueError("head")
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
                 self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
                 self._datasets = datasets(self.campaign)
@@ -99,22 +111,17 @@ class Results:
             raise
 
     def _check_size(self) -> None:
-        """Refuse a file with more than a campaign can have beside its datasets, before reading.
+        """Refuse a file with more than a campaign can have beside its rows, before reading.
 
-        Texts are stored beside the datasets, with no limit to their length.
+        HDF5 keeps texts beside the datasets, with no limit to their length.
         """
-        if len(self._file) > _MOST_MEMBERS:
-            raise ValueError(f"{len(self._file)} members")
         size = os.path.getsize(self.path)
-        stored = 0
-        for name in self._file:
-            found = self._file.get(name) if self._is_here(name) else None
-            if isinstance(found, h5py.Dataset):
-                stored += found.id.get_storage_size()
-        if size - stored > _MOST_BESIDES:
+        rows = (self._file[d.name] for d in DATASETS if d.name in self._file)
+        held = sum(min(size, dataset.id.get_storage_size()) for dataset in rows)
+        if size - held > _MOST_BESIDES + held:
             raise InputError(
-                f"{self.path} holds {(size - stored) / 1e6:.0f} MB beside its datasets: a results "
-                f"file holds at most {_MOST_BESIDES / 1e6:.0f} MB of texts"
+                f"{self.path} holds {(size - held) / 1e6:.0f} MB beside its rows, more than a "
+                "campaign can have there"
             )
 
     def _is_here(self, name: str) -> bool:
@@ -133,17 +140,6 @@ class Results:
                 raise ValueError(name)
             found[name] = value
         return found
-
-    def _check_head(self) -> None:
-        """Check the root attributes against their checksum."""
-        has = CHECKSUM.name in self._file.attrs
-        if has != self.has_checksums:
-            raise ValueError(CHECKSUM.name)
-        if has and attributes_checksum(self.attributes) != int(self._file.attrs[CHECKSUM.name]):
-            raise InputError(
-                f"{self.path} is damaged: its root attributes do not have their checksum; "
-                f"{_INSTEAD}"
-            )
 
     def _check_layout(self) -> None:
         """Compare shapes and types with those of the campaign, before anything of them is read."""
@@ -177,14 +173,10 @@ class Results:
             raise ValueError(name)  # its numbers would be those of other files
 
     def _check_scales(self) -> None:
-        """Compare the dimension scales with their checksums and with the campaign."""
+        """Compare the dimension scales with the campaign."""
         for scale in scales(self.campaign, self.part):
-            dataset = self._file[scale.name]
-            values = dataset[:]
-            sound = np.allclose(values, scale.values, rtol=_SCALE_ROUNDING, atol=0.0)
-            if self.has_checksums:
-                sound = sound and checksum([values]) == int(dataset.attrs[CHECKSUM.name])
-            if not sound:
+            found = self._file[scale.name][:]
+            if not np.allclose(found, scale.values, rtol=_SCALE_ROUNDING, atol=0.0):
                 raise InputError(
                     f"{self.path} is damaged: its {scale.name} is not that of its campaign; "
                     f"{_INSTEAD}"
@@ -269,6 +261,17 @@ class Results:
         """Return the rows that are damaged."""
         return np.flatnonzero(self.status() == DAMAGED)
 
+    def damage(self) -> str:
+        """Return the sentence that names the damaged rows; empty without any."""
+        rows = self.damaged()
+        return f"{self.path} is damaged in {named_rows(rows.tolist())}" if rows.size else ""
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return a sentence for each reason not to take the file for sound and whole."""
+        age = "" if self.has_checksums else f"{self.path} {NO_CHECKSUMS}"
+        damage = self.damage()
+        return tuple(s for s in (age, f"{damage}; they are left out" if damage else "") if s)
+
     def _checked_status(self) -> NDArray[np.uint8]:
         status = self.column(STATUS.name)
         suspects = np.flatnonzero(status != PENDING)
@@ -312,6 +315,16 @@ class Results:
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""
         return [text.decode("utf-8", "replace") for text in self.column("error", rows).tolist()]
+
+
+def named_rows(rows: Sequence[int]) -> str:
+    """Return "rows 3, 7 and 12", of many the first and how many more."""
+    if len(rows) == 1:
+        return f"row {rows[0]}"
+    shown = [str(row) for row in rows[:_MOST_NAMED]]
+    if len(rows) > _MOST_NAMED:
+        return f"{len(rows)} rows ({', '.join(shown)}, …)"
+    return f"rows {', '.join(shown[:-1])} and {shown[-1]}"
 
 
 def stretches(rows: NDArray[np.intp]) -> Iterator[tuple[int, tuple[int, int]]]:

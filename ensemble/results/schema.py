@@ -32,7 +32,7 @@ DAMAGED = 4
 ERROR_LENGTH = 512
 ORIGIN_LENGTH = 160
 
-# Root attributes that are read, and that the checksum of the file's head covers.
+# Root attributes that are read.
 ROOT_ATTRIBUTES = (
     *("file_type", "file_version", "Conventions", "title", "campaign", "seed", "part"),
     *("created", "laid_out", "adhesis_version", "commit", "python", "numpy", "scipy"),
@@ -65,6 +65,8 @@ RUN_DATASETS: tuple[Dataset, ...] = (
     ORIGIN,
     CHECKSUM,
 )
+# What a run writes; everything else in the file never changes.
+ROW_DATASETS: tuple[Dataset, ...] = RUN_DATASETS + RESULT_DATASETS
 # Datasets that files of version 1.0 lack: readers make them up of the rest.
 LATER_DATASETS = frozenset((CHECKSUM.name, ORIGIN.name))
 # The datasets of every campaign; one for each further axis comes to them.
