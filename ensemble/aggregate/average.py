@@ -68,8 +68,13 @@ class Aggregate:
         In the order of the cells.
     failures : tuple of (int, str)
         Row and error text of the first failed tasks.
+    doubts : tuple of str
+        A sentence about each file, this one and those beside it, with damaged rows, which are left
+        out, or without checksums.
     companions : tuple of Companion
         Other campaigns that the report sets beside this one.
+    damaged : int
+        Rows of this file that are.
     """
 
     path: Path
@@ -81,6 +86,8 @@ class Aggregate:
     fields: FieldStatistics
     failures: tuple[tuple[int, str], ...]
     companions: tuple[Companion, ...] = ()
+    doubts: tuple[str, ...] = ()
+    damaged: int = 0
 
     @property
     def done(self) -> int:
@@ -164,6 +171,7 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
                     for cell, average in zip(cells, averages, strict=True):
                         cell.curves[f"{branch}_{curve}"] = average
         failed = np.flatnonzero(status == FAILED)[:_MOST_FAILURES]
+        companions = tuple(read_companion(other, results.campaign) for other in beside)
         return Aggregate(
             path=results.path,
             campaign=results.campaign,
@@ -173,7 +181,9 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
             jumps=aggregate_jumps(results, rows),
             fields=aggregate_fields(results, rows),
             failures=tuple(zip(failed.tolist(), results.errors(failed), strict=True)),
-            companions=tuple(read_companion(other, results.campaign) for other in beside),
+            companions=companions,
+            doubts=(*results.doubts(), *(d for other in companions for d in other.doubts)),
+            damaged=results.damaged().size,
         )
 
 

@@ -111,9 +111,11 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         If no task is finished.
     """
     if not np.any(status == DONE):
+        damaged = results.damaged().size
         raise InputError(
-            f"{results.path} holds no finished task yet ({np.sum(status == FAILED)} failed, of "
-            f"{status.size}): there is nothing to report"
+            f"{results.path} holds no finished task yet ({np.sum(status == FAILED)} failed"
+            + (f" and {damaged} damaged" if damaged else "")
+            + f", of {status.size}): there is nothing to report"
         )
     campaign = results.campaign
     hurst, gamma = results.column("hurst"), results.column("work_of_adhesion")

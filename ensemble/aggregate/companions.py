@@ -43,6 +43,8 @@ class Companion:
         largest one, load steps may go with it), "spectrum" (the profile), "other".
     further : tuple of Axis
         Axes beside H and γ of the campaign that this one is set beside.
+    doubts : tuple of str
+        Sentences on damage of the file.
     """
 
     path: Path
@@ -51,6 +53,7 @@ class Companion:
     differs: tuple[str, ...]
     kind: Kind
     further: tuple[Axis, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def like(self, cell: Cell) -> Cell | None:
         """Return the cell of the same H, γ and place on the further axes of either campaign.
@@ -87,6 +90,7 @@ def read_companion(path: Path | str, campaign: Campaign) -> Companion:
     """
     with Results(path) as results:
         other, cells = results.campaign, read_cells(results, results.status())
+        doubts = results.doubts()
     values, keys = other.values(), differing_keys(campaign, other)
     return Companion(
         path=Path(path),
@@ -95,6 +99,7 @@ def read_companion(path: Path | str, campaign: Campaign) -> Companion:
         differs=tuple(f"{key} = {shown(values[key])}" for key in keys),
         kind=kind_of(keys),
         further=campaign.axes[2:],
+        doubts=doubts,
     )
 
 

@@ -27,6 +27,7 @@ from ensemble.run.ranks import launched
 COMMANDS: dict[str, str] = {
     "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
     "status": "what of a results file is pending, done and failed",
+    "verify": "whether a results file is damaged, and which of its rows",
     "merge": "join the results files of parts, as --part has made them, into one",
     "report": "tables, curves and figures of a results file",
     "loop": "one loop of one profile",

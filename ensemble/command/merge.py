@@ -40,6 +40,8 @@ def execute(args: argparse.Namespace) -> int:
     except WriteError as error:
         print(f"adhesis merge: {error}; the same command goes on", file=sys.stderr)
         return _WRITE_FAILED
+    for doubt in merged.doubts:
+        print(f"adhesis merge: {doubt}", file=sys.stderr)
     failed = f", {merged.failed} failed" if merged.failed else ""
     print(
         f"{out}: {merged.taken} rows taken over from {len(args.parts)} files; "

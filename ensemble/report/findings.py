@@ -102,9 +102,12 @@ def _numerical(data: Aggregate) -> str:
 
 
 def missing(data: Aggregate) -> list[str]:
-    """Sentences on tasks that are not in the averages; none if the campaign is complete."""
-    out = []
-    total = data.done + data.failed + data.pending
+    """Sentences on tasks that are not in the averages; none if the campaign is complete.
+
+    Damaged rows are not, and of a file without checksums it is not known which are.
+    """
+    out = [f"{doubt}." for doubt in data.doubts]
+    total = data.done + data.failed + data.pending + data.damaged
     if data.pending:
         out.append(
             f"The campaign is not finished: {data.pending} of {total} tasks are pending. All "

@@ -6,6 +6,7 @@ run may go on writing to it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +24,18 @@ from ensemble.report.plots import Plots
 from ensemble.report.tables import losses, mechanisms
 from ensemble.report.tables.table import Table
 from ensemble.results.read import Results
-from ensemble.results.schema import DATASETS, DONE, scales
+from ensemble.results.schema import (
+    CHECKSUM,
+    DAMAGED,
+    DATASETS,
+    DONE,
+    FAILED,
+    ORIGIN,
+    PENDING,
+    STATUS,
+    TASK_DATASETS,
+    scales,
+)
 from ensemble.task.dataset import KEPT, Dataset
 from solver.jumps import BRANCHES, JUMP_KINDS
 
@@ -33,6 +45,7 @@ _RENAMED = {
     "field_penetration": "penetration",
     "field_position": "position",
 }
+_NO_RESULTS = ("error", CHECKSUM.name, ORIGIN.name)
 _SPECTRA = ("psd_height", "height_density", "psd_displacement", "gap_density")
 
 
@@ -54,10 +67,16 @@ class CampaignResults:
     plot : Plots
         One method for each figure of the report.
 
+    Warns
+    -----
+    UserWarning
+        If rows are damaged, which are left out as if they were pending, or if the file was written
+        before rows had checksums.
+
     Raises
     ------
     InputError
-        If a file is missing, foreign or damaged.
+        If a file is missing, foreign or damaged beyond its rows.
     """
 
     def __init__(self, path: Path | str, beside: Sequence[Path | str] = ()) -> None:
@@ -65,12 +84,18 @@ class CampaignResults:
         self._beside = tuple(beside)
         with Results(self.path) as results:
             self.campaign: Campaign = results.campaign
-            self._counts = np.bincount(results.status(), minlength=3)
+            status = results.status()
+            for doubt in results.doubts():
+                warnings.warn(doubt, stacklevel=3)
+        states = {"done": DONE, "failed": FAILED, "pending": PENDING}
+        self._counts = {name: int(np.sum(status == state)) for name, state in states.items()}
+        if DAMAGED in status:
+            self._counts["damaged"] = int(np.sum(status == DAMAGED))
         self.plot = Plots(lambda: self.averages)
 
     def __repr__(self) -> str:
-        pending, done, failed = self._counts[:3]
-        return f"<CampaignResults {self.path}: {done} done, {failed} failed, {pending} pending>"
+        told = ", ".join(f"{number} {name}" for name, number in self._counts.items())
+        return f"<CampaignResults {self.path}: {told}>"
 
     @cached_property
     def averages(self) -> Aggregate:
@@ -96,13 +121,13 @@ class CampaignResults:
 
         Dimensions hurst, work_of_adhesion, further axes of the campaign if it has any, realisation,
         and the penetration of either branch;
-        NaN (-1 for counts) where a task is not done.
+        NaN (-1 for counts) where a task is not done. A damaged one counts as pending.
         """
         wanted = [
             d
             for d in DATASETS
             if d.dims[0] == "task"
-            and d.name not in (*self.axes, *_SPECTRA, "error")
+            and d.name not in (*self.axes, *_SPECTRA, *_NO_RESULTS)
             and not d.name.startswith("jump_")
         ]
         count = next(d for d in DATASETS if d.name == "jump_count")
@@ -168,6 +193,9 @@ class CampaignResults:
             axes = list(_axes(results).values())
             rows = np.arange(len(results))
             kept = results.column(KEPT)
+            status = results.status()
+            status[status == DAMAGED] = PENDING
+            has_result = np.isin(status, (DONE, FAILED))
             known = {scale.name: scale for scale in scales(results.campaign, results.part)}
             coordinates: dict[str, Any] = {}
             variables: dict[str, Any] = {}
@@ -178,7 +206,9 @@ class CampaignResults:
                     np.searchsorted(label, axis[mine])
                     for label, axis in zip(labels, axes, strict=True)
                 )
-                values = results.column(d.name)
+                values = status if d is STATUS else results.column(d.name)
+                if d not in TASK_DATASETS and d is not STATUS:
+                    values[~has_result[mine]] = d.fill
                 shape = (*(label.size for label in labels), *values.shape[1:])
                 array = np.full(shape, d.fill, values.dtype)
                 array[place] = values

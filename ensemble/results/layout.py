@@ -16,6 +16,7 @@ import shutil
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -24,8 +25,10 @@ from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
 from ensemble.foreign import target
+from ensemble.results.head import SIZE, write_head
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
+    DAMAGED,
     DATASETS,
     FILE_TYPE,
     FILE_VERSION,
@@ -80,13 +83,12 @@ def create(
             )
         # Made anew, so that a link of that name is removed and not followed.
         unfinished.unlink(missing_ok=True)
-        with h5py.File(unfinished, "x", locking=False, track_order=False) as file:
+        with h5py.File(unfinished, "x", userblock_size=SIZE, locking=False) as file:
             _lay_out(file, campaign, part)
-            _describe(file, campaign, versions or {}, grown_from)
-            if part != WHOLE:
-                file.attrs["part"] = str(part)
+            _describe(file, campaign, part, versions or {}, grown_from)
             if grown_from is not None:
-                _copy_rows(grown_from, file, campaign)
+                _copy_rows(grown_from, file, campaign, part)
+        write_head(unfinished)
         with unfinished.open("rb") as handle:
             os.fsync(handle.fileno())
         unfinished.replace(path)
@@ -134,34 +136,47 @@ def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.
 
 
 def _describe(
-    file: h5py.File, campaign: Campaign, versions: Mapping[str, str], old: Results | None
+    file: h5py.File,
+    campaign: Campaign,
+    part: Part,
+    versions: Mapping[str, str],
+    old: Results | None,
 ) -> None:
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    file.attrs["file_type"] = FILE_TYPE
-    file.attrs["file_version"] = np.array(FILE_VERSION, "i4")
-    file.attrs["Conventions"] = "CF-1.11"
-    file.attrs["title"] = "Loading-unloading hysteresis loops of rough adhesive contacts"
-    file.attrs["campaign"] = campaign.text
-    file.attrs["seed"] = campaign.sweep.seed
-    file.attrs["created"] = now if old is None else old.attributes.get("created", now)
-    file.attrs["laid_out"] = now
-    for name, text in versions.items():
-        file.attrs[name] = text
+    attributes: dict[str, Any] = {
+        "file_type": FILE_TYPE,
+        "file_version": np.array(FILE_VERSION, "i4"),
+        "Conventions": "CF-1.11",
+        "title": "Loading-unloading hysteresis loops of rough adhesive contacts",
+        "campaign": campaign.text,
+        "seed": campaign.sweep.seed,
+        "created": now if old is None else old.attributes.get("created", now),
+        "laid_out": now,
+        **({} if part == WHOLE else {"part": str(part)}),
+        **versions,
+    }
+    for name, value in attributes.items():
+        file.attrs[name] = value
 
 
-def _copy_rows(old: Results, file: h5py.File, campaign: Campaign) -> None:
-    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks())}
-    target = np.array([place[old.campaign.identity(task)] for task in old.tasks()])
+def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) -> None:
+    """Copy every row but those that are damaged: in the new file they are pending."""
+    place = {campaign.identity(task): row for row, task in enumerate(campaign.tasks(part))}
+    target = np.array([place[old.campaign.identity(task)] for task in old.tasks()], np.intp)
+    sound = old.status() != DAMAGED
     # A task that kept its fields does so in the grown campaign: realisations are only added.
-    kept = np.searchsorted(file[KEPT][:], target[old.column(KEPT)])
+    of_kept = old.column(KEPT)
+    kept = np.searchsorted(file[KEPT][:], target[of_kept])
     for column in DATASETS:
         if column in TASK_DATASETS:
             continue
         dataset = file[column.name]
         targets = kept if column.dims[0] == KEPT else target
+        taken = sound[of_kept] if column.dims[0] == KEPT else sound
         width = max(1, int(np.prod(dataset.shape[1:])) * dataset.dtype.itemsize)
         for first in range(0, len(targets), max(1, _COPY_BYTES // width)):
             block = old.column(column.name, slice(first, first + max(1, _COPY_BYTES // width)))
-            rows = targets[first : first + len(block)]
+            chosen = taken[first : first + len(block)]
+            block, rows = block[chosen], targets[first : first + len(chosen)][chosen]
             for i, (start, stop) in stretches(rows):
                 dataset[start:stop] = block[i : i + stop - start]

@@ -22,13 +22,15 @@ from ensemble.errors import InputError, WriteError
 from ensemble.results.layout import create
 from ensemble.results.read import Results
 from ensemble.results.schema import (
+    DAMAGED,
     DATASETS,
     DONE,
     FAILED,
-    NOT_NEEDED,
     PENDING,
+    STATUS,
     TASK_DATASETS,
     kept_rows,
+    same_rows,
 )
 from ensemble.results.write import reason
 from ensemble.task.dataset import KEPT, Dataset
@@ -41,22 +43,28 @@ _BLOCK_BYTES = 16 * 2**20
 # Time and place may differ between two computations of one task; nothing else may.
 _OF_THE_RUN = ("wall_time", "cpu_time")
 _COMPARED = tuple(d for d in RESULT_DATASETS if d.name not in _OF_THE_RUN)
-_STATUS = next(d for d in DATASETS if d.name == "status")
 # Root attributes that say what a file is; the others say what computed it.
 _NOT_VERSIONS = frozenset(
     ("file_type", "file_version", "Conventions", "title", "campaign", "seed", "created", "laid_out")
 ) | {"part"}
-_COPIED = tuple(d for d in DATASETS if d not in TASK_DATASETS and d is not _STATUS)
+_COPIED = tuple(d for d in DATASETS if d not in TASK_DATASETS and d is not STATUS)
 
 
 @dataclass(frozen=True)
 class Merged:
-    """What a merge has left: rows by status, and how many it took over."""
+    """What a merge has left: rows by status, how many it took over, and what it left out.
+
+    Attributes
+    ----------
+    doubts : tuple of str
+        A sentence about each file with damaged rows, which are left out, or without checksums.
+    """
 
     total: int
     done: int
     failed: int
     taken: int
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,13 +125,14 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         status = np.zeros(campaign.task_count, np.uint8) if there is None else there.status()
         if status.size != campaign.task_count:
             raise InputError(f"{out} is part {there.part if there else ''} of its campaign itself")
+        doubts = [doubt for file in opened for doubt in file.doubts()]
         sources = _assign(opened, campaign, status, there)
         if there is None:
-            told = opened[0].attributes
-            create(
-                out, campaign, versions={k: v for k, v in told.items() if k not in _NOT_VERSIONS}
-            )
+            create(out, campaign, versions=_versions(opened[0]))
         else:
+            if not there.has_checksums:
+                doubts += there.doubts()
+                create(out, campaign, versions=_versions(there), grown_from=there)
             there.close()
         _copy(sources, out)
     return Merged(
@@ -131,19 +140,28 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         done=int(np.sum(status == DONE)),
         failed=int(np.sum(status == FAILED)),
         taken=sum(int(source.taken.sum()) for source in sources),
+        doubts=tuple(doubts),
     )
 
 
+def _versions(results: Results) -> dict[str, str]:
+    """Return what computed a file, of its root attributes."""
+    return {k: v for k, v in results.attributes.items() if k not in _NOT_VERSIONS}
+
+
 def _check_campaign(part: Results, campaign: Campaign, of: Path) -> None:
-    """Refuse a file of another campaign, or one whose tasks are not those of its campaign."""
+    """Refuse a file of another campaign, or of one whose rows have other shapes."""
     difference = compare(part.campaign, campaign)
     if difference.other:
         raise InputError(
             f"{part.path} holds another campaign than {of}: {'; '.join(difference.other)} "
             f"(here: {of}, there: {part.path})"
         )
-    if part.tasks() != part.campaign.tasks(part.part) or part.status().max(initial=0) > NOT_NEEDED:
-        raise InputError(f"{part.path} is damaged: its tasks are not those of its campaign")
+    if not same_rows(part.campaign, campaign):
+        raise InputError(
+            f"{part.path} cannot be merged into {of}: the bins of its spectra differ (they follow "
+            "the highest n0 · ratio of the campaign)"
+        )
 
 
 def _assign(
@@ -167,7 +185,7 @@ def _assign(
                 _compare(source, row, there, int(target[row]))
         # A row that failed elsewhere, in time or place, gives way to one that did not.
         better = (own == DONE) & (status[target] != DONE)
-        better |= (own == FAILED) & (status[target] == PENDING)
+        better |= (own == FAILED) & np.isin(status[target], (PENDING, DAMAGED))
         for row in np.flatnonzero(better & (giver[target] >= 0)).tolist():
             loser = sources[giver[target[row]]]
             loser.taken[loser.row_of(target[row])] = False
@@ -208,7 +226,7 @@ def _copy(sources: Sequence[_Source], out: Path) -> None:
                     else:
                         _copy_dataset(sources, file, dataset, first, stop)
                 file.flush()
-                _copy_dataset(sources, file, _STATUS, first, stop)
+                _copy_dataset(sources, file, STATUS, first, stop)
                 file.flush()
     except OSError as error:
         raise WriteError(f"{out} could not be written: {reason(error)}") from error

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -14,19 +15,48 @@ from numpy.typing import NDArray
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
+from ensemble.results.checksum import row_checksums
+from ensemble.results.head import check_head
 from ensemble.results.schema import (
+    CHECKSUM,
+    DAMAGED,
+    DATASETS,
+    LATER_DATASETS,
+    NOT_NEEDED,
+    ORIGIN,
+    ORIGIN_LENGTH,
+    PENDING,
+    ROOT_ATTRIBUTES,
+    STATUS,
     TASK_DATASETS,
     axis_datasets,
     check_version,
     datasets,
+    encode_text,
+    file_size,
+    origin_of,
     scales,
     shape_of,
 )
-from ensemble.task.dataset import sizes_of
+from ensemble.task.dataset import KEPT, sizes_of
 
+_MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
+_LONGEST_ATTRIBUTE = 2**16  # bytes of a root attribute, of a text those of a reference to it
+_NUMBERS = ("file_version", "seed")  # root attributes that are no texts
+# Exponential functions of numpy differ between processors by the last bits.
+_SCALE_ROUNDING = 1e-12
+_LOOKS = 3
+_MOST_NAMED = 10
+# What is wrong with a file of version 1.0, after its name.
+NO_CHECKSUMS = "was written before rows had checksums: damage of its rows cannot be found"
+_INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 class Results:
     """A results file, read with plain h5py, at any moment of a run.
+
+    Opening it checks everything but the rows: the root attributes, the shapes and types of the
+    datasets, the dimension scales, and that the tasks are those of the campaign. The rows are
+    checked by :meth:`status`.
 
     Parameters
     ----------
@@ -40,6 +70,8 @@ class Results:
         Which rows of the campaign it holds; part 1 of 1 is the whole.
     attributes : dict
         The root attributes (docs/results-file.md).
+    has_checksums : bool
+        Whether damage of its rows can be found; not so in files of version 1.0.
 
     Raises
     ------
@@ -49,25 +81,73 @@ class Results:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
+        self._status: NDArray[np.uint8] | None = None
         with _damage(self.path):
+            # HDF5 can crash over damaged bytes of its own: it reads none that are known to be.
+            sound = check_head(self.path)
+            if sound is False:
+                raise InputError(
+                    f"{self.path} is damaged or truncated, or another program has changed it: the "
+                    f"bytes beside its rows do not have their checksum; {_INSTEAD}"
+                )
             self._file = h5py.File(self.path, "r", locking=False)
         try:
             with _damage(self.path):
-                self.attributes: dict[str, Any] = dict(self._file.attrs)
-                check_version(
+                self._check_size()
+                self.attributes = self._root_attributes()
+                self.has_checksums = check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
+                if self.has_checksums != (sound is True):
+                    raise ValueError("head")
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
                 self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
-                self._check_shapes()
+                self._datasets = datasets(self.campaign)
+                self._check_layout()
+                self._check_scales()
+                self._tasks = self._checked_tasks()
         except BaseException:
             self._file.close()
             raise
 
-    def _check_shapes(self) -> None:
+    def _check_size(self) -> None:
+        """Refuse a file with more than a campaign can have beside its rows, before reading.
+
+        HDF5 keeps texts beside the datasets, with no limit to their length.
+        """
+        size = os.path.getsize(self.path)
+        rows = (self._file[d.name] for d in DATASETS if d.name in self._file)
+        held = sum(min(size, dataset.id.get_storage_size()) for dataset in rows)
+        if size - held > _MOST_BESIDES + held:
+            raise InputError(
+                f"{self.path} holds {(size - held) / 1e6:.0f} MB beside its rows, more than a "
+                "campaign can have there"
+            )
+
+    def _is_here(self, name: str) -> bool:
+        """Whether a member of the root is in this file, not a link to somewhere else."""
+        return isinstance(self._file.get(name, getlink=True), h5py.HardLink)
+
+    def _root_attributes(self) -> dict[str, Any]:
+        found = {}
+        for name in ROOT_ATTRIBUTES:
+            if name not in self._file.attrs:
+                continue
+            if self._file.attrs.get_id(name).get_storage_size() > _LONGEST_ATTRIBUTE:
+                raise ValueError(name)
+            value = self._file.attrs[name]
+            if isinstance(value, str) == (name in _NUMBERS):
+                raise ValueError(name)
+            found[name] = value
+        return found
+
+    def _check_layout(self) -> None:
+        """Compare shapes and types with those of the campaign, before anything of them is read."""
+        if file_size(self.campaign, self.part) > os.path.getsize(self.path):
+            raise ValueError("truncated")
         wanted = scales(self.campaign, self.part)
-        names = [scale.name for scale in wanted] + [d.name for d in datasets(self.campaign)]
-        missing = [name for name in names if name not in self._file]
+        known = [d for d in self._datasets if self.has_checksums or d.name not in LATER_DATASETS]
+        missing = [d.name for d in (*wanted, *known) if d.name not in self._file]
         if missing:
             by = str(self.attributes.get("adhesis_version", "an unknown version"))
             commit = str(self.attributes.get("commit", "unknown"))
@@ -79,14 +159,45 @@ class Results:
                 f"{', '.join(missing[:3])}{more}: read it with that version, or compute the "
                 "campaign again into another file"
             )
-        for scale in wanted:
-            if self._file[scale.name].shape != scale.values.shape:
-                raise ValueError(scale.name)
         sizes = sizes_of(wanted)
-        for known in datasets(self.campaign):
-            found = self._file[known.name]
-            if found.shape != shape_of(known, sizes) or found.dtype != np.dtype(known.dtype):
-                raise ValueError(known.name)
+        for scale in wanted:
+            self._check_dataset(scale.name, scale.values.shape, scale.values.dtype)
+        for column in known:
+            self._check_dataset(column.name, shape_of(column, sizes), np.dtype(column.dtype))
+
+    def _check_dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+        found = self._file[name]
+        if found.shape != shape or found.dtype != dtype or not self._is_here(name):
+            raise ValueError(name)
+        if found.is_virtual or found.external:
+            raise ValueError(name)  # its numbers would be those of other files
+
+    def _check_scales(self) -> None:
+        """Compare the dimension scales with the campaign."""
+        for scale in scales(self.campaign, self.part):
+            found = self._file[scale.name][:]
+            if not np.allclose(found, scale.values, rtol=_SCALE_ROUNDING, atol=0.0):
+                raise InputError(
+                    f"{self.path} is damaged: its {scale.name} is not that of its campaign; "
+                    f"{_INSTEAD}"
+                )
+
+    def _checked_tasks(self) -> list[Task]:
+        """Return the tasks of the campaign, which those of the file must be."""
+        tasks = self.campaign.tasks(self.part)
+        columns = [(d.name, [getattr(task, d.name) for task in tasks]) for d in TASK_DATASETS]
+        for place, axis in enumerate(axis_datasets(self.campaign)):
+            columns.append((axis.name, [task.others[place][1] for task in tasks]))
+        for name, wanted in columns:
+            found = self._file[name][:]
+            wrong = np.flatnonzero(found != np.asarray(wanted))
+            if wrong.size:
+                row = int(wrong[0])
+                raise InputError(
+                    f"{self.path} is damaged: its tasks are not those of its campaign ({name} of "
+                    f"row {row} is {found[row]} instead of {wanted[row]}); {_INSTEAD}"
+                )
+        return tasks
 
     def __enter__(self) -> Self:
         return self
@@ -115,12 +226,18 @@ class Results:
     def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Return a dataset, or some rows of it.
 
+        Checksum and origin of the rows of a file that has none are made up.
+
         Parameters
         ----------
         name : str
         rows : slice or ascending int array, optional
             All rows if not given. Memory is that of the result.
         """
+        if not self.has_checksums and name in LATER_DATASETS:
+            every = np.arange(len(self))
+            chosen = every if rows is None else every[rows]
+            return self._checksums(chosen) if name == CHECKSUM.name else self._origins(chosen)
         with _damage(self.path):
             dataset = self._file[name]
             if rows is None or isinstance(rows, slice):
@@ -131,22 +248,83 @@ class Results:
             return out
 
     def status(self) -> NDArray[np.uint8]:
-        """Return the status of every task: PENDING, DONE or FAILED (ensemble.results.schema)."""
-        return self.column("status")
+        """Return the status of every task: PENDING, DONE, … (ensemble.results.schema).
+
+        DAMAGED is that of a row which does not have its checksum, or whose status is none. All rows
+        with a result are read for it, once.
+        """
+        if self._status is None:
+            self._status = self._checked_status()
+        return self._status.copy()
+
+    def damaged(self) -> NDArray[np.intp]:
+        """Return the rows that are damaged."""
+        return np.flatnonzero(self.status() == DAMAGED)
+
+    def damage(self) -> str:
+        """Return the sentence that names the damaged rows; empty without any."""
+        rows = self.damaged()
+        return f"{self.path} is damaged in {named_rows(rows.tolist())}" if rows.size else ""
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return a sentence for each reason not to take the file for sound and whole."""
+        age = "" if self.has_checksums else f"{self.path} {NO_CHECKSUMS}"
+        damage = self.damage()
+        return tuple(s for s in (age, f"{damage}; they are left out" if damage else "") if s)
+
+    def _checked_status(self) -> NDArray[np.uint8]:
+        status = self.column(STATUS.name)
+        suspects = np.flatnonzero(status != PENDING)
+        suspects = suspects[self._differ(suspects, status[suspects])]
+        # A row that a run empties and computes again at this moment looks damaged, once.
+        for _ in range(_LOOKS):
+            if not suspects.size:
+                break
+            status[suspects] = self.column(STATUS.name, suspects)
+            suspects = suspects[status[suspects] != PENDING]
+            suspects = suspects[self._differ(suspects, status[suspects])]
+        status[suspects] = DAMAGED
+        return status
+
+    def _differ(self, rows: NDArray[np.intp], status: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Whether rows that are not pending cannot be what was written."""
+        out = status > NOT_NEEDED
+        if self.has_checksums:
+            out |= self.column(CHECKSUM.name, rows) != self._checksums(rows)
+            return out
+        for dataset in self._datasets:
+            names = dataset.attributes.get("flag_values")
+            if names is not None and dataset is not STATUS:
+                values = self.column(dataset.name, rows)
+                out |= np.any((values < dataset.fill) | (values >= len(names)), axis=1)
+        return out
+
+    def _checksums(self, rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+        """Compute the checksums of some rows (ascending) from what they hold."""
+        return row_checksums(self.column, self._datasets, self.column(KEPT), rows)
+
+    def _origins(self, rows: NDArray[np.intp]) -> NDArray[np.bytes_]:
+        """Take the versions that laid the file out for those that computed its rows."""
+        text = encode_text(origin_of(self.attributes), ORIGIN_LENGTH)
+        return np.full(rows.size, text, ORIGIN.dtype)
 
     def tasks(self) -> list[Task]:
         """Return every task, row by row."""
-        columns = [self.column(d.name).tolist() for d in TASK_DATASETS]
-        names = [axis.name for axis in self.campaign.axes[2:]]
-        axes = [self.column(d.name).tolist() for d in axis_datasets(self.campaign)]
-        return [
-            Task(hurst, gamma, realisation, seed, tuple(zip(names, others, strict=True)))
-            for hurst, gamma, realisation, seed, *others in zip(*columns, *axes, strict=True)
-        ]
+        return self._tasks.copy()
 
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""
         return [text.decode("utf-8", "replace") for text in self.column("error", rows).tolist()]
+
+
+def named_rows(rows: Sequence[int]) -> str:
+    """Return "rows 3, 7 and 12", of many the first and how many more."""
+    if len(rows) == 1:
+        return f"row {rows[0]}"
+    shown = [str(row) for row in rows[:_MOST_NAMED]]
+    if len(rows) > _MOST_NAMED:
+        return f"{len(rows)} rows ({', '.join(shown)}, …)"
+    return f"rows {', '.join(shown[:-1])} and {shown[-1]}"
 
 
 def stretches(rows: NDArray[np.intp]) -> Iterator[tuple[int, tuple[int, int]]]:

@@ -19,11 +19,25 @@ from ensemble.task.dataset import COUNT, FLOAT, KEPT, Dataset, Scale, flags, row
 from ensemble.task.row import RESULT_DATASETS, row_scales
 
 FILE_TYPE = "adhesis-results"
-FILE_VERSION = (1, 0)
+FILE_VERSION = (1, 1)
+# Versions, beside that of adhesis, on which the last bits of a loop depend.
+_COMPUTING = ("numpy", "scipy", "numba", "llvmlite", "fftw", "processor")
+# Files of this version and later ones have checksums.
+_WITH_CHECKSUMS = (1, 1)
 
 PENDING, DONE, FAILED, NOT_NEEDED = 0, 1, 2, 3
 _STATES = ("pending", "done", "failed", "not needed")
+# Never stored: the status that readers get of a row that is not what was written.
+DAMAGED = 4
 ERROR_LENGTH = 512
+ORIGIN_LENGTH = 160
+
+# Root attributes that are read.
+ROOT_ATTRIBUTES = (
+    *("file_type", "file_version", "Conventions", "title", "campaign", "seed", "part"),
+    *("created", "laid_out", "adhesis_version", "commit", "python", "numpy", "scipy"),
+    *("numba", "llvmlite", "mpi", "hdf5", "fftw", "processor"),
+)
 
 
 def _task(name: str, dtype: str, unit: str, meaning: str, **attributes: object) -> Dataset:
@@ -37,12 +51,24 @@ TASK_DATASETS: tuple[Dataset, ...] = (
     _task("realisation", COUNT, "1", "realisation of the profile"),
     _task("seed", "i8", "1", "seed of the profile's phases"),
 )
+STATUS = _task("status", "u1", "1", "state of the task", **flags(_STATES, "u1"))
+CHECKSUM = _task("checksum", "u4", "1", "CRC-32 of the row; not of a pending one")
+ORIGIN = _task(
+    *("computed_by", f"S{ORIGIN_LENGTH}", "1"),
+    "versions and processor that computed the task (UTF-8)",
+)
 # How it went; the status is written last.
 RUN_DATASETS: tuple[Dataset, ...] = (
-    _task("status", "u1", "1", "state of the task", **flags(_STATES, "u1")),
+    STATUS,
     _task("error", f"S{ERROR_LENGTH}", "1", "why the task failed (UTF-8)"),
     _task("rank", COUNT, "1", "rank that computed the task"),
+    ORIGIN,
+    CHECKSUM,
 )
+# What a run writes; everything else in the file never changes.
+ROW_DATASETS: tuple[Dataset, ...] = RUN_DATASETS + RESULT_DATASETS
+# Datasets that files of version 1.0 lack: readers make them up of the rest.
+LATER_DATASETS = frozenset((CHECKSUM.name, ORIGIN.name))
 # The datasets of every campaign; one for each further axis comes to them.
 DATASETS: tuple[Dataset, ...] = TASK_DATASETS + RUN_DATASETS + RESULT_DATASETS
 _NAMES = frozenset(dataset.name for dataset in DATASETS)
@@ -106,23 +132,36 @@ def file_size(campaign: Campaign, part: Part = WHOLE) -> int:
     )
 
 
-def encode_error(text: str) -> bytes:
-    """Return an error text as it is stored: UTF-8, whole characters, at most ERROR_LENGTH bytes."""
-    return text.encode("utf-8", "replace")[:ERROR_LENGTH].decode("utf-8", "ignore").encode("utf-8")
+def encode_text(text: str, length: int = ERROR_LENGTH) -> bytes:
+    """Return a text as it is stored: UTF-8, whole characters, at most ``length`` bytes."""
+    return text.encode("utf-8", "replace")[:length].decode("utf-8", "ignore").encode("utf-8")
 
 
-def check_version(path: object, file_type: object, version: object) -> None:
-    """Refuse a file of another type or of a version that this code does not know.
+def origin_of(versions: Mapping[str, Any]) -> str:
+    """Return in one text what the bits of a row depend on: versions and processor."""
+    commit = str(versions.get("commit", "unknown"))
+    by = f"adhesis {versions.get('adhesis_version', 'unknown')}"
+    if commit != "unknown":
+        by += f" ({commit[:12]})"
+    others = (f"{name} {versions[name]}" for name in _COMPUTING if versions.get(name))
+    return ", ".join((by, *others))
+
+
+def check_version(path: object, file_type: object, version: object) -> bool:
+    """Return whether a file of this version has checksums.
 
     Raises
     ------
     InputError
+        If it is of another type, or of a version that this code does not know.
     """
     if file_type != FILE_TYPE:
         raise InputError(f"{path} is not a results file of adhesis")
-    numbers = np.ravel(np.asarray(version))
-    if numbers.size != 2 or int(numbers[0]) != FILE_VERSION[0]:
+    numbers = tuple(np.ravel(np.asarray(version)).tolist())
+    if len(numbers) != 2 or numbers[0] != FILE_VERSION[0] or not 0 <= numbers[1] <= FILE_VERSION[1]:
         shown = ".".join(str(n) for n in numbers[:4])
         raise InputError(
-            f"{path} has file version {shown}: this adhesis reads version {FILE_VERSION[0]}"
+            f"{path} has file version {shown}: this adhesis reads versions {FILE_VERSION[0]}.0 to "
+            f"{FILE_VERSION[0]}.{FILE_VERSION[1]}"
         )
+    return numbers >= _WITH_CHECKSUMS

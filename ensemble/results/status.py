@@ -1,13 +1,14 @@
 """How far a campaign is: counts, times, failures and losses so far, from its results file alone.
 
-Never loads MPI and reads a few bytes a task: it works on a login node, and while the run writes.
+Never loads MPI: it works on a login node, and while the run writes. It reads all rows with a
+result, for their checksums.
 """
 
 from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from ensemble.campaign.precision import relative_error
 from ensemble.foreign import one_line, printable
-from ensemble.results.read import Results
+from ensemble.results.read import NO_CHECKSUMS, Results, named_rows
 from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful
 
@@ -33,7 +34,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``file``, ``tasks``, ``pending``, ``done``, ``failed``; ``seconds`` per done task (``mean``,
+        ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
+        dict for each row that does not have its checksum (it counts as nothing else), and
+        ``checksums``, whether the file has any; ``seconds`` per done task (``mean``,
         ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each cell (a
         value of each of the ``axes``) with
         its counts, its mean time and its mean loss with standard error (J/m², and W~);
@@ -63,15 +66,16 @@ def read_status(path: Path | str) -> dict[str, Any]:
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
+        damaged = results.damaged()
+        has_checksums = results.has_checksums
     times = column["wall_time"][state == DONE]
     failures = [
         {
-            "row": row,
-            **{name: column[name][row].item() for name in _TASK},
-            "seconds": float(column["wall_time"][row]),
+            **failure,
+            "seconds": float(column["wall_time"][failure["row"]]),
             "error": one_line(error),
         }
-        for row, error in zip(failed.tolist(), errors, strict=True)
+        for failure, error in zip(named(column, failed), errors, strict=True)
     ]
     return {
         "file": str(path),
@@ -80,6 +84,8 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "done": int(np.sum(state == DONE)),
         "failed": len(failed),
         "not_needed": int(np.sum(state == NOT_NEEDED)),
+        "damaged": named(column, damaged),
+        "checksums": has_checksums,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
@@ -87,6 +93,13 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "groups": _groups(state, column, axes, wanted),
         "failures": failures,
     }
+
+
+def named(column: Mapping[str, NDArray[Any]], rows: NDArray[np.intp]) -> list[dict[str, Any]]:
+    """Return row number and task of some rows."""
+    return [
+        {"row": row, **{name: column[name][row].item() for name in _TASK}} for row in rows.tolist()
+    ]
 
 
 def _doubtful(
@@ -174,8 +187,11 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         f"{status['file']}: {status['tasks']} tasks, {status['done']} done, "
         f"{status['pending']} pending, {status['failed']} failed"
         + (f", {status['not_needed']} not needed" if status["not_needed"] else "")
+        + (f", {len(status['damaged'])} damaged" if status["damaged"] else "")
         + pace
     ]
+    if not status["checksums"]:
+        lines.append(f"the file {NO_CHECKSUMS}")
     if seconds := status["seconds"]:
         lines.append(
             f"time per task: mean {seconds['mean']:.3g} s, median {seconds['median']:.3g} s, "
@@ -187,6 +203,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         names = "".join(f"{name}  " for name in further)
         lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  loss W~"]
         lines += [_group_line(group, further) for group in groups]
+    if status["damaged"]:
+        lines += ["", *damage_lines(status["damaged"])]
     if status["doubtful"]:
         lines += ["", *_doubt_lines(status["doubtful"])]
     if status["failures"]:
@@ -232,6 +250,20 @@ def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
         )
     if len(doubts) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(doubts) - _MOST_FAILURES_SHOWN} more (--json lists all)")
+    return lines
+
+
+def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the damaged rows as lines for people, and what is to be done."""
+    lines = [f"damaged: {named_rows([d['row'] for d in damaged])}; no number of them is used"]
+    for d in damaged[:_MOST_FAILURES_SHOWN]:
+        lines.append(
+            f"  row {d['row']}: H = {d['hurst']:g}, γ = {d['work_of_adhesion']:g} J/m², "
+            f"realisation {d['realisation']}, seed {d['seed']}"
+        )
+    if len(damaged) > _MOST_FAILURES_SHOWN:
+        lines.append(f"  … and {len(damaged) - _MOST_FAILURES_SHOWN} more (--json lists all)")
+    lines.append("again: adhesis run CAMPAIGN.toml computes damaged rows as if they were pending")
     return lines
 
 

@@ -1,10 +1,13 @@
-"""Writing rows of a results file: a row before its status, so that a done row is a whole one."""
+"""Writing rows of a results file: a row and its checksum before its status.
+
+So a row whose status is not "pending" is a whole one, and its checksum is that of what it holds.
+"""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -12,22 +15,32 @@ from typing import Any, Self
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
+from ensemble.campaign.file import parse_campaign
 from ensemble.errors import WriteError
+from ensemble.results.checksum import checksum, covered
 from ensemble.results.schema import (
+    CHECKSUM,
     DATASETS,
     DONE,
     FAILED,
     NOT_NEEDED,
+    ORIGIN,
+    ORIGIN_LENGTH,
     PENDING,
+    STATUS,
     TASK_DATASETS,
-    encode_error,
+    datasets,
+    encode_text,
 )
 from ensemble.task.dataset import KEPT
 from ensemble.task.row import RESULT_DATASETS, Row
 
 _KEPT_NAMES = frozenset(d.name for d in DATASETS if d.dims[0] == KEPT)
 _NAMES = frozenset(d.name for d in RESULT_DATASETS)
+# What a row holds beside the task itself, its status and its checksum.
+_CONTENT = tuple(d for d in DATASETS if d not in (*TASK_DATASETS, STATUS, CHECKSUM))
 
 
 class Writer:
@@ -39,16 +52,29 @@ class Writer:
     comm : MPI communicator, optional
         If given, every rank of it opens the file together (parallel HDF5) and writes rows on its
         own; opening and closing are collective. If not, this process is the only writer.
+    origin : callable, optional
+        Versions and processor of what computes a row, by the rank that does.
     """
 
-    def __init__(self, path: Path | str, comm: Any = None) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        comm: Any = None,
+        origin: Callable[[int], str] = lambda rank: "",
+    ) -> None:
         self.path = Path(path)
         self._serial = comm is None
         # HDF5's own lock would refuse readers; two writers are refused by ensemble.run.lock.
         options = {"locking": False} if comm is None else {"driver": "mpio", "comm": comm}
         self._file = h5py.File(self.path, "r+", **options)
+        self._origin = origin
         self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
         self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
+        campaign = parse_campaign(self._file.attrs["campaign"], str(self.path))
+        of_tasks, of_kept = covered(datasets(campaign))
+        self._order = [dataset.name for dataset in (*of_tasks, *of_kept)]
+        written = {d.name for d in (*_CONTENT, STATUS)}
+        self._tasks = {name: self._file[name][:] for name in self._order if name not in written}
 
     def __enter__(self) -> Self:
         return self
@@ -81,43 +107,71 @@ class Writer:
         wanted = _NAMES if row in self._kept else _NAMES - _KEPT_NAMES
         if wanted - result.keys() or result.keys() - _NAMES:
             raise ValueError(f"a row of {sorted(result)} where {sorted(wanted)} is wanted")
-        self._write(row, {**result, "rank": rank, "error": b""}, DONE)
+        self._write(row, {**result, "rank": rank, **self._origin_of(rank)}, DONE)
 
     def write_failure(self, row: int, error: str, wall_time: float, rank: int = 0) -> None:
         """Write the row of a task that failed: why, after how many seconds; its status last."""
-        values = {"error": encode_error(error), "wall_time": wall_time, "rank": rank}
-        self._write(row, values, FAILED)
+        values = {"error": encode_text(error), "wall_time": wall_time, "rank": rank}
+        self._write(row, values | self._origin_of(rank), FAILED)
 
     def reset(self, rows: Sequence[int]) -> None:
         """Make rows pending again; what they held is lost."""
-        cleared = [d for d in DATASETS if d not in TASK_DATASETS and d.name != "status"]
+        cleared = (*_CONTENT, CHECKSUM)
         for row in rows:
             with self._telling(row):
                 # First the status: a row that is being emptied must not be taken for a whole one.
-                self._datasets["status"].write(row, PENDING)
+                self._write_status(row, PENDING)
                 self.flush()
                 for dataset in cleared:
                     place = self._place(dataset.name, row)
                     if place is not None:
-                        self._datasets[dataset.name].clear(place, dataset.fill)
+                        rows_of = self._datasets[dataset.name]
+                        rows_of.write(place, rows_of.filled(dataset.fill))
                 self.flush()
 
     def mark(self, rows: Iterable[int], *, needed: bool) -> None:
-        """Say of rows without a result that they are to be computed, or that they need not be."""
+        """Mark rows without a result: they are to be computed, or need not be."""
         for row in rows:
-            with self._telling(row):
-                self._datasets["status"].write(row, PENDING if needed else NOT_NEEDED)
+            if needed:
+                with self._telling(row):
+                    self._write_status(row, PENDING)
+            else:
+                self._write(row, {}, NOT_NEEDED)
         self.flush()
 
     def _write(self, row: int, values: Mapping[str, Any], status: int) -> None:
+        """Write a row, its checksum, and then its status; what has no value is left empty.
+
+        All of a row is written: a run that was killed may have left a part of it.
+        """
         with self._telling(row):
-            for name, value in values.items():
-                place = self._place(name, row)
+            blocks = {STATUS.name: self._datasets[STATUS.name].block(status)}
+            for dataset in _CONTENT:
+                name, place = dataset.name, self._place(dataset.name, row)
                 if place is not None:
-                    self._datasets[name].write(place, value)
+                    rows_of = self._datasets[name]
+                    given = name in values
+                    blocks[name] = (
+                        rows_of.block(values[name]) if given else rows_of.filled(dataset.fill)
+                    )
+                    rows_of.write(place, blocks[name])
+            parts = (
+                blocks[name] if name in blocks else self._tasks[name][row : row + 1]
+                for name in self._order
+                if name in blocks or name in self._tasks
+            )
+            rows_of = self._datasets[CHECKSUM.name]
+            rows_of.write(row, rows_of.block(checksum(parts)))
             self.flush()
-            self._datasets["status"].write(row, status)
+            self._datasets[STATUS.name].write(row, blocks[STATUS.name])
             self.flush()
+
+    def _write_status(self, row: int, status: int) -> None:
+        rows_of = self._datasets[STATUS.name]
+        rows_of.write(row, rows_of.block(status))
+
+    def _origin_of(self, rank: int) -> dict[str, bytes]:
+        return {ORIGIN.name: encode_text(self._origin(rank), ORIGIN_LENGTH)}
 
     def _place(self, name: str, row: int) -> int | None:
         """Where the row of a task stands in a dataset; None where it has none."""
@@ -150,20 +204,24 @@ class DatasetRows:
         self._memory = h5py.h5s.create_simple((1, *self._shape))
         self._rest = (0,) * len(self._shape)
 
-    def clear(self, row: int, fill: Any) -> None:
-        """Fill a row with one value."""
-        self.write(row, np.full(self._shape, fill, self._dtype))
-
-    def write(self, row: int, value: Any) -> None:
-        """Write a row, of the dataset's own shape."""
+    def block(self, value: Any) -> NDArray[Any]:
+        """Return the bytes that a value of a row has in the file, shape (1, …)."""
         if np.shape(value) != self._shape:
             raise ValueError(
                 f"{self._id.name!r} has rows of shape {self._shape}, not {np.shape(value)}"
             )
         block = np.empty((1, *self._shape), self._dtype)
+        block[0] = value
+        return block
+
+    def filled(self, fill: Any) -> NDArray[Any]:
+        """Return a row that holds one value throughout, shape (1, …)."""
+        return np.full((1, *self._shape), fill, self._dtype)
+
+    def write(self, row: int, block: NDArray[Any]) -> None:
+        """Write a row that :meth:`block` or :meth:`filled` has made."""
         if not block.size:
             return
-        block[0] = value
         self._space.select_hyperslab((row, *self._rest), (1, *self._shape))
         self._id.write(self._memory, self._space, block)
 

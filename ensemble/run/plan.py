@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ensemble.campaign.compare import compare
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
 from ensemble.results.layout import create
-from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, same_rows
+from ensemble.results.read import NO_CHECKSUMS, Results
+from ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
 from ensemble.results.write import Writer
 from ensemble.run.batches import Batches
 from ensemble.run.lock import RunLock
@@ -183,29 +184,33 @@ def prepare(
                 "spectra would change (they follow the highest n0 · ratio of the campaign)"
             )
         before = len(old)
-        if difference.grown:
-            create(path, campaign, versions=versions(), grown_from=old)
+        if not old.has_checksums:
+            say(f"{old.path} {NO_CHECKSUMS}; the run copies its rows into a file that has them")
+        if difference.grown or not old.has_checksums:
+            create(path, campaign, part=part, versions=versions(), grown_from=old)
+            if old.damaged().size:
+                say(f"{old.damage()}; they will be computed again")
     with Results(path) as results:
-        tasks, status = results.tasks(), results.status()
-    if redo is not None:
-        again = [
-            row
-            for row, (task, state) in enumerate(zip(tasks, status.tolist(), strict=True))
-            if redo.takes(task, state)
-        ]
+        status = results.status()
+        again = np.flatnonzero(status == DAMAGED).tolist()
+        if again:
+            say(f"{results.damage()}; they will be computed again")
+        if redo is not None:
+            states = zip(results.tasks(), status.tolist(), strict=True)
+            chosen = [row for row, (task, state) in enumerate(states) if redo.takes(task, state)]
+            say(f"{path}: {len(chosen)} tasks will be computed again")
+            again += chosen
+        status[again] = PENDING
+        plan = _plan(results, status)
+    if again or plan.batches is not None:
         with Writer(path) as writer:
             writer.reset(again)
-        say(f"{path}: {len(again)} tasks will be computed again")
-    with Results(path) as results:
-        plan = _plan(results)
-        status = results.status()
-    if plan.batches is not None:
-        with Writer(path) as writer:
-            spare = plan.batches.not_needed
-            writer.mark([row for row in spare if status[row] == PENDING], needed=False)
-            wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
-            writer.mark(sorted(wanted), needed=True)
-    grown = f", {len(tasks) - before} of them new" if difference.grown else ""
+            if plan.batches is not None:
+                spare = plan.batches.not_needed
+                writer.mark([row for row in spare if status[row] == PENDING], needed=False)
+                wanted = set(np.flatnonzero(status == NOT_NEEDED).tolist()) - set(spare)
+                writer.mark(sorted(wanted), needed=True)
+    grown = f", {len(plan.tasks) - before} of them new" if difference.grown else ""
     say(
         f"{path}: {plan.done} of {_planned(plan)} tasks done, {len(plan.rows)} to do{grown}"
         + (f", {plan.failed} failed before (see --redo failed)" if plan.failed else "")
@@ -230,8 +235,7 @@ def _check_path(path: Path) -> None:
         raise InputError(f"{path} cannot be written: permission denied")
 
 
-def _plan(results: Results) -> Plan:
-    status = results.status()
+def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
     tasks = results.tasks()
     times: dict[Group, tuple[float, int]] = {}
     seconds = results.column("wall_time").tolist()

@@ -18,7 +18,7 @@ from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.errors import InputError
 from ensemble.results.read import Results
-from ensemble.results.schema import DONE, NOT_NEEDED, PENDING, file_size
+from ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from ensemble.run.plan import group_of, prior
 from ensemble.run.progress import duration
 from ensemble.task.compute import Runner
@@ -233,7 +233,7 @@ def _left(
                 known.add(task.cell, took, loss)
                 done += 1
             more = campaign.stop != results.campaign.stop and status == NOT_NEEDED
-            if status != PENDING and not more:
+            if status not in (PENDING, DAMAGED) and not more:
                 del mine[campaign.identity(task)]
     return list(mine.values()), done
 

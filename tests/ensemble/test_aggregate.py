@@ -21,7 +21,7 @@ from ensemble.interval import interval, interval_method, untransformed
 from ensemble.results.layout import create
 from ensemble.task.fields import field_plan
 from solver.jumps import JUMP_KINDS
-from tests.support.synthetic_results import campaign, rows, write
+from tests.support.synthetic_results import campaign, rows, sign, write
 
 E_STAR, Q0 = 1e6 / 0.75, 1000.0
 
@@ -282,6 +282,7 @@ def test_memory_does_not_grow_with_the_curves(tmp_path):
         for name in ("loss", "loss_dimensionless", "h_max", "m2", "loss_from_drops", "jump_count"):
             data[name][:] = np.random.default_rng(1).random(done) + 1
         data["status"][:] = 1
+    sign(path)
     size = path.stat().st_size / 2**20
     out = subprocess.run(
         [sys.executable, "-c", MEMORY, str(path)],

@@ -13,6 +13,7 @@ from ensemble.campaign.file import load_campaign, parse_campaign
 from ensemble.campaign.tasks import Part
 from ensemble.command.main import main
 from ensemble.errors import InputError
+from ensemble.results.head import write_head
 from ensemble.results.layout import create
 from ensemble.results.merge import merge
 from ensemble.results.read import Results
@@ -26,6 +27,7 @@ from tests.support.campaign_support import (
     write_campaign,
 )
 from tests.support.fake_run import fake_engine, fake_result
+from tests.support.synthetic_results import sign
 
 CAMPAIGN = campaign_text(realisations="6")
 
@@ -117,6 +119,7 @@ def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tm
     assert merge([one, two, again], tmp_path / "same.h5").done == 24  # the same bits: no matter
     with h5py.File(again, "r+") as file:
         file["unloading_energy"][7, 2] *= 1 + 1e-15
+    sign(again)
     sentence = refused([one, two, again], out)
     assert "again.h5" in sentence
     assert "and their unloading_energy differs" in sentence
@@ -124,7 +127,10 @@ def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tm
     assert "differs" in refused([again], out)
     with h5py.File(two, "r+") as file:
         file["seed"][3] += 1
-    assert "p2.h5 is damaged: its tasks are not those of its campaign" in refused([two], out)
+    assert "p2.h5 is damaged or truncated, or another program has changed" in refused([two], out)
+    write_head(two)
+    sentence = refused([two], out)
+    assert "p2.h5 is damaged: its tasks are not those of its campaign (seed of row 3 is" in sentence
     two.write_bytes(two.read_bytes()[:5000])
     assert "damaged or truncated" in refused([one, two], out)
     assert "merged into itself" in refused([one, out], out)
@@ -171,6 +177,7 @@ def test_memory_of_a_merge_does_not_grow_with_the_files(tmp_path):
         with h5py.File(name, "r+") as file:
             file["status"][:] = DONE
             file["loss"][:] = np.arange(k - 1, campaign.task_count, 2)
+        sign(name)
     out = tmp_path / "all.h5"
     done = subprocess.run(
         [sys.executable, "-c", MERGED, str(out), *map(str, names)],

@@ -23,7 +23,7 @@ from ensemble.report.figures.catalogue import (
 from ensemble.report.plots import Plots
 from ensemble.report.tables.losses import losses
 from ensemble.results.layout import create
-from tests.support.synthetic_results import campaign, rows, write
+from tests.support.synthetic_results import campaign, rows, sign, write
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_a_part_has_the_labels_of_its_own_rows(tmp_path):
         raw["loss"][:] = 10.0 * raw["hurst"][:] + raw["realisation"][:]
         raw["status"][:] = 1
         labels = set(zip(raw["hurst"][:].tolist(), raw["realisation"][:].tolist(), strict=True))
-    data = adhesis.open(path).dataset
+    data = adhesis.open(sign(path)).dataset
     known = data.loss.squeeze().to_series().dropna()
     assert set(known.index) == labels
     assert all(loss == 10.0 * hurst + number for (hurst, number), loss in known.items())

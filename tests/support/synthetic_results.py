@@ -9,8 +9,11 @@ import numpy as np
 
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tables import Campaign
+from ensemble.results.checksum import row_checksums
+from ensemble.results.head import SIZE, write_head
 from ensemble.results.layout import create
-from ensemble.results.schema import axis_datasets, kept_rows
+from ensemble.results.schema import LATER_DATASETS, axis_datasets, datasets, kept_rows
+from ensemble.task.dataset import KEPT
 from ensemble.task.fields import GAP_EDGES, field_plan
 from solver.jumps import JUMP_KINDS
 
@@ -166,4 +169,27 @@ def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
     with h5py.File(path, "r+") as file:
         for name, value in rows.items():
             file[name][...] = value
+    return sign(path)
+
+
+def sign(path: Path) -> Path:
+    """Give a results file and its rows the checksums of what they hold, as if all were written."""
+    with h5py.File(path, "r+") as file:
+        known = datasets(parse_campaign(file.attrs["campaign"]))
+        rows = np.arange(file["task"].size)
+        file["checksum"][...] = row_checksums(
+            lambda name, rows: file[name][rows], known, file[KEPT][:], rows
+        )
+    write_head(path)
+    return path
+
+
+def age(path: Path) -> Path:
+    """Make a results file one of version 1.0, as if written before there were checksums."""
+    with h5py.File(path, "r+") as file:
+        for name in LATER_DATASETS:
+            del file[name]
+        file.attrs["file_version"] = np.array([1, 0], "i4")
+    with path.open("r+b") as handle:
+        handle.write(bytes(SIZE))
     return path

@@ -1,0 +1,52 @@
+"""Check a results file: its head, its tasks and axes, and the checksum of every row.
+
+Exit codes: 0 no damage was found, 1 rows are damaged and named, 2 the file is no results file, or is
+damaged beside its rows. Rows that are damaged count as pending: the next run computes them again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+_EXAMPLES = """\
+examples:
+  adhesis verify results.h5
+  adhesis verify results.h5 --json
+"""
+SOUND, SOME_DAMAGED = 0, 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.epilog = _EXAMPLES
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("file", metavar="FILE.h5", help="the results file")
+    parser.add_argument(
+        "--json", action="store_true", help="counts, and every damaged row with its task, as JSON"
+    )
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Print what is damaged; returns 0, or 1 if rows are."""
+    from ensemble.results.status import damage_lines, read_status
+    from ensemble.results.read import NO_CHECKSUMS
+
+    status = read_status(args.file)
+    damaged = status["damaged"]
+    if args.json:
+        names = ("file", "tasks", "done", "failed", "not_needed", "pending", "damaged", "checksums")
+        print(json.dumps({name: status[name] for name in names}, indent=1, ensure_ascii=False))
+        return SOME_DAMAGED if damaged else SOUND
+    sound = status["done"] + status["failed"] + status["not_needed"]
+    if damaged:
+        print(f"{args.file}: {len(damaged)} of {sound + len(damaged)} written rows are damaged")
+        print("\n".join(damage_lines(damaged)))
+    elif status["checksums"]:
+        print(
+            f"{args.file} is sound: {sound} rows have their checksum ({status['done']} done, "
+            f"{status['failed']} failed), {status['pending']} are pending"
+        )
+    else:
+        print(f"{args.file} {NO_CHECKSUMS}; its head, axes and tasks are sound")
+    return SOME_DAMAGED if damaged else SOUND

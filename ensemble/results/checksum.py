@@ -1,0 +1,111 @@
+"""Checksums of the rows of a results file.
+
+The checksum of a row is the CRC-32 of what it holds, in the order
+that ``docs/results-file.md`` states. It finds every
+damage of up to 32 successive bits, and any other with a chance of all but one in 4·10⁹. Damage is
+an accident here, not an attack, so that no cryptographic digest is needed: readers compute the
+checksum of every row, and BLAKE2b takes more than four times as long.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.results.schema import CHECKSUM
+from ensemble.task.dataset import KEPT, Dataset
+
+_BLOCK_BYTES = 16 * 2**20
+
+Read = Callable[[str, slice], NDArray[Any]]
+"""Returns some rows of a dataset, by its name."""
+
+
+def covered(datasets: Iterable[Dataset]) -> tuple[tuple[Dataset, ...], tuple[Dataset, ...]]:
+    """Return the datasets that a row's checksum covers, in its order.
+
+    Returns
+    -------
+    of_tasks, of_kept : tuples of Dataset
+        Those with a row for each task, by name, then those with a row for each task that keeps its
+        fields, by name.
+    """
+    ordered = sorted((d for d in datasets if d is not CHECKSUM), key=lambda d: d.name)
+    return (
+        tuple(d for d in ordered if d.dims[0] != KEPT),
+        tuple(d for d in ordered if d.dims[0] == KEPT),
+    )
+
+
+def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
+    """Return the checksum of arrays, one after the other, in little-endian byte order.
+
+    Parameters
+    ----------
+    parts : iterable of array
+    start : int, optional
+        The checksum of what comes before them.
+    """
+    for part in parts:
+        little = part.astype(part.dtype.newbyteorder("<"), copy=False)
+        start = zlib.crc32(np.ascontiguousarray(little).reshape(-1).view(np.uint8), start)
+    return start
+
+
+def row_checksums(
+    read: Read, datasets: Iterable[Dataset], kept: NDArray[np.intp], rows: NDArray[np.intp]
+) -> NDArray[np.uint32]:
+    """Compute the checksums of some rows from what they hold; a block is in memory at a time.
+
+    Parameters
+    ----------
+    read : callable
+    datasets : iterable of Dataset
+        All datasets of the file.
+    kept : int array
+        Rows of the tasks that keep their fields, ascending.
+    rows : int array
+        Ascending.
+    """
+    of_tasks, of_kept = covered(datasets)
+    out = np.zeros(rows.size, np.uint32)
+    if not rows.size:
+        return out
+    first_row = {d.name: read(d.name, slice(int(rows[0]), int(rows[0]) + 1)) for d in of_tasks}
+    width = sum(values.nbytes for values in first_row.values())
+    step = max(1, _BLOCK_BYTES // width)
+    done = 0
+    while done < rows.size:
+        first = int(rows[done])
+        last = done + int(np.searchsorted(rows[done:], first + step))
+        block = _side_by_side(read, of_tasks, slice(first, int(rows[last - 1]) + 1), width)
+        for place in range(done, last):
+            row = int(rows[place])
+            value = zlib.crc32(block[row - first])
+            where = int(np.searchsorted(kept, row))
+            if where < kept.size and kept[where] == row:
+                here = slice(where, where + 1)
+                value = checksum((read(d.name, here) for d in of_kept), value)
+            out[place] = value
+        done = last
+    return out
+
+
+def _side_by_side(
+    read: Read, datasets: Iterable[Dataset], rows: slice, width: int
+) -> NDArray[np.uint8]:
+    """Return the bytes of rows of several datasets, those of a row in one piece."""
+    count = rows.stop - rows.start
+    out = np.empty((count, width), np.uint8)
+    place = 0
+    for dataset in datasets:
+        values = read(dataset.name, rows)
+        little = values.astype(values.dtype.newbyteorder("<"), copy=False)
+        size = little.nbytes // count
+        out[:, place : place + size] = little.reshape(-1).view(np.uint8).reshape(count, size)
+        place += size
+    return out
