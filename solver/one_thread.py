@@ -9,9 +9,38 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, wraps
+from threading import RLock
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+class _Limit:
+    """The limit of the process, set by the first caller and lifted by the last.
+
+    It belongs to the process, not to a thread: a caller that lifted it while another is at work
+    would change the bits of that other's sums, and the other would then restore the limit for ever.
+    """
+
+    def __init__(self) -> None:
+        self._guard = RLock()
+        self._callers = 0
+        self._limiter: Any = None
+
+    def __enter__(self) -> None:
+        with self._guard:
+            if self._callers == 0:
+                self._limiter = _libraries().limit(limits=1)
+            self._callers += 1
+
+    def __exit__(self, *raised: object) -> None:
+        with self._guard:
+            self._callers -= 1
+            if self._callers == 0:
+                self._limiter.restore_original_limits()
+
+
+_limit = _Limit()
 
 
 def on_one_thread(function: F) -> F:
@@ -19,7 +48,7 @@ def on_one_thread(function: F) -> F:
 
     @wraps(function)
     def limited(*args: Any, **kwargs: Any) -> Any:
-        with _libraries().limit(limits=1):
+        with _limit:
             return function(*args, **kwargs)
 
     limited_function: Any = limited
