@@ -14,41 +14,21 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-
-class _Limit:
-    """The limit of the process, set by the first caller and lifted by the last.
-
-    It belongs to the process, not to a thread: a caller that lifted it while another is at work
-    would change the bits of that other's sums, and the other would then restore the limit for ever.
-    """
-
-    def __init__(self) -> None:
-        self._guard = RLock()
-        self._callers = 0
-        self._limiter: Any = None
-
-    def __enter__(self) -> None:
-        with self._guard:
-            if self._callers == 0:
-                self._limiter = _libraries().limit(limits=1)
-            self._callers += 1
-
-    def __exit__(self, *raised: object) -> None:
-        with self._guard:
-            self._callers -= 1
-            if self._callers == 0:
-                self._limiter.restore_original_limits()
-
-
-_limit = _Limit()
+# The number of threads belongs to the process: a caller that restored it while another is at work
+# would change the bits of that other's sums. Compiled code and Python hold the interpreter's lock
+# nearly all the time, so callers that take turns are hardly slower than callers side by side.
+_in_use = RLock()
 
 
 def on_one_thread(function: F) -> F:
-    """Let linear algebra use one thread while ``function`` runs, and as before afterwards."""
+    """Let linear algebra use one thread while ``function`` runs, and as before afterwards.
+
+    Callers in other threads wait.
+    """
 
     @wraps(function)
     def limited(*args: Any, **kwargs: Any) -> Any:
-        with _limit:
+        with _in_use, _libraries().limit(limits=1):
             return function(*args, **kwargs)
 
     limited_function: Any = limited
