@@ -32,13 +32,13 @@ Progress = Callable[[Branch, float, ContactState], None]
 """Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
 
 # After so many times the loading stroke, unloading skips load steps that are shorter than a share
-# of h_max or of the way since first touch; loops of ordinary depth have detached long before.
+# of the control's natural range (h_max at fixed separation) or of the way since first touch; loops
+# of ordinary depth have detached long before.
 _STROKES_AT_STEP = 20
 _LONG_STEP = 0.02
-# Unloading has always detached long before this many times h_max (under a load, this many times the
-# loading stroke); more is a bug.
-_FARTHEST = 1000
-_FARTHEST_HEIGHTS = 1e6
+# Unloading is given up so many natural ranges below first touch. Contact detaches at about
+# sqrt(γ/energy of full contact) ranges, and no method accepts more than 1e12 of those energies.
+_FARTHEST = 1e7
 
 
 def check_cycle(
@@ -95,8 +95,7 @@ def run_loop(
     TypeError
         If the method is no Method, or a value no number.
     PathError
-        If the path cannot be followed, or the contact has not detached after a thousand loading
-        strokes.
+        If the path cannot be followed, or the contact does not detach (:func:`unload`).
 
     References
     ----------
@@ -110,8 +109,12 @@ def run_loop(
     started = process_time()
     record = Record(on_state)
     axis = Axis(turning_point, load_steps)
-    state = _load(method, record, [axis(i) for i in range(load_steps + 1)], progress)
-    unload(method, record, state, axis, load_steps, progress)
+    state = method.detached(method.problem.profile.h_max)
+    record.visit("loading", False, state)
+    load = recorder(method, record, "loading", state, progress)
+    for i in range(load_steps + 1):
+        state = load(axis(i))
+    unload_recorded(method, record, state, axis, turning_point, progress)
     return result_of(method, record, turning_point, load_steps, started)
 
 
@@ -132,89 +135,103 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
     return wanted[1]
 
 
-def _load(
-    method: Method, record: Record, drives: Sequence[float], progress: Progress | None
-) -> ContactState:
-    """Load from first touch through the load steps ``drives``; gives the state at the last."""
-    state = method.detached(method.problem.profile.h_max)
-    record.visit("loading", False, state)
-    for drive in drives:
-        state = record.extend("loading", method.follow(state, method.problem.prescribed(drive)))
+def recorder(
+    method: Method,
+    record: Record,
+    branch: Branch,
+    state: ContactState,
+    progress: Progress | None,
+) -> Callable[[float], ContactState]:
+    """Return a function that follows one branch from ``state``, a load step a call.
+
+    It takes the place of a load step (Δ/h_max, u_tot/h_max or Pa), adds the states on the way to
+    the record, and returns the last one.
+    """
+
+    def step(drive: float) -> ContactState:
+        nonlocal state
+        state = record.extend(branch, method.follow(state, method.problem.prescribed(drive)))
         if progress is not None:
-            progress("loading", drive, state)
-    return state
+            progress(branch, drive, state)
+        return state
+
+    return step
 
 
-def unload(
+def unload_recorded(
     method: Method,
     record: Record,
     state: ContactState,
     axis: Axis,
-    index: int,
+    turn: float,
     progress: Progress | None,
     marks: Sequence[float] = (),
 ) -> None:
-    """Go back by load steps, the next one below ``index``, until contact is lost.
+    """Add the unloading branch of a loop to the record of its loading branch; see :func:`unload`.
+
+    The turning point belongs to both branches: its state starts the unloading curve.
+    """
+    record.visit("unloading", True, state)
+    step = recorder(method, record, "unloading", state, progress)
+    unload(method.problem, axis, turn, state, step, marks)
+
+
+def unload(
+    problem: Problem,
+    axis: Axis,
+    turn: float,
+    state: ContactState,
+    step: Callable[[float], ContactState],
+    marks: Sequence[float] = (),
+) -> None:
+    """Unload by load steps until contact is lost: the rule of all loops and paths.
 
     Parameters
     ----------
-    method : Method
-    record : Record
-        Of the loading branch; it gets the unloading branch too.
-    state : ContactState
-        At the turning point.
+    problem : Problem
     axis : Axis
-    index : int
-        Number of the first load step at or above the turning point.
-    progress : callable, optional
-        See :data:`Progress`.
+    turn : float
+        Where unloading begins, on the axis or between two of its load steps.
+    state : ContactState
+        The state there.
+    step : callable
+        Follows the path to a place on the axis and returns the state there.
     marks : sequence of float
-        Further places below the turning point, none of them a load step, at which a step ends.
+        Further places at which a step ends; those above ``turn`` are not passed.
 
     Raises
     ------
     PathError
-        If the path cannot be followed or does not end.
+        If the path cannot be followed, or contact lasts where no contact has ever lasted.
     """
-    # The turning point belongs to both branches: it starts the unloading curve.
-    record.visit("unloading", True, state)
-    i = index
+    first = i = axis.above(turn)
     stride = 1
-    ahead = sorted(marks)
+    ahead = sorted(mark for mark in marks if mark < turn)
+    unit = _natural_range(problem)
     while state.patches:
         i -= stride
         end = axis(i)
-        if _too_far(method.problem, end, (index - i) / axis.load_steps):
-            raise PathError(f"still in contact at {end:g}")
-        if index - i >= _STROKES_AT_STEP * axis.load_steps:
-            stride = _stride(method.problem, axis, i, stride)
+        if end < -_FARTHEST * unit:
+            raise PathError(
+                f"unloading does not end: surfaces are still in contact at "
+                f"{problem.place(problem.prescribed(end))}, {_FARTHEST:g} times further than the "
+                "profile's height alone would hold them; check the units of work_of_adhesion, "
+                "young and the heights, or try the other method"
+            )
+        if first - i >= _STROKES_AT_STEP * axis.load_steps:
+            wanted = _LONG_STEP * max(unit, -end) / (axis(i + 1) - end)
+            stride = max(1, min(2 * stride, int(wanted)))
         stops = []
         while ahead and ahead[-1] > end:
             stops.append(ahead.pop())
         for drive in [*stops, end]:
-            state = record.extend(
-                "unloading", method.follow(state, method.problem.prescribed(drive))
-            )
-            if progress is not None:
-                progress("unloading", drive, state)
+            state = step(drive)
             if not state.patches:
                 break
 
 
-def _too_far(problem: Problem, drive: float, strokes: float) -> bool:
-    """Whether a loop that is still in contact at ``drive`` is a bug."""
+def _natural_range(problem: Problem) -> float:
+    """Range of the prescribed quantity that the profile alone sets: 1 (in h_max), or Pa."""
     if problem.control.is_load:
-        return strokes > _FARTHEST
-    return drive < -_FARTHEST_HEIGHTS
-
-
-def _stride(problem: Problem, axis: Axis, index: int, last: int) -> int:
-    """Load steps to the next state, far below the turning point: at most twice as many as last.
-
-    Under a load there is no height that steps could be measured by.
-    """
-    if problem.control.is_load:
-        return 1
-    step = axis(index + 1) - axis(index)
-    wanted = _LONG_STEP * max(1.0, -axis(index)) / step
-    return max(1, min(2 * last, int(wanted)))
+        return problem.stress_scale
+    return 1.0 + problem.stress_scale / (problem.control.stiffness * problem.profile.h_max)

@@ -28,9 +28,13 @@ To add a method, subclass :class:`Method` and keep these promises:
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import partial, wraps
+from threading import RLock
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -41,6 +45,8 @@ from solver.profile import Array
 from solver.state import ContactState
 from solver.values import ByValue
 
+F = TypeVar("F", bound=Callable[..., Any])
+
 __all__ = [
     "BRANCHES",
     "Branch",
@@ -50,6 +56,7 @@ __all__ = [
     "MethodReport",
     "Path",
     "PathError",
+    "one_at_a_time",
 ]
 
 
@@ -152,6 +159,23 @@ class MethodReport:
     chosen: str | None
 
 
+def one_at_a_time(function: F) -> F:
+    """Let one thread at a time call the decorated methods of an object; the others wait.
+
+    Methods reuse work arrays and plans from call to call. Between calls nothing but counters and
+    caches is kept, so threads that take turns get the same bits as one alone.
+    """
+
+    @wraps(function)
+    def waiting(self: Method, *args: Any, **options: Any) -> Any:
+        with self._in_use:
+            return function(self, *args, **options)
+
+    guarded: Any = waiting
+    answer: F = guarded
+    return answer
+
+
 class Method(ABC):
     """Finds and follows contact states of one problem; see the module's numbered contract.
 
@@ -166,6 +190,16 @@ class Method(ABC):
     nodes : int or None
         Nodes of the method's own grid, where it has one.
 
+    Raises
+    ------
+    ValueError
+        If adhesion is too weak or too strong for this method to resolve (``adhesion_range``).
+
+    Notes
+    -----
+    A method can be shared by threads, which take turns, copied and pickled: the copy is built anew
+    from the same arguments and follows the same paths, bit by bit.
+
     References
     ----------
     docs/methods.md, "Rules of evolution"
@@ -173,11 +207,44 @@ class Method(ABC):
 
     name: ClassVar[str]
     nodes: int | None = None
+    adhesion_range: ClassVar[tuple[float, float]] = (0.0, math.inf)
+    """Least and largest γ that the method resolves, over the elastic energy of full contact."""
+
+    _built_from: tuple[tuple[Any, ...], dict[str, Any]]
+
+    def __new__(cls, *args: Any, **options: Any) -> Self:
+        """Remember the arguments, which a copy is built from."""
+        method = super().__new__(cls)
+        method._built_from = args, options
+        return method
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        args, options = self._built_from
+        return partial(type(self), *args, **options), ()
 
     def __init__(self, problem: Problem, *, chosen: str | None = None) -> None:
         how = "Problem(profile, half_space, work_of_adhesion)"
         self.problem = instance("problem", problem, Problem, how)
+        self._check_adhesion(self.problem)
         self.chosen = chosen
+        self._in_use = RLock()
+
+    @classmethod
+    def _check_adhesion(cls, problem: Problem) -> None:
+        """Refuse a work of adhesion of which no number would come out."""
+        gamma, unit = problem.work_of_adhesion, problem.full_contact_energy
+        least, largest = (limit * unit for limit in cls.adhesion_range)
+        if gamma == 0 or least <= gamma <= largest:
+            return
+        advice = "check the units of work_of_adhesion, young and the heights"
+        if gamma < least:
+            advice += ", or take 0, which is contact without adhesion"
+        raise ValueError(
+            f"work_of_adhesion is {gamma:g} J/m²: for this profile and E* = "
+            f"{problem.half_space.modulus:g} Pa the method '{cls.name}' resolves a loss from "
+            f"{least:.2g} to {largest:.2g} J/m² ({cls.adhesion_range[0]:g} to "
+            f"{cls.adhesion_range[1]:g} times the elastic energy of full contact); {advice}"
+        )
 
     @abstractmethod
     def follow(self, state: ContactState, separation: float) -> Path:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from solver.checks import finite_row, flag, function, instance
 from solver.jumps import Branch, Jump
-from solver.loop import HOW_METHOD, Progress, check_cycle
+from solver.loop import HOW_METHOD, Progress, check_cycle, unload
 from solver.loop_result import counted, estimated_error
 from solver.method import ContactState, Method, MethodReport, PathError
 from solver.problem import Problem
@@ -30,7 +30,6 @@ from solver.profile import Array
 from solver.record import Axis, Record
 from solver.values import ByValue
 
-_MAX_UNLOADING_STROKES = 1000  # as in a loop
 _SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # states whose stress and contact differ by less (of what they went through) are one
 
@@ -311,25 +310,26 @@ class _Walk:
         for drive in drives[1:] if self.leg else drives:  # the first leg begins with first touch
             self._step(branch, drive)
             if not self.state.patches and self.leg > 0:
+                unit = "Pa" if self.problem.control.is_load else "h_max"
                 raise PathError(
-                    f"contact is lost on the way to {point:g}, before the path has ended"
+                    f"contact is lost on the way to {point:g} {unit}, at "
+                    f"{self.problem.place(self.problem.prescribed(drive))}, before the path has "
+                    "ended: let it turn where contact lasts, or end there with out"
                 )
         self.drive = point
 
     def out(self) -> None:
-        """Unload until contact is lost."""
+        """Unload until contact is lost, as a loop does."""
         self._begin("unloading")
-        first = index = self.axis.above(self.drive)
-        marks = sorted((turn.drive for turn in self.open[:-1]), reverse=True)
-        while self.state.patches:
-            index -= 1
-            if first - index > _MAX_UNLOADING_STROKES * self.axis.load_steps:
-                raise PathError(f"still in contact at {self.axis(index):g}")
-            for drive in self.axis.between(self.drive, self.axis(index), marks)[1:]:
-                self._step("unloading", drive)
-                self.drive = drive
-                if not self.state.patches:
-                    break
+        marks = [turn.drive for turn in self.open[:-1]]
+        unload(
+            self.problem,
+            self.axis,
+            self.drive,
+            self.state,
+            lambda drive: self._step("unloading", drive),
+            marks,
+        )
 
     def _begin(self, branch: Branch) -> None:
         """The turning point belongs to both legs: it starts the next one."""
@@ -339,7 +339,7 @@ class _Walk:
         self.record.visit(branch, self.leg > 0, self.state)
         self.legs.append(self.leg)
 
-    def _step(self, branch: Branch, drive: float) -> None:
+    def _step(self, branch: Branch, drive: float) -> ContactState:
         path = self.method.follow(self.state, self.problem.prescribed(drive))
         self.jump_steps += [len(self.record.states)] * len(path.jumps)
         self.jump_legs += [self.leg] * len(path.jumps)
@@ -350,6 +350,7 @@ class _Walk:
         while len(self.open) > 1 and drive == self.open[-2].drive:
             self._close(self.open[-2], self.open[-1])
             del self.open[-2:]
+        return self.state
 
     def _close(self, start: _Turn, turn: _Turn) -> None:
         """Take down the minor loop from ``start`` over ``turn`` to the last state."""

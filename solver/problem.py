@@ -118,10 +118,23 @@ class Problem(ByValue):
 
     def full_contact(self, prescribed: float) -> str:
         """One sentence for a contact that runs into full contact on the way to x = prescribed."""
-        where = f"before a mean stress of {-prescribed:g} Pa"
-        if not self.control.is_load:
-            where = f"before u_tot/h_max = {self.penetration(prescribed):g}"
-        return f"the contact runs into full contact {where}: no state with a gap carries that"
+        first = self.control.prescribed(self.profile.h_max, 0.0)
+        where = f"before {self.place(prescribed)}" if prescribed < first else "at first touch"
+        return (
+            f"the contact runs into full contact {where}: no state with a gap carries that; a "
+            "fixed separation, or a larger stiffness, leaves a gap, and so may a smaller turning "
+            "point or work_of_adhesion"
+        )
+
+    def place(self, prescribed: float) -> str:
+        """Where a path is at x = prescribed, in the units of its turning points and in m."""
+        if self.control.is_load:
+            return f"a mean stress of {0.0 - prescribed:g} Pa"
+        penetration = self.penetration(prescribed)
+        if self.control.is_fixed:
+            return f"Δ/h_max = {penetration:.6g} (mean gap {prescribed:.6g} m)"
+        u_tot = self.profile.h_max - prescribed
+        return f"u_tot/h_max = {penetration:.6g} (u_tot = {u_tot:.6g} m)"
 
     def penetration(self, separation: Value) -> Value:
         """Penetration Δ~ = 1 - s/h_max at separations s in m; 0 where it is only rounding."""

@@ -24,8 +24,8 @@ class Axis:
     load_steps: int
 
     def __call__(self, index: int) -> float:
-        """Return the place of a load step."""
-        return self.top * index / self.load_steps
+        """Return the place of a load step; of the last one ``top`` itself, without rounding."""
+        return self.top if index == self.load_steps else self.top * index / self.load_steps
 
     def above(self, drive: float) -> int:
         """Number of the first load step at or above ``drive``."""
@@ -127,7 +127,10 @@ class Record:
         free = separation[self.column("patches") == 0]
         held = not control.is_load and problem.work_of_adhesion > 0
         if held and free.min(initial=np.inf) < h_max * (1 - _NEAR):
-            raise PathError(f"without contact at s = {free.min() / h_max:.9g} h_max: there is none")
+            raise PathError(
+                f"the path is without contact at s = {free.min() / h_max:.9g} h_max "
+                f"({free.min():.9g} m), where surfaces overlap: there is no such state"
+            )
         return -integral(
             control.prescribed(separation, mean_stress),
             control.conjugate(separation, mean_stress, h_max),

@@ -7,7 +7,7 @@ from time import process_time
 
 from solver.checks import function, instance, row
 from solver.jumps import Branch
-from solver.loop import HOW_METHOD, Progress, check_cycle, turning_of, unload
+from solver.loop import HOW_METHOD, Progress, check_cycle, turning_of, unload_recorded
 from solver.loop_result import LoopResult, result_of
 from solver.method import ContactState, Method, PathError
 from solver.record import Axis, Record
@@ -141,8 +141,8 @@ class LoadingBranch:
             for branch, state in zip(record.branches, record.states, strict=True):
                 on_state(branch, state)
         axis = self._axis
-        ahead = [mark for mark in axis.apart(marks) if mark < turn]
-        unload(self.method, record, self._state, axis, axis.above(turn), progress, ahead)
+        apart = axis.apart(marks)
+        unload_recorded(self.method, record, self._state, axis, turn, progress, apart)
         return result_of(self.method, record, turn, self._passed - 1, started)
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from solver.control import Control
 from solver.grid.elasticity import ElasticGrid
 from solver.grid.kernels import advance, dot, turn
+from solver.method import PathError
 from solver.profile import Array
 
 Mask = NDArray[np.bool_]
@@ -162,7 +163,7 @@ class ContactSolver:
 
         Raises
         ------
-        RuntimeError
+        PathError
             If there is no free node, or the iteration stalls above the tolerance.
         """
         self.solves += 1
@@ -242,7 +243,10 @@ class ContactSolver:
             response = elastic.displacement(direction)
             curvature = dot(direction, response)
             if curvature <= 0:
-                raise RuntimeError("no free node: full contact has no solution at a mean gap")
+                raise PathError(
+                    "method 'grid' has no free node left: full contact has no solution at a mean "
+                    "gap; more nodes, or a smaller turning point, leave one"
+                )
             step = rz / curvature
             largest = advance(stress, displacement, residual, direction, response, inside, step)
             # Twice what one iteration adds to the energy bounds what all later ones will: gains
@@ -252,8 +256,9 @@ class ContactSolver:
             rz_before = rz
             self.iterations += 1
         else:
-            raise RuntimeError(
-                f"conjugate gradients stalled at a residual of {largest:.3e} m "
-                f"(wanted {most:.3e} m, {int(inside.sum())} contact nodes)"
+            raise PathError(
+                f"method 'grid' does not solve the stress of {int(inside.sum())} contact nodes: "
+                f"the gap inside contact stays {largest:.3g} m, {most:.3g} m are wanted; the "
+                "method 'sharp', or more nodes, may get past it"
             )
         return displacement, largest, gain

@@ -30,6 +30,7 @@ from solver.grid.moves import (
     least_release,
     pair_moves,
 )
+from solver.method import PathError
 from solver.profile import EQUAL_CRESTS
 
 _MAX_SWEEPS = 1_000_000
@@ -88,7 +89,7 @@ class Relaxation:
 
         Raises
         ------
-        RuntimeError
+        PathError
             If the edges do not come to rest.
         """
         return _Descent(self, contact, abort, equal_speeds).run()
@@ -102,7 +103,7 @@ class Relaxation:
 
         Raises
         ------
-        RuntimeError
+        PathError
             If the contact set does not settle.
         """
         contact = contact.copy()
@@ -116,7 +117,10 @@ class Relaxation:
                 return contact
             self.flips += changed
             contact.mask = kept
-        raise RuntimeError("the contact set without adhesion does not settle")
+        raise PathError(
+            f"method 'grid' finds no contact set without adhesion at a mean gap of "
+            f"{contact.separation:.6g} m; the method 'sharp', or other nodes, may"
+        )
 
     def edges(self, contact: Contact) -> Edges:
         """Edges of a solved contact with their prices."""
@@ -213,7 +217,10 @@ class _Descent:
                 self._sweep()
             elif self._at_rest():
                 return self.current
-        raise RuntimeError("edges still move after a million sweeps")
+        raise PathError(
+            f"method 'grid' finds no state at a mean gap of {self.current.separation:.6g} m: edges "
+            f"still move after {_MAX_SWEEPS} sweeps; the method 'sharp', or other nodes, may"
+        )
 
     def _sweep(self) -> None:
         self.solver.solve(self.current, self.tolerance)

@@ -96,6 +96,14 @@ class FullContact(Exception):
     """The last gap of the period closes: no state of gaps is left."""
 
 
+class NoState(PathError):
+    """The path has no state at d = ``at``; the text is the reason."""
+
+    def __init__(self, reason: str, at: float) -> None:
+        super().__init__(reason)
+        self.at = at
+
+
 class EdgeMechanics:
     """Openings, equilibrium and stability of the edges of one problem, in units of 1/q0.
 
@@ -333,7 +341,7 @@ class EdgeMechanics:
                 track.met = True
                 return np.empty((0, 2))
             if ended == LOST:
-                raise PathError(f"there is no field of these edges at q0 s = {prescribed:.9g}")
+                raise NoState("there is no field of these edges", prescribed)
             if ended == NARROW:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
@@ -356,7 +364,7 @@ class EdgeMechanics:
                     break
                 if not patient:
                     gaps = self._pushed_on(gaps, prescribed, rests - _RESTS)
-        raise PathError(f"the descent at q0 s = {prescribed:.9g} did not end")
+        raise NoState("edges that descend in energy do not come to rest", prescribed)
 
     def _pushed_on(self, gaps: Array, prescribed: float, times: int) -> Array:
         """Gaps whose most unbalanced edge has gone on, ``times`` half a longest step.

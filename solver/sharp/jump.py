@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.jumps import Branch
-from solver.method import ContactState, PathError
+from solver.method import ContactState
 from solver.profile import Array
-from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, Track
+from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, NoState, Track
 from solver.sharp.gaps import outward
 from solver.sharp.nearby import Start
 from solver.sharp.point import Point
@@ -130,7 +130,7 @@ class Jumps:
                     break
                 return point
             point = grown
-        raise PathError(f"surfaces overlap at q0 s = {at:.9g}, and no patch comes to rest there")
+        raise NoState("surfaces overlap, and no patch comes to rest there", at)
 
     def _alike(self, one: Point | None, other: Point | None) -> bool:
         """Whether two descents led to one minimum."""

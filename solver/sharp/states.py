@@ -88,6 +88,10 @@ class States:
             return prescribed / self._half
         return prescribed * self.q0
 
+    def prescribed(self, at: float) -> float:
+        """What d = ``at`` is in m, under a load in Pa."""
+        return at * self._half if self.problem.control.is_load else at / self.q0
+
     def place(self, state: ContactState) -> float:
         """What is prescribed in a state, in the units of the field."""
         return self.at(self.problem.prescribed_in(state))

@@ -92,9 +92,9 @@ def test_what_cannot_be_followed_is_refused_in_one_sentence(words, sentence, cap
     assert len(error.splitlines()) == 1
 
 
-def test_a_load_that_runs_away_says_at_which_load(tmp_path, capsys):
+def test_a_load_that_runs_away_ends_in_where_it_does(tmp_path, capsys):
     out = tmp_path / "x.json"
     words = ["--stiffness", "0", "--max-stress", "100", "--work-of-adhesion", "1"]
     assert main([*SCENE, *words, "--json", str(out)]) == 1
-    assert "runs into full contact before a mean stress of" in capsys.readouterr().err
+    assert "runs into full contact" in capsys.readouterr().err
     assert not out.exists()

@@ -1,0 +1,231 @@
+"""Adhesion, turning points and controls at either end of what can be followed, and sharing."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import numpy as np
+import pytest
+
+from adhesis import (
+    Control,
+    HalfSpace,
+    Problem,
+    make_method,
+    run_loop,
+    run_loops,
+    run_path,
+    self_affine_profile,
+    single_wave,
+)
+from solver import one_thread
+from solver.grid.method import GridMethod
+from solver.method import Method, PathError
+from solver.one_thread import on_one_thread
+from solver.references.exact_wave import ExactWave
+from solver.sharp.edges import EdgeMechanics, NoState
+from solver.sharp.method import SharpMethod
+
+WAVE = single_wave(1e-6, 1e-3)
+ROUGH = self_affine_profile(0.8, period=1e-3, n0=2, ratio=3, seed=4, h_rms=1e-6)
+HALF_SPACE = HalfSpace(1e6, 0.5)
+FULL = Problem(WAVE, HALF_SPACE, 0.0).full_contact_energy
+
+
+def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) -> Problem:
+    """γ is ``share`` of the energy of full contact, at 1 MPa; the stiffness is in p*/A."""
+    unit = np.pi * HALF_SPACE.modulus / WAVE.period
+    return Problem(WAVE, HalfSpace(young, 0.5), share * FULL, Control(stiffness * unit))
+
+
+# ---------------------------------------------------------------------- adhesion
+
+
+@pytest.mark.parametrize("name", ["sharp", "grid", "auto"])
+@pytest.mark.parametrize(
+    ("share", "young", "advice"),
+    [
+        (1e-9, 1e6, "or take 0"),
+        (1e-30, 1e6, "or take 0"),
+        (1e-320, 1e6, "or take 0"),
+        (1.0, 1e30, "or take 0"),
+        (1e13, 1e6, "check the units"),
+        (1.0, 1e-30, "check the units"),
+        (1e300, 1e6, "check the units"),
+    ],
+)
+def test_adhesion_that_no_method_resolves_is_refused(name, share, young, advice):
+    rule = rf"work_of_adhesion is \S+ J/m².* resolves a loss from \S+ to \S+ J/m².*{advice}"
+    with pytest.raises(ValueError, match=rule):
+        make_method(name, wave_problem(share, young=young))
+
+
+@pytest.mark.parametrize("share", [1.0, 1e4, 1e8, 1e10])
+def test_adhesion_of_every_accepted_strength_ends_in_an_audited_loss(share):
+    loop = run_loop(SharpMethod(wave_problem(share)), max_penetration=0.5, load_steps=1)
+    assert abs(loop.audit_residual) < 1e-3
+    assert loop.loss_error < 1e-3 * loop.loss
+
+
+def test_no_adhesion_at_all_is_accepted_whatever_the_modulus():
+    for young in (1e-30, 1e30):
+        loop = run_loop(
+            make_method("auto", wave_problem(0.0, young=young)), max_penetration=0.3, load_steps=2
+        )
+        assert abs(loop.loss_dimensionless) < 1e-9
+
+
+# ---------------------------------------------------------------------- one rule of unloading
+
+
+@pytest.mark.parametrize(
+    ("share", "stiffness", "turn", "load_steps"),
+    [
+        (0.9, np.inf, 1e-4, 1),  # shallow: thousands of strokes to pull-off
+        (0.9, np.inf, 1e-6, 1),
+        (1e-5, np.inf, 1e-6, 3),
+        (50.0, np.inf, 0.999999, 1),
+        (0.9, np.inf, 0.8, 6),  # 0.8 * 6 / 6 is not 0.8
+        (0.2, 1.0, 1e-3, 1),
+        (0.2, 0.01, 0.1, 2),
+        (0.2, 0.0, 1e-6, 1),
+        (0.2, 0.0, 0.1, 4),
+    ],
+)
+def test_a_plain_path_is_a_loop_bit_by_bit(share, stiffness, turn, load_steps):
+    problem = wave_problem(share, stiffness)
+    point = turn * (problem.stress_scale if stiffness == 0 else 1.0)
+    name = "max_stress" if stiffness == 0 else "max_penetration"
+    method = ExactWave(problem, states_per_step=1)
+    loop = run_loop(method, **{name: point}, load_steps=load_steps)
+    (other,) = run_loops(method, **{name: [point]}, load_steps=load_steps)
+    path = run_path(method, [point], load_steps=load_steps)
+    assert path.work == loop.loss == other.loss > 0
+    assert path.loss_from_drops == loop.loss_from_drops
+    for column in ("separation", "mean_stress", "contact_fraction", "load_step"):
+        assert np.array_equal(getattr(path, column), getattr(loop, column))
+        assert np.array_equal(getattr(other, column), getattr(loop, column))
+    assert loop.patches[-1] == 0
+
+
+def test_a_plain_path_of_the_method_sharp_is_its_loop():
+    problem = Problem(ROUGH, HALF_SPACE, 0.01)
+    loop = run_loop(SharpMethod(problem), max_penetration=1e-3, load_steps=1)
+    path = run_path(SharpMethod(problem), [1e-3], load_steps=1)
+    assert path.work == loop.loss > 0
+    assert np.array_equal(path.mean_stress, loop.mean_stress)
+
+
+def test_turning_points_far_below_first_touch_are_marks_of_the_way_out():
+    """Unloading that skips load steps still ends one at the points where minor loops begin."""
+    problem = wave_problem(0.9)
+    path = run_path(ExactWave(problem, states_per_step=4), [1e-2, -0.3, -0.1], load_steps=1)
+    (minor,) = path.minor_loops
+    assert (minor.start, minor.turn) == (-0.3, -0.1)
+    assert minor.closes
+    assert path.work == pytest.approx(path.loss_from_drops, rel=1e-4)
+
+
+# ---------------------------------------------------------------------- what went wrong, in words
+
+
+def test_a_state_that_is_not_found_is_reported_in_the_units_of_the_turning_point(monkeypatch):
+    def lost(self, gaps, prescribed, *args, **options):
+        raise NoState("edges that descend in energy do not come to rest", prescribed)
+
+    monkeypatch.setattr(EdgeMechanics, "relax", lost)
+    for stiffness, place in (
+        (np.inf, r"Δ/h_max = 0 \(mean gap 1e-06 m\)"),
+        (1.0, r"u_tot/h_max = 0 \(u_tot = 0 m\)"),
+        (0.0, "a mean stress of 0 Pa"),
+    ):
+        method = SharpMethod(wave_problem(0.5, stiffness))
+        turn = {"max_stress": 1.0} if stiffness == 0 else {"max_penetration": 0.5}
+        with pytest.raises(PathError, match=rf"no state at {place}: edges .* the method 'grid'"):
+            run_loop(method, **turn, load_steps=2)
+
+
+@pytest.mark.parametrize(
+    ("share", "max_stress", "where"),
+    [
+        (1e3, 1e12, "at first touch: no state"),
+        (0.2, 1e12, r"before a mean stress of 5e\+11 Pa"),
+    ],
+)
+def test_full_contact_is_reported_with_where_it_happens(share, max_stress, where):
+    method = SharpMethod(wave_problem(share, 0.0))
+    with pytest.raises(PathError, match=f"runs into full contact {where}"):
+        run_loop(method, max_stress=max_stress, load_steps=2)
+
+
+# ---------------------------------------------------------------------- threads and copies
+
+
+def methods(problem: Problem) -> list[Method]:
+    return [GridMethod(problem, nodes=64), SharpMethod(problem)]
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_threads_that_share_a_method_get_the_bits_of_one_alone(index):
+    problem = wave_problem(1.0)
+    turns = [0.3, 0.5, 0.7]
+
+    def loss(method: Method, turn: float) -> tuple[float, float]:
+        loop = run_loop(method, max_penetration=turn, load_steps=2)
+        return loop.loss, loop.loss_from_drops
+
+    alone = [loss(methods(problem)[index], turn) for turn in turns]
+    shared = methods(problem)[index]
+    together = Barrier(len(turns))
+
+    def in_thread(turn: float) -> tuple[float, float]:
+        together.wait()
+        return loss(shared, turn)
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        with ThreadPoolExecutor(len(turns)) as pool:
+            assert list(pool.map(in_thread, turns)) == alone
+    finally:
+        sys.setswitchinterval(interval)
+
+
+def test_one_caller_at_a_time_changes_the_number_of_threads():
+    """Else the first to leave would restore it while the other is at work."""
+
+    @on_one_thread
+    def limited(pool: ThreadPoolExecutor) -> bool:
+        return pool.submit(enters).result()
+
+    def enters() -> bool:
+        entered = one_thread._in_use.acquire(blocking=False)
+        if entered:
+            one_thread._in_use.release()
+        return entered
+
+    with ThreadPoolExecutor(1) as pool:
+        assert not limited(pool)
+        assert pool.submit(enters).result()
+
+
+@pytest.mark.parametrize(
+    "duplicate", [copy.copy, copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))]
+)
+def test_copies_follow_the_same_paths_bit_by_bit(duplicate):
+    problem = wave_problem(1.0)
+    assert duplicate(WAVE).h_max == WAVE.h_max
+    for method in [*methods(problem), ExactWave(problem)]:
+        other = duplicate(method)
+        assert type(other) is type(method)
+        loops = [run_loop(m, max_penetration=0.4, load_steps=2) for m in (method, other)]
+        assert np.array_equal(loops[0].energy, loops[1].energy)
+        assert duplicate(loops[0]).loss == loops[0].loss
+        # a state of one is one of the other
+        state = duplicate(method.follow(method.detached(WAVE.h_max), WAVE.h_max).states[-1])
+        onwards = [m.follow(state, 0.5 * WAVE.h_max).states[-1].energy for m in (method, other)]
+        assert onwards[0] == onwards[1]
