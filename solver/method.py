@@ -193,7 +193,7 @@ class Method(ABC):
     Raises
     ------
     ValueError
-        If adhesion is too weak or too strong for this method to resolve (``adhesion_range``).
+        If adhesion is too weak or too strong for this method to resolve (``resolved_adhesion``).
 
     Notes
     -----
@@ -207,7 +207,7 @@ class Method(ABC):
 
     name: ClassVar[str]
     nodes: int | None = None
-    adhesion_range: ClassVar[tuple[float, float]] = (0.0, math.inf)
+    resolved_adhesion: ClassVar[tuple[float, float]] = (0.0, math.inf)
     """Least and largest γ that the method resolves, over the elastic energy of full contact."""
 
     _built_from: tuple[tuple[Any, ...], dict[str, Any]]
@@ -233,7 +233,7 @@ class Method(ABC):
     def _check_adhesion(cls, problem: Problem) -> None:
         """Refuse a work of adhesion of which no number would come out."""
         gamma, unit = problem.work_of_adhesion, problem.full_contact_energy
-        least, largest = (limit * unit for limit in cls.adhesion_range)
+        least, largest = (limit * unit for limit in cls.resolved_adhesion)
         if gamma == 0 or least <= gamma <= largest:
             return
         advice = "check the units of work_of_adhesion, young and the heights"
@@ -242,8 +242,8 @@ class Method(ABC):
         raise ValueError(
             f"work_of_adhesion is {gamma:g} J/m²: for this profile and E* = "
             f"{problem.half_space.modulus:g} Pa the method '{cls.name}' resolves a loss from "
-            f"{least:.2g} to {largest:.2g} J/m² ({cls.adhesion_range[0]:g} to "
-            f"{cls.adhesion_range[1]:g} times the elastic energy of full contact); {advice}"
+            f"{least:.2g} to {largest:.2g} J/m² ({cls.resolved_adhesion[0]:g} to "
+            f"{cls.resolved_adhesion[1]:g} times the elastic energy of full contact); {advice}"
         )
 
     @abstractmethod

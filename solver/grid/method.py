@@ -94,7 +94,7 @@ class GridMethod(Method):
     name: ClassVar[str] = "grid"
     # Below, the loss is smaller than the errors of the two works whose difference it is; above
     # 1e12, contact lasts to 1e6 h_max and nothing is left of the profile in the gap's opening.
-    adhesion_range: ClassVar[tuple[float, float]] = (1e-8, 1e12)
+    resolved_adhesion: ClassVar[tuple[float, float]] = (1e-8, 1e12)
 
     def __init__(
         self,

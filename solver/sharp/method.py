@@ -115,7 +115,7 @@ class SharpMethod(Method):
     # the energy of full contact at g of it, is no larger than the rounding of the two works whose
     # difference it is, some 1e-11; above, Newton's iteration does not converge, as the profile is
     # too small in the openings to place the last gap.
-    adhesion_range: ClassVar[tuple[float, float]] = (1e-8, 1e10)
+    resolved_adhesion: ClassVar[tuple[float, float]] = (1e-8, 1e10)
 
     def __init__(
         self, problem: Problem, *, accuracy: float = 1e-3, chosen: str | None = None
