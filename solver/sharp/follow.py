@@ -322,7 +322,18 @@ class Follower:
             return None, max(share * min(abs(at - point.at), finest), self.resolution.finest)
         displaced = self._late(before, trace.states[-1], self._displaced(point))
         trace.misplaced += late + max(0.0, displaced - self.resolution.field_share * abs(drop))
+        if after is None and self.states.problem.control.is_load:
+            trace.misplaced += self._closed_early(before, point, abs(at - point.at))
         return after, finest
+
+    def _closed_early(self, before: ContactState, point: Point, way: float) -> float:
+        """Work in J/m² that a loop under a load misses at most, as it is closed short of the fold.
+
+        It is closed at the separation of the last state (:mod:`solver.control`), a ``way`` in d or
+        less before the fold. There s goes like a square root of the distance from the fold, which
+        therefore lies 2 ds/dd times that distance further on.
+        """
+        return abs(before.mean_stress) * 2 * abs(point.slope) * way / self.states.q0
 
     def _displaced(self, point: Point) -> float:
         """Estimate how far (in d) the error of the field displaces the fold next to ``point``.
