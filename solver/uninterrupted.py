@@ -8,6 +8,7 @@ the work ends by itself, at its next call of such a function.
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Callable
 from functools import wraps
@@ -26,6 +27,21 @@ class _Abandoned(BaseException):
 
 class _Worker(threading.Thread):
     abandoned = False
+
+
+def _start(worker: _Worker) -> None:
+    """Start a thread, to which no signal comes that Python handles.
+
+    Meanwhile they wait: :mod:`threading` does not expect a handler's exception there.
+    """
+    handled = {each for each in signal.valid_signals() if callable(signal.getsignal(each))}
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, handled)
+    size = threading.stack_size(_STACK)
+    try:
+        worker.start()
+    finally:
+        threading.stack_size(size)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
 def uninterrupted(function: F) -> F:
@@ -47,10 +63,8 @@ def uninterrupted(function: F) -> F:
                 answers.put((None, error))
 
         worker = _Worker(target=work)
-        before = threading.stack_size(_STACK)
         try:
-            worker.start()
-            threading.stack_size(before)
+            _start(worker)
             result, error = answers.get()
         except BaseException:
             worker.abandoned = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import random
+import signal
 import threading
 import time
 
@@ -15,6 +16,8 @@ from ensemble.run.attempt import GivenUp, Outcome, attempt
 from ensemble.run.dispatch import AHEAD, MOST_AHEAD, Limits, Master, Overdue, work_alone
 from ensemble.run.schedule import Schedule
 from ensemble.run.units import Units
+from solver import compiled as module
+from tools.interrupted import Interrupt
 
 
 class SimulatedRanks:
@@ -315,7 +318,7 @@ def test_a_task_that_hangs_meets_its_time_limit():
 
 @njit
 def _sines(count):
-    """Compiled work that hands arrays back, and runs Python while it does."""
+    """Compiled work that hands arrays back; numba would run Python while it does."""
     out = np.empty(4)
     total = 0.0
     for i in range(count):
@@ -325,7 +328,8 @@ def _sines(count):
 
 
 def test_a_task_in_compiled_code_meets_its_time_limit():
-    """The timer goes off in compiled code; its exception must not come where results are made."""
+    """The timer goes off in compiled code; what its handler raises arrives as it is."""
+    assert module.compiled  # which has results handed back without Python code
     _sines(1)
 
     def compute(task, check):
@@ -334,6 +338,40 @@ def test_a_task_in_compiled_code_meets_its_time_limit():
 
     outcomes, _ = alone(compute, limits=Limits(task_seconds=0.05))
     assert [o.error for o in outcomes] == ["longer than the time limit of 0.05 s"] * 3
+
+
+@pytest.fixture
+def handler():
+    """A handler of SIGALRM that raises what may be taken for a task's failure."""
+
+    def raise_interrupt(number, frame):
+        raise Interrupt
+
+    before = signal.signal(signal.SIGALRM, raise_interrupt)
+    yield
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def test_what_the_handler_of_a_signal_raises_is_no_failure_of_a_task(handler):
+    before = signal.signal(signal.SIGUSR2, signal.getsignal(signal.SIGALRM))
+    try:
+        with pytest.raises(Interrupt):
+            alone(lambda task, check: signal.raise_signal(signal.SIGUSR2))
+    finally:
+        signal.signal(signal.SIGUSR2, before)
+
+
+def test_the_callers_own_timer_goes_on_while_tasks_are_tried(handler):
+    """It goes off in a task, as it would have without; and when it has not, it is still set."""
+    signal.setitimer(signal.ITIMER_REAL, 500, 7)
+    assert len(alone(lambda task, check: task)[0]) == 3
+    left, interval = signal.getitimer(signal.ITIMER_REAL)
+    assert 400 < left <= 500
+    assert interval == 7
+    signal.setitimer(signal.ITIMER_REAL, 0.02)
+    with pytest.raises(Interrupt):
+        alone(lambda task, check: time.sleep(60))
 
 
 def test_a_task_cannot_swallow_the_end_of_its_time():

@@ -29,6 +29,7 @@ from ensemble.trace.pool import Pool
 from ensemble.trace.prepare import Prepared, prepare_trace
 from ensemble.trace.read import Trace
 from tests.support.scenes import HALF_SPACE
+from tools.interrupted import Interrupt, interrupted
 
 ROOT = Path(__file__).parents[2]
 N, LENGTH = 400, 1e-3
@@ -200,6 +201,38 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     failed = [name for name, found in done.items() if isinstance(found, str)]
     assert failed == killed
     assert "ended with code -9" in str(done[killed[0]])
+
+
+@pytest.mark.parametrize("processes", [0, 2])
+def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
+    """In what was raised, though it is of a class that loops fail with; and no process is left."""
+    _, _, plan = small_plan()
+    pool = Pool(plan.jobs, processes=processes)
+
+    def handler(number: int, frame: object) -> None:
+        raise Interrupt
+
+    def watch(pool: Pool) -> None:
+        if processes == 0 or len(pool.running) == processes:
+            os.kill(os.getpid(), signal.SIGALRM)
+
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        with pytest.raises(Interrupt):
+            pool.run(watch, every=0.05)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert len(pool.pids) == processes
+    for pid in pool.pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_a_loop_of_a_trace_that_is_interrupted_has_not_failed() -> None:
+    """Where it runs in this process: its own failures are words, an interrupt is none of them."""
+    trace, cycle, plan = small_plan()
+    ended = {interrupted(lambda: run_plan(trace, cycle, plan), t) for t in (1e-4, 0.1, 0.2, 0.3)}
+    assert ended <= {"raised", "done"}
 
 
 def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:

@@ -195,10 +195,16 @@ def test_a_folder_that_cannot_be_used_is_one_warning(places, monkeypatch, tmp_pa
         assert compile_double() == 1
 
 
-def test_a_damaged_file_is_compiled_anew(places, monkeypatch):
+@pytest.mark.parametrize("damage", ["cut", "one bit"])
+def test_a_damaged_file_is_compiled_anew(places, monkeypatch, damage):
     compile_double()
     (kept,) = (places[1] / "key").iterdir()
-    kept.write_bytes(kept.read_bytes()[:100])
+    content = bytearray(kept.read_bytes())
+    if damage == "cut":
+        del content[100:]
+    else:
+        content[len(content) // 2] ^= 4
+    kept.write_bytes(content)
     use_new_files(monkeypatch)
     assert compile_double() == 1
     assert compile_double() == 0

@@ -21,13 +21,11 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent))
 
 import numpy as np
 
-Work = Callable[[], object]
+from tools.interrupted import interrupted
 
 KINDS = ("strong", "weak", "grid", "first", "compile", "trace", "pool", "campaign")
 OF_ONE_PROCESS_EACH = ("first", "compile")
@@ -44,33 +42,6 @@ LOAD_STEPS = 40
 WAVES = 10  # the longest ones in a period
 AT_ONCE = 50  # interrupts of one process
 LIMIT = 1200.0  # s after which a process is taken for hanging
-
-
-class Interrupt(Exception):
-    """What the handler raises; no other code does."""
-
-
-def interrupted(work: Work, delay: float) -> str:
-    """Interrupt ``work`` after ``delay`` seconds; returns what it ended in."""
-    raised: list[Interrupt] = []
-
-    def handler(number: int, frame: object) -> None:
-        raised.append(Interrupt())
-        raise raised[-1]
-
-    before = signal.signal(signal.SIGALRM, handler)
-    try:
-        signal.setitimer(signal.ITIMER_REAL, delay)
-        work()
-        signal.setitimer(signal.ITIMER_REAL, 0)
-    except BaseException as error:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        if raised and error is raised[0]:
-            return "raised"
-        return f"{type(error).__name__}: {error}"[:200]
-    finally:
-        signal.signal(signal.SIGALRM, before)
-    return "lost" if raised else "done"
 
 
 # ---------------------------------------------------------------------------------- the kinds
@@ -170,9 +141,9 @@ class Traces:
         from solver.profile import self_affine_profile
 
         profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=6, seed=2, h_rms=1e-6)
-        x = 1e-3 / 400 * np.arange(400)
-        noise = 5e-9 * np.random.default_rng(0).standard_normal(400)
-        self._prepared = prepare_trace(Trace(Path("t.txt"), profile.at(x) + noise, 1e-3 / 400))
+        x = np.linspace(0.0, 1e-3, 400, endpoint=False, dtype=np.float64)
+        heights = profile.at(x) + 5e-9 * np.random.default_rng(0).standard_normal(400)
+        self._prepared = prepare_trace(Trace(Path("t.txt"), heights, 1e-3 / 400))
         self._half_space = HalfSpace(young=1e6, poisson=0.5)
         self._processes, self._longest = processes, longest
 
