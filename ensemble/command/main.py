@@ -11,7 +11,7 @@ import importlib
 import os
 import sys
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, WriteError
 from ensemble.run.launch import ONE_THREAD
 
 COMMANDS: dict[str, str] = {
@@ -27,6 +27,7 @@ COMMANDS: dict[str, str] = {
     "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",
 }
 BAD_INPUT = 2
+WRITE_FAILED = 74
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -53,6 +54,9 @@ def main(argv: list[str] | None = None) -> int:
     except InputError as error:
         print(f"adhesis {name}: {error}", file=sys.stderr)
         return BAD_INPUT
+    except WriteError as error:
+        print(f"adhesis {name}: {error}", file=sys.stderr)
+        return WRITE_FAILED
     except BrokenPipeError:
         return 1
     return code

@@ -12,6 +12,7 @@ import numpy as np
 from ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
 from ensemble.trace.pool import Pool, Result, Watch
 from ensemble.trace.prepare import Prepared
+from ensemble.trace.units import counted
 from solver.loop import check_cycle
 from solver.material import HalfSpace
 from solver.problem import Problem
@@ -278,8 +279,8 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     races = answer.main["races"]
     if races:
         found.append(
-            f"{races:.0f} jumps would have ended elsewhere under another rule of descent "
-            f"({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
+            f"{counted(round(races), 'jump')} would have ended elsewhere under another rule of "
+            f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
     return found
 

@@ -38,11 +38,12 @@ def summary(answer: Answer) -> str:
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to Δ/h_max = "
         f"{answer.cycle.max_penetrations[0]:g} with h_max = {length_text(loop['h_max'], 4)}; "
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
-        f"most, {loop['jumps']} jumps, "
+        f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
         "doubts      "
         + ", ".join(f"{name} {_percent(share)}" for name, share in answer.loss.doubts.items())
-        + f" of the loss (standard uncertainties; the interval is {COVERAGE:g} times their sum)",
+        + " of the loss (standard uncertainties; the half-width of the interval is "
+        f"{COVERAGE:g} times the root of the sum of their squares)",
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
     return "\n".join(lines)
