@@ -299,15 +299,16 @@ def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
     if all(value is None for value in norms.values()):
         norms["h_rms"] = _H_RMS
-    return self_affine_profile(
-        args.hurst,
-        period=_PERIOD if args.period is None else args.period,
-        n0=_N0 if args.n0 is None else args.n0,
-        ratio=_RATIO if args.ratio is None else args.ratio,
-        seed=0 if args.seed is None else args.seed,
-        amplitudes=args.amplitudes or "deterministic",
-        **norms,
-    )
+    with np.errstate(over="ignore", invalid="ignore"):  # _check_scales refuses what overflows
+        return self_affine_profile(
+            args.hurst,
+            period=_PERIOD if args.period is None else args.period,
+            n0=_N0 if args.n0 is None else args.n0,
+            ratio=_RATIO if args.ratio is None else args.ratio,
+            seed=0 if args.seed is None else args.seed,
+            amplitudes=args.amplitudes or "deterministic",
+            **norms,
+        )
 
 
 def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:

@@ -87,7 +87,7 @@ def read_column(path: Path, delimiter: str | None = None, decimal: str | None = 
     Raises
     ------
     InputError
-        As :func:`read_table`.
+        As :func:`read_table`, and if a number stands among the lines of the header.
     """
     lines = _lines(path)
     rows = [place for place, line in enumerate(lines) if _looks_like_numbers(line)]
@@ -98,7 +98,14 @@ def read_column(path: Path, delimiter: str | None = None, decimal: str | None = 
         if len(words) > 1:
             lines[rows[0] : rows[0] + 1] = words
             delimiter = "|"  # none is left
-    return _table(path, lines, delimiter, decimal)
+    table = _table(path, lines, delimiter, decimal)
+    for place, line in enumerate(lines[: int(table.lines[0]) - 1]):
+        if _looks_like_numbers(line) and _value(line, table.decimal) is not None:
+            raise InputError(
+                f"line {place + 1} of {path} is {_quoted(line)}, above the numbers that begin on "
+                f"line {table.lines[0]}: mark it with # if it is none of them"
+            )
+    return table
 
 
 def _table(path: Path, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
