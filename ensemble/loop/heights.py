@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ensemble.errors import InputError
+from ensemble.trace.foreign import container
 from ensemble.trace.read import holds_numbers, load_array
 from ensemble.trace.text import Table, read_column
 from ensemble.trace.units import METRES, length_text, parse_units, units_of_header
@@ -57,7 +58,8 @@ def read_heights(
     given = None if unit is None else _unit(unit)
     if not holds_numbers(path):
         raise InputError(
-            f"{path} is neither text nor .npy: --trace reads files of instruments, as adhesis "
+            container(path)
+            or f"{path} is neither text nor .npy: --trace reads files of instruments, as adhesis "
             "trace does"
         )
     if path.suffix.lower() == ".npy":

@@ -54,16 +54,23 @@ def beginning(path: Path) -> bytes:
 
 
 def _refuse(path: Path, begin: bytes) -> None:
-    suffix = path.suffix.lower()
     for magic, (name, program) in _COMPRESSED.items():
         if begin.startswith(magic):
             raise InputError(f"{path} is compressed ({name}): unpack it first ({program} {path})")
     for magic, name in _DOCUMENTS.items():
         if begin.startswith(magic):
             raise InputError(f"{path} is {name}: export the heights as text")
+
+
+def container(path: Path) -> str | None:
+    """Return what to do with a workbook or an archive that is no instrument's file, or None."""
+    with path.open("rb") as stream:
+        begin = stream.read(_BEGIN)
+    suffix = path.suffix.lower()
     if begin.startswith((_ZIP, _COMPOUND)) and suffix in _WORKBOOKS:
-        raise InputError(f"{path} is a workbook: save its columns as text (CSV)")
+        return f"{path} is a workbook: save its columns as text (CSV)"
     if begin.startswith(_ZIP) and suffix == ".npz":
-        raise InputError(f"{path} is an archive of arrays: save the one of the heights as .npy")
+        return f"{path} is an archive of arrays: save the one of the heights as .npy"
     if begin.startswith(_ZIP) and suffix == ".zip":
-        raise InputError(f"{path} is an archive (zip): unpack it first (unzip {path})")
+        return f"{path} is an archive (zip): unpack it first (unzip {path})"
+    return None

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ensemble.errors import InputError
-from ensemble.trace.foreign import beginning
-from ensemble.trace.instrument import HINT, available, read_scan
+from ensemble.trace.foreign import beginning, container
+from ensemble.trace.instrument import HINT, UnknownFormatError, available, read_scan
 from ensemble.trace.text import Table, read_table
 from ensemble.trace.units import (
     METRES,
@@ -141,10 +141,14 @@ def read_trace(
     if not available():
         # Say which of both is missing: the extra, or any sense in the file.
         raise InputError(
-            f"{path} is no text: export the trace as text, or, if it is an instrument's file, "
+            container(path)
+            or f"{path} is no text: export the trace as text, or, if it is an instrument's file, "
             f"install the optional package SurfaceTopography, {HINT}"
         )
-    scan = read_scan(path, row, channel)
+    try:
+        scan = read_scan(path, row, channel)
+    except UnknownFormatError as error:
+        raise InputError(container(path) or str(error)) from None
     heights, step, said = _even(path, scan.positions, scan.heights, None)
     return _checked(Trace(path, heights, step, (scan.said, *said), scan.tip_radius), told=True)
 

@@ -182,7 +182,7 @@ def _looks_like_numbers(line: str) -> bool:
     begin = line.strip()
     if not begin or begin[0] in _COMMENT:
         return False
-    return bool(_FIRST.fullmatch(re.split(r"[;\t |]", begin, maxsplit=1)[0]))
+    return bool(_FIRST.fullmatch(re.split(r"[;\t |]", begin, maxsplit=1)[0].strip('"')))
 
 
 def _form(

@@ -201,9 +201,14 @@ def test_a_pipe_is_written_in_place(tmp_path: Path) -> None:
 
 def test_staged_files_are_moved_together_or_not_at_all(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("old")
-    with pytest.raises(OSError, match="full"), staged_folder(tmp_path) as folder:
-        (folder / "a").write_text("new")
-        raise OSError("full")
+
+    def fail() -> None:
+        with staged_folder(tmp_path) as folder:
+            (folder / "a").write_text("new")
+            raise OSError("full")
+
+    with pytest.raises(OSError, match="full"):
+        fail()
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a", "old")]
     with staged_folder(tmp_path) as folder:
         (folder / "a").write_text("new")
