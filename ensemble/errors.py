@@ -34,6 +34,8 @@ def refusals_of(options: Container[str], **names: str) -> Iterator[None]:
     """
     try:
         yield
+    except InputError:
+        raise
     except (ValueError, NotImplementedError) as error:
         text = " ".join(str(error).split())
         found = re.match(r"(\w+)(?= (is|are|holds|has)\b)", text)

@@ -107,6 +107,8 @@ def check_output_folder(
 def _refusing(option: str, path: Path) -> Iterator[None]:
     try:
         yield
+    except InputError:
+        raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise InputError(
             f"{option} is {path}: it cannot be written ({_reason(error)})"

@@ -44,7 +44,9 @@ def beginning(path: Path) -> bytes:
             raise InputError(f"{path} is a pipe or a device: write its content to a file first")
         with path.open("rb") as stream:
             begin = stream.read(_BEGIN)
-    except (OSError, ValueError) as error:
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot read {path}: {reason}") from None
     if not begin.strip():
