@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -30,7 +31,7 @@ class RankError(InputError):
 
 
 class WriteError(_Printable):
-    """A row could not be written: the disk is full, say. What was written before is sound."""
+    """An output could not be written: the disk is full, say. What was written before is sound."""
 
 
 _of_a_command: ContextVar[bool] = ContextVar("of_a_command", default=False)
@@ -52,11 +53,35 @@ def parameter(name: str) -> str:
 
 
 @contextmanager
-def refused_as_input() -> Iterator[None]:
-    """Raise an InputError where a value is refused by the solver; other errors pass."""
+def refused_as_input(options: Container[str] = (), **names: str) -> Iterator[None]:
+    """Raise what the solver refuses as an InputError; other errors pass.
+
+    Parameters
+    ----------
+    options : container of str
+        Names of a command's options ("work_of_adhesion"); a sentence that begins with one
+        ("work_of_adhesion is -1: …") then begins with the option (--work-of-adhesion).
+    **names : str
+        Option by the word that such a sentence begins with, where they differ.
+
+    Raises
+    ------
+    InputError
+        For a ValueError, a NotImplementedError, or an overflow.
+    """
     try:
         yield
     except InputError:
         raise
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    except (ValueError, NotImplementedError) as error:
+        text = " ".join(str(error).split())
+        found = re.match(r"(\w+)(?= (is|are|holds|has)\b)", text)
+        name = names.get(found[1], found[1]) if found else ""
+        if found and name in options:
+            text = f"{parameter(name)}{text[found.end() :]}"
+        raise InputError(text) from None
+    except OverflowError as error:
+        raise InputError(
+            f"the numbers leave the range of floating point ({error.args[-1]}): lengths are in m, "
+            "stresses in Pa"
+        ) from None

@@ -35,12 +35,25 @@ def load_campaign(path: Path | str) -> Campaign:
         If it cannot be read or breaks a rule; one sentence.
     """
     try:
-        text = Path(path).read_bytes().decode("utf-8")
+        data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
+    return parse_campaign(_decoded(data, str(path)), str(path))
+
+
+def _decoded(data: bytes, source: str) -> str:
+    """Decode the bytes of a campaign file, with or without a UTF-8 mark."""
+    refused = f"{source} is not a campaign file: it is not UTF-8 text"
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in data:
+        kind = "UTF-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "it holds zero bytes"
+        raise InputError(f"{refused} ({kind}), so save it as UTF-8")
+    try:
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not a campaign file: it is not UTF-8 text") from error
-    return parse_campaign(text, str(path))
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{refused} (line {line} holds the byte 0x{data[error.start]:02x}), so save it as UTF-8"
+        ) from error
 
 
 def parse_campaign(text: str, source: str = "campaign") -> Campaign:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ensemble.errors import InputError
+from ensemble.outputs import Writing, check_output_folder, staged_folder
 from ensemble.ticker import tell, ticking
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ EXAMPLES = (
     "adhesis bench --quick",
     "adhesis bench --to out/benchmark --budget 60",
 )
+_FILES = tuple(f"benchmark.{suffix}" for suffix in ("csv", "md", "png", "pdf"))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,10 +64,7 @@ def execute(args: argparse.Namespace) -> int:
 
     if not (math.isfinite(args.budget) and args.budget > 0):
         raise InputError(f"--budget is {args.budget!r}: it must be positive, in seconds")
-    try:
-        args.to.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--to is {str(args.to)!r}: {error.strerror}") from error
+    check_output_folder("--to", args.to, _FILES, {})
     warm_missing(COMPILED_METHODS, tell)  # or the first run of each would do it, silently
     # A file or a pipe has no width of its own; the tables need this one.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
@@ -94,11 +93,14 @@ def execute(args: argparse.Namespace) -> int:
         rows = [growth_cells(line) for line in grown]
         console.print(_table("How the cost grows", GROWTH_COLUMNS, rows))
     compared = ratios(lines)
-    _write_csv(args.to / "benchmark.csv", [*lines, *grown])
     command = "adhesis bench --quick" if args.quick else "adhesis bench"
     text = page(lines, grown, compared, exponents(grown), f"`{command}` on {_machine()}")
-    (args.to / "benchmark.md").write_text(text, encoding="utf-8")
-    _draw(lines, args.to / "benchmark")
+    writing = Writing()
+    with writing.output("the benchmark in", args.to), staged_folder(args.to) as folder:
+        _write_csv(folder / "benchmark.csv", [*lines, *grown])
+        (folder / "benchmark.md").write_text(text, encoding="utf-8")
+        _draw(lines, folder / "benchmark")
+    writing.finish()
     console.print(f"wrote {args.to}/benchmark.csv, benchmark.md, benchmark.png and benchmark.pdf")
     return 0
 

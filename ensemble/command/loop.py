@@ -5,19 +5,18 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ensemble.errors import InputError
+from ensemble.errors import InputError, refused_as_input
 from ensemble.loop.arguments import H_RMS, N0, PERIOD, RATIO
 from ensemble.loop.cycle import Cycle, cycle_of
+from ensemble.loop.heights import closure_warning, read_heights
 from ensemble.loop.record import (
     FieldStates,
-    check_writable,
     loop_summary,
     loops_document,
     path_document,
@@ -25,8 +24,10 @@ from ensemble.loop.record import (
     write_json,
     write_npz,
 )
+from ensemble.outputs import Writing, check_outputs, whole_file
 from ensemble.ticker import tell
 from ensemble.trace.options import (
+    delimiter_of,
     given,
     prepared_of,
     trace_of,
@@ -39,63 +40,64 @@ from solver.material import HalfSpace
 from solver.method import Branch, ContactState, Method, PathError
 from solver.path import PathResult, run_path
 from solver.problem import Problem
-from solver.profile import Array, Profile, profile_from_heights, self_affine_profile
+from solver.profile import Profile, profile_from_heights, self_affine_profile
 from solver.registry import make_method
 from solver.turns import run_loops
 
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
 _SECONDS_BETWEEN_LINES = 5.0
 FIGURE_FORMATS = (".png", ".pdf", ".svg")
+_MATERIAL = {"work_of_adhesion": 0.04, "young": 1e6, "poisson": 0.5}
+# Of every field that is kept, over all its states: three arrays of so many numbers take 1.6 GB.
+_MOST_FIELD_VALUES = 2**26
 
 
 def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
-    with _bad_input():
-        profile = _profile(args)
+    _set_material(args)
+    _check_files(args)
+    with refused_as_input(vars(args)):
+        profile, warnings = _profile(args)
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
         problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control)
         cycle.check(problem)
-    if args.figure is not None and args.figure.suffix.lower() not in FIGURE_FORMATS:
-        raise InputError(
-            f"--figure is {args.figure}: the name must end in {', '.join(FIGURE_FORMATS)}"
-        )
-    files = [path for path in (args.json, args.fields, args.figure) if path is not None]
-    for path in files:
-        check_writable(path)
     penetrations = _field_penetrations(args, cycle)
-    with _bad_input():
+    with refused_as_input(vars(args)):
         method = make_method(
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
+    nodes = _field_nodes(args, method, penetrations) if penetrations else 0
     warm_missing([method.name], _quiet if args.quiet else tell)
-    nodes = _field_nodes(args, method) if penetrations else 0
     picked = FieldStates(method, penetrations)
     try:
         results = _run(args, method, cycle, picked.visit if penetrations else None)
+        fields = picked.collect(nodes) if penetrations else {}
     except PathError as error:
         print(f"adhesis loop: {error}", file=sys.stderr)
         return 1
-    fields = picked.collect(nodes) if penetrations else {}  # everything is there before a file is
-    if isinstance(results, PathResult):
-        document, summary = path_document(results), path_summary(results)
-    else:
-        document, summary = loops_document(results), "\n\n".join(map(loop_summary, results))
+    writing = Writing()
     if args.json is not None:
-        write_json(args.json, document)
+        with writing.output("--json", args.json):
+            write_json(args.json, _document(results, warnings))
     if fields:
-        write_npz(args.fields, fields)
+        with writing.output("--fields", args.fields):
+            write_npz(args.fields, fields)
     if args.figure is not None:
-        from ensemble.loop.figure import draw_loops
-
-        draw_loops(results).savefig(args.figure, dpi=200)
-    print(summary)
-    for path in files:
+        with writing.output("--figure", args.figure):
+            _draw(results, args.figure)
+    loops: tuple[LoopResult, ...] = ()
+    if isinstance(results, PathResult):
+        print(path_summary(results))
+    else:
+        loops = results
+        print("\n\n".join(map(loop_summary, loops)))
+    for path in writing.written:
         print(f"wrote       {path}")
-    loops = [] if isinstance(results, PathResult) else results
-    doubts = list(dict.fromkeys(text for result in loops for text in result.warnings))
+    doubts = list(dict.fromkeys([*warnings, *(text for loop in loops for text in loop.warnings)]))
     for text in doubts:
         print(f"adhesis loop: {text}", file=sys.stderr)
+    writing.finish()
     return 1 if doubts and args.strict else 0
 
 
@@ -131,21 +133,44 @@ def _run(
 # ---------------------------------------------------------------------- input
 
 
-@contextmanager
-def _bad_input() -> Iterator[None]:
-    """Turn the refusals of the solver's constructors into the user's errors; nothing else."""
-    try:
-        yield
-    except (ValueError, NotImplementedError) as error:
-        raise InputError(str(error)) from None
+def _set_material(args: argparse.Namespace) -> None:
+    """Set the material's defaults; with heights of one's own there are none."""
+    missing = [name for name in _MATERIAL if getattr(args, name) is None]
+    if args.heights is not None and missing:
+        options = ", ".join("--" + name.replace("_", "-") for name in missing)
+        verb = "is" if len(missing) == 1 else "are"
+        raise InputError(
+            f"{options} {verb} missing: with --heights the material has to be given "
+            "(--work-of-adhesion in J/m², --young in Pa, --poisson)"
+        )
+    for name in missing:
+        setattr(args, name, _MATERIAL[name])
 
 
-def _profile(args: argparse.Namespace) -> Profile:
-    """Return the profile of the one source that is given."""
+def _check_files(args: argparse.Namespace) -> None:
+    """Refuse output files that cannot be written, or that would destroy an input or each other."""
+    if args.figure is not None and args.figure.suffix.lower() not in FIGURE_FORMATS:
+        raise InputError(
+            f"--figure is {args.figure}: the name must end in {', '.join(FIGURE_FORMATS)}"
+        )
+    if args.fields is not None and args.fields.suffix != ".npz":
+        raise InputError(f"--fields is {args.fields}: the name must end in .npz")
+
+    def named(*names: str) -> dict[str, Path]:
+        paths = {f"--{name}": getattr(args, name) for name in names}
+        return {option: path for option, path in paths.items() if path is not None}
+
+    check_outputs(named("json", "fields", "figure"), named("heights", "trace"))
+
+
+def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
+    """Return the profile of the one source that is given, and what is doubtful about it."""
     if args.trace is None:
+        if _wants_heights(args):
+            return _given_heights(args)
         for option in given(args):
             raise InputError(f"{option} belongs to --trace")
-        return _given_heights(args) if _wants_heights(args) else _self_affine(args)
+        return _self_affine(args), []
     if args.heights is not None or args.hurst is not None:
         raise InputError("give one of --heights, --hurst and --trace: several are given")
     _refuse_options_of_hurst(args, "period")
@@ -153,7 +178,7 @@ def _profile(args: argparse.Namespace) -> Profile:
     print(what_was_read(prepared))
     for warning in prepared.warnings:
         print(f"WARNING     {warning}")
-    return prepared.profile()
+    return prepared.profile(), []
 
 
 def _wants_heights(args: argparse.Namespace) -> bool:
@@ -175,8 +200,15 @@ def _refuse_options_of_hurst(args: argparse.Namespace, *more: str) -> None:
             raise InputError(f"{option} belongs to --hurst: given heights are taken as they are")
 
 
-def _given_heights(args: argparse.Namespace) -> Profile:
-    return profile_from_heights(_read_heights(args.heights), args.period)
+def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
+    for option in given(args):
+        if option not in ("--unit", "--delimiter", "--decimal"):
+            raise InputError(f"{option} belongs to --trace")
+    heights = read_heights(
+        args.heights, unit=args.unit, delimiter=delimiter_of(args), decimal=args.decimal
+    )
+    warning = closure_warning(heights, str(args.heights)) if np.all(np.isfinite(heights)) else None
+    return profile_from_heights(heights, args.period), [warning] if warning else []
 
 
 def _self_affine(args: argparse.Namespace) -> Profile:
@@ -194,41 +226,6 @@ def _self_affine(args: argparse.Namespace) -> Profile:
     )
 
 
-def _read_heights(path: Path) -> Array:
-    """Heights of a .npy (one row) or a .csv (one column, or one row) in m.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as one row of numbers.
-    """
-    if path.suffix not in (".npy", ".csv"):
-        raise InputError(f"heights file {path}: it must be a .npy or a .csv file")
-    table: Any
-    try:
-        if path.suffix == ".npy":
-            table = np.load(path, allow_pickle=False)
-        else:
-            lines = path.read_text(encoding="utf-8").split("\n")
-            rows = [line.split(",") for line in lines if line.strip() and line.strip()[0] != "#"]
-            if len({len(row) for row in rows}) > 1:
-                raise ValueError("its lines differ in length")
-            table = np.array([[float(word) for word in row] for row in rows])
-    except OSError as error:
-        raise InputError(f"cannot read heights file {path}: {error.strerror or error}") from None
-    except (ValueError, EOFError) as error:
-        raise InputError(f"heights file {path} is not a table of numbers: {error}") from None
-    if table.dtype.kind not in "fiu":
-        raise InputError(f"heights file {path} holds {table.dtype}: heights are real numbers")
-    if table.ndim > 2 or (table.ndim == 2 and 1 not in table.shape):
-        shape = " × ".join(str(size) for size in table.shape)
-        raise InputError(
-            f"heights file {path} holds {shape} numbers: it must hold one column (or one row), "
-            "the heights of one period"
-        )
-    return np.asarray(table, dtype=float).reshape(-1)
-
-
 def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
     """Penetrations of the fields; empty if no fields are wanted."""
     if args.fields is None:
@@ -236,8 +233,6 @@ def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
             if getattr(args, name) is not None:
                 raise InputError(f"--{name.replace('_', '-')} needs --fields, where to write them")
         return []
-    if args.fields.suffix != ".npz":
-        raise InputError(f"--fields is {args.fields}: the name must end in .npz")
     if cycle.is_path or len(cycle.turning_points) > 1 or not cycle.control.is_fixed:
         raise InputError(
             "--fields belongs to one loop at fixed separation: give one --max-penetration, and "
@@ -254,17 +249,46 @@ def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
     return list(dict.fromkeys(wanted))
 
 
-def _field_nodes(args: argparse.Namespace, method: Method) -> int:
+def _field_nodes(
+    args: argparse.Namespace, method: Method, penetrations: Sequence[float]
+) -> int:
     """Nodes of the fields: those asked for, else the method's own, else 32 per shortest wave."""
-    if args.field_nodes is None:
-        if method.nodes is not None:
-            return method.nodes
-        return 1 << (32 * method.problem.profile.highest_harmonic - 1).bit_length()
-    with _bad_input():
-        # A method refuses a number of nodes here, not after the loop has been computed.
-        method.problem.profile.heights(args.field_nodes)
-        method.fields(method.detached(method.problem.separation(0.0)), args.field_nodes)
-    return int(args.field_nodes)
+    nodes = args.field_nodes
+    if nodes is None:
+        nodes = method.nodes
+    if nodes is None:
+        nodes = 1 << (32 * method.problem.profile.highest_harmonic - 1).bit_length()
+    states = 2 * len(penetrations)
+    if nodes * states > _MOST_FIELD_VALUES:
+        raise InputError(
+            f"--field-nodes is {nodes}{'' if args.field_nodes else ' by default'}: with the fields "
+            f"of {states} states it must be at most {_MOST_FIELD_VALUES // states}"
+        )
+    if args.field_nodes is not None:
+        with refused_as_input(vars(args), nodes="field_nodes", n="field_nodes"):
+            # A method refuses a number of nodes here, not after the loop has been computed.
+            method.problem.profile.heights(nodes)
+            method.fields(method.detached(method.problem.separation(0.0)), nodes)
+    return int(nodes)
+
+
+# ---------------------------------------------------------------------- output
+
+
+def _document(
+    results: tuple[LoopResult, ...] | PathResult, warnings: Sequence[str]
+) -> dict[str, Any]:
+    if isinstance(results, PathResult):
+        return path_document(results, warnings)
+    return loops_document(results, warnings)
+
+
+def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
+    from ensemble.loop.figure import draw_loops
+
+    figure = draw_loops(results)
+    with whole_file(path) as stream:
+        figure.savefig(stream, format=path.suffix[1:].lower(), dpi=200)
 
 
 # ---------------------------------------------------------------------- progress

@@ -20,7 +20,7 @@ from types import FrameType
 
 from ensemble.command.parser import Parser
 from ensemble.command.streams import OutputError, standard_streams, write_line
-from ensemble.errors import InputError, RankError, naming_options
+from ensemble.errors import InputError, RankError, WriteError, naming_options
 from ensemble.run.launch import ONE_THREAD, hand_over
 from ensemble.run.ranks import launched
 
@@ -100,6 +100,8 @@ def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | Non
         return code, "", None
     except InputError as error:
         return BAD_INPUT, str(error), error
+    except WriteError as error:
+        return WRITE_FAILED, str(error), error
     except OutputError as error:
         return WRITE_FAILED, f"stdout could not be written: {error}", error
     except BrokenPipeError as error:

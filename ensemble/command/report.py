@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ensemble.outputs import check_output_folder
 from ensemble.ticker import ticking
 
 EXAMPLES = (
     "adhesis report paper.h5 --to report",
     "adhesis report paper.h5 --to report --beside fine.h5",
 )
+_TABLES = ("losses", "growth", "jumps", "works", "beside", "slopes")
+_FILES = (*(f"{name}.csv" for name in _TABLES), "curves.nc", "report.md", "report.html")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the report; returns 0."""
+    inputs = {"the command": args.file}
+    inputs |= {f"--beside (number {k})": path for k, path in enumerate(args.beside, 1)}
+    check_output_folder("--to", args.to, _FILES, inputs)
     from ensemble.report.write import write_report
 
     with ticking("adhesis report: tables and figures"):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from pathlib import Path
 
-from ensemble.errors import InputError
-from ensemble.loop.record import check_writable, write_json
+from ensemble.errors import InputError, refused_as_input
+from ensemble.loop.record import write_json
+from ensemble.outputs import Writing, check_output_folder, staged_folder
 from ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from ensemble.trace.options import prepared_of, trace_of, what_was_read
 from ensemble.trace.plan import Plan, clock, make_plan
@@ -17,6 +17,8 @@ from solver.material import HalfSpace
 from solver.registry import METHOD_NAMES
 
 _SECONDS_BETWEEN_LINES = 10.0
+_FIGURES = ("trace.png", "spectrum.png", "loop.png", "cut-off.png", "tables.png")
+_FILES = ("trace.json", "trace.html", "trace.md", *_FIGURES)
 
 
 def execute(args: argparse.Namespace) -> int:
@@ -29,13 +31,14 @@ def execute(args: argparse.Namespace) -> int:
     depths = _numbers(args.max_penetration, "--max-penetration")
     if args.method not in METHOD_NAMES:
         raise InputError(f"method is {args.method!r}: it must be one of {', '.join(METHOD_NAMES)}")
-    prepared = prepared_of(args, trace_of(args, args.file))
-    try:
+    with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
         cycle = make_cycle(half_space, gammas, depths, args.load_steps, args.method, args.accuracy)
+    if args.to is not None:
+        check_output_folder("--to", args.to, _FILES, {"the command": args.file})
+    prepared = prepared_of(args, trace_of(args, args.file))
+    with refused_as_input(vars(args)):
         check(prepared, cycle)
-    except ValueError as error:
-        raise InputError(str(error)) from None
     plan = make_plan(prepared, cycle, quick=args.quick, processes=args.processes)
     print(what_was_read(prepared))
     for warning in prepared.warnings:
@@ -43,7 +46,6 @@ def execute(args: argparse.Namespace) -> int:
     print(plan.said, flush=True)
     if args.plan:
         return 0
-    _make_folder(args.to)
     try:
         answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
     except NoAnswer as error:
@@ -51,10 +53,16 @@ def execute(args: argparse.Namespace) -> int:
         return 1
     from ensemble.trace.page import summary, write_page
 
-    write_json(args.to / "trace.json", document(answer))
-    write_page(answer, args.to)
+    writing = Writing()
+    with writing.output("--to", args.to / "trace.json"):
+        args.to.mkdir(parents=True, exist_ok=True)
+        write_json(args.to / "trace.json", document(answer))
+    with writing.output("--to", args.to / "trace.html"), staged_folder(args.to) as folder:
+        write_page(answer, folder)
     print(summary(answer))
-    print(f"wrote       {args.to / 'trace.html'}, trace.md, trace.json and the figures")
+    if not writing.failures:
+        print(f"wrote       {args.to / 'trace.html'}, trace.md, trace.json and the figures")
+    writing.finish()
     return 0
 
 
@@ -66,14 +74,6 @@ def _numbers(text: str, option: str) -> list[float]:
     if len(set(values)) < len(values):
         raise InputError(f"{option} is {text!r}: it names a value twice")
     return values
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the directory {folder}: {error.strerror or error}") from None
-    check_writable(folder / "trace.json")
 
 
 class _Progress:

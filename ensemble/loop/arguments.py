@@ -23,7 +23,7 @@ EXAMPLES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``adhesis loop``."""
     shape = parser.add_argument_group("profile (--heights, --hurst or --trace)")
-    shape.add_argument("--heights", type=Path, metavar="FILE", help=".npy or .csv: heights in m")
+    shape.add_argument("--heights", type=Path, metavar="FILE", help="text or .npy: heights in m")
     shape.add_argument(
         "--trace", type=Path, metavar="FILE", help="a measured trace: see adhesis trace"
     )
@@ -43,10 +43,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_reading_arguments(parser)
     contact = parser.add_argument_group("contact and cycle")
     contact.add_argument(
-        "--work-of-adhesion", type=float, default=0.04, metavar="G", help="J/m² (default 0.04)"
+        "--work-of-adhesion",
+        type=float,
+        metavar="G",
+        help="J/m² (required with --heights; else default 0.04)",
     )
-    contact.add_argument("--young", type=float, default=1e6, metavar="E", help="Pa (default 1e6)")
-    contact.add_argument("--poisson", type=float, default=0.5, metavar="NU", help="(default 0.5)")
+    contact.add_argument(
+        "--young", type=float, metavar="E", help="Pa (required with --heights; else default 1e6)"
+    )
+    contact.add_argument(
+        "--poisson", type=float, metavar="NU", help="(required with --heights; else default 0.5)"
+    )
     _add_cycle_arguments(contact)
     method = parser.add_argument_group("method")
     method.add_argument(

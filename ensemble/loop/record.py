@@ -1,23 +1,20 @@
 """What ``adhesis loop`` writes: the JSON of a loop, and the fields at chosen penetrations.
 
-Both files appear whole or not at all: they are written beside their place and renamed.
+How files are written is in :mod:`ensemble.outputs`.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
-from ensemble.errors import InputError
+from ensemble.outputs import whole_file
 from ensemble.trace.units import counted
 from solver.jumps import Jump
 from solver.loop_result import LoopResult
@@ -69,16 +66,19 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
     }
 
 
-def loops_document(results: Sequence[LoopResult]) -> dict[str, Any]:
+def loops_document(results: Sequence[LoopResult], warnings: Sequence[str] = ()) -> dict[str, Any]:
     """Return the JSON document of loops with ascending turning points.
 
     That of the last one, and where there are several all of them, in order, as ``turns``.
+    ``warnings`` of the input stand before those of each loop.
     """
     documents = [loop_document(result) for result in results]
+    for document in documents:
+        document["warnings"] = [*warnings, *document["warnings"]]
     return documents[-1] | ({"turns": documents} if len(documents) > 1 else {})
 
 
-def path_document(result: PathResult) -> dict[str, Any]:
+def path_document(result: PathResult, warnings: Sequence[str] = ()) -> dict[str, Any]:
     """Return the JSON document of a path; the keys are those of a loop where they mean the same."""
     details = asdict(result.method)
     columns = {
@@ -96,6 +96,7 @@ def path_document(result: PathResult) -> dict[str, Any]:
         "energy_change": result.energy_change,
         "audit_residual": result.audit_residual,
         "loss_error": result.loss_error,
+        "warnings": list(warnings),
         "minor_loops": [
             asdict(part) | {"audit_residual": part.audit_residual} for part in result.minor_loops
         ],
@@ -163,8 +164,7 @@ def path_summary(result: PathResult) -> str:
         f"path        {way}{', out' if result.ends_out else ''} in {result.load_steps} load steps "
         "to the largest",
         f"work        {result.work:.6g} J/m², of which {result.energy_change:.6g} J/m² are stored",
-        f"audit       {result.loss_from_drops:.6g} J/m² in {counted(len(result.jumps), 'jump')}, "
-        f"residual {result.audit_residual:.2e}",
+        _audit(result),
     ]
     for part in result.minor_loops:
         end = (
@@ -197,15 +197,22 @@ def loop_summary(result: LoopResult) -> str:
             f"largest contact fraction {result.contact_fraction.max():.4g}, "
             f"most patches {result.patches.max()}",
             f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
-            f"audit       {result.loss_from_drops:.6g} J/m² in "
-            f"{counted(len(result.jumps), 'jump')}, residual {result.audit_residual:.2e}",
+            _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "
             f"{counted(result.races, 'jump')} raced, {result.energy_at_stake:.3g} J/m² at stake",
             f"jumps       {kinds}",
-            f"pull-off    mean tension {result.pull_off_stress:.6g} Pa",
+            f"pull-off    mean tension {result.pull_off_stress + 0.0:.6g} Pa",
             f"method      {result.method.name}, {result.seconds:.1f} s",
         )
     )
+
+
+def _audit(result: LoopResult | PathResult) -> str:
+    """The line of the audit; without adhesion there is no loss that a residual could refer to."""
+    drops = f"{result.loss_from_drops:.6g} J/m² in {counted(len(result.jumps), 'jump')}"
+    if result.problem.work_of_adhesion == 0:
+        return f"audit       {drops}; without adhesion nothing is lost"
+    return f"audit       {drops}, residual {result.audit_residual:.2e}"
 
 
 def _turn(result: LoopResult) -> str:
@@ -299,59 +306,14 @@ class FieldStates:
 # ---------------------------------------------------------------------- files
 
 
-def check_writable(path: Path) -> None:
-    """Refuse a path that cannot be written, before any work is done.
-
-    Raises
-    ------
-    InputError
-        If the directory does not exist or takes no new files, or the path is a directory.
-    """
-    if path.is_dir():
-        raise InputError(f"cannot write {path}: it is a directory")
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no directory {path.parent}")
-    try:
-        if _special(path):
-            path.open("ab").close()
-        else:
-            tempfile.TemporaryFile(dir=path.parent).close()
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}") from None
-
-
 def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write ``document`` whole or not at all."""
-    with _whole_file(path) as stream:
+    """Write ``document`` whole or not at all (OSError)."""
+    with whole_file(path) as stream:
         stream.write((json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
 
 
 def write_npz(path: Path, arrays: dict[str, Any]) -> None:
-    """Write ``arrays`` as a compressed .npz, whole or not at all."""
+    """Write ``arrays`` as a compressed .npz, whole or not at all (OSError)."""
     save: Callable[..., None] = np.savez_compressed
-    with _whole_file(path) as stream:
+    with whole_file(path) as stream:
         save(stream, **arrays)
-
-
-@contextmanager
-def _whole_file(path: Path) -> Iterator[IO[bytes]]:
-    if _special(path):
-        with path.open("wb") as stream:
-            yield stream
-        return
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            yield stream
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)  # mkstemp makes files private; results are for sharing
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def _special(path: Path) -> bool:
-    """Whether the path is a device or pipe (/dev/stdout): written in place, not renamed over."""
-    return path.exists() and not path.is_file()

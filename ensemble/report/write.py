@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import IO
 
 from ensemble.aggregate.average import Aggregate, aggregate
-from ensemble.errors import InputError
 from ensemble.foreign import printable
+from ensemble.outputs import Writing, staged_folder
 
 
 def write_report(
@@ -34,15 +34,16 @@ def write_report(
     Raises
     ------
     InputError
-        If there is nothing to report, or the directory cannot be written.
+        If there is nothing to report.
+    WriteError
+        If the directory cannot be written; what was there is left as it was.
     """
     data = aggregate(path, beside)
     directory = Path(directory)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        _write_files(data, directory)
-    except OSError as error:
-        raise InputError(f"{directory} cannot be written: {error.strerror or error}") from error
+    writing = Writing()
+    with writing.output("the report in", directory), staged_folder(directory) as folder:
+        _write_files(data, folder)
+    writing.finish()
     _print_summary(data, directory, stream or sys.stdout)
     return data
 

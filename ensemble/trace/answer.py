@@ -318,7 +318,7 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     races = answer.main["races"]
     if races:
         found.append(
-            f"{counted(int(races), 'jump')} would have ended elsewhere under another rule of "
+            f"{counted(round(races), 'jump')} would have ended elsewhere under another rule of "
             f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
     return found

@@ -23,6 +23,10 @@ from solver.profile import Array
 HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
 
 
+class UnknownFormatError(InputError):
+    """No reader of instrument files gets heights out of the file."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """Positions and heights (NaN: not measured) of an instrument file in m, and what was read."""
@@ -45,9 +49,11 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
 
     Raises
     ------
+    UnknownFormatError
+        If no reader knows the file, or it is damaged.
     InputError
-        If no reader knows the file, it is damaged, it tells no length or unit, it holds a map and
-        no row is chosen, or the chosen channel or row is not there.
+        If it tells no length or unit, it holds a map and no row is chosen, or the chosen channel
+        or row is not there.
     """
     io = _library()
     import warnings
@@ -58,7 +64,7 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
             reader = io.open_topography(str(path))
             channels = list(reader.channels)
         except Exception as error:  # every reader has failures of its own
-            raise InputError(
+            raise UnknownFormatError(
                 f"{path} is no instrument format that can be read: {_one_line(error)}"
             ) from None
         chosen = _channel(path, channels, channel)
@@ -69,7 +75,9 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
         except InputError:
             raise
         except Exception as error:
-            raise InputError(f"{path} cannot be read as heights: {_one_line(error)}") from None
+            raise UnknownFormatError(
+                f"{path} cannot be read as heights: {_one_line(error)}"
+            ) from None
     if topography.unit is None or topography.physical_sizes is None:
         raise InputError(
             f"{path} tells no unit of its lengths: export it as text and give {parameter('unit')}"

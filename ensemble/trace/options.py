@@ -9,6 +9,7 @@ from ensemble.errors import InputError
 from ensemble.foreign import printable
 from ensemble.trace.prepare import Prepared, prepare_trace
 from ensemble.trace.read import Trace, read_trace
+from ensemble.trace.text import DELIMITERS
 from ensemble.trace.units import counted, length_text, parse_length
 
 _NAMES = (
@@ -27,9 +28,6 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
             raise InputError(
                 f"--columns is {args.columns!r}: two whole numbers, as in 1,3"
             ) from None
-    delimiter = {"\\t": "\t", "tab": "\t", "space": " "}.get(args.delimiter, args.delimiter)
-    if delimiter is not None and len(delimiter) != 1:
-        raise InputError(f"--delimiter is {args.delimiter!r}: it must be one sign, or tab")
     return read_trace(
         path,
         unit=args.unit,
@@ -37,9 +35,19 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
         columns=columns,
         row=args.row,
         channel=args.channel,
-        delimiter=delimiter,
+        delimiter=delimiter_of(args),
         decimal=args.decimal,
     )
+
+
+def delimiter_of(args: argparse.Namespace) -> str | None:
+    """Delimiter of a text, as the option names it; None to find it out."""
+    sign: str | None = args.delimiter
+    delimiter = {"\\t": "\t", "tab": "\t", "space": " "}.get(sign, sign) if sign else sign
+    if delimiter is not None and delimiter not in DELIMITERS:
+        known = ", ".join(DELIMITERS.values())
+        raise InputError(f"--delimiter is {sign!r}: it must be one of {known} (; tab , space |)")
+    return delimiter
 
 
 def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:

@@ -43,8 +43,8 @@ def summary(answer: Answer) -> str:
         f"audit {loop['audit_residual']:.0e}",
         "doubts      "
         + ", ".join(f"{name} {_percent(share)}" for name, share in answer.loss.doubts.items())
-        + f" of the loss (standard uncertainties; the interval is {COVERAGE:g} times the "
-        "root of the sum of their squares)",
+        + " of the loss (standard uncertainties; the half-width of the interval is "
+        f"{COVERAGE:g} times the root of the sum of their squares)",
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
     return printable("\n".join(lines))

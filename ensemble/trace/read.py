@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ensemble.errors import InputError, parameter, refused_as_input
-from ensemble.trace.instrument import HINT, available, read_scan
+from ensemble.trace.foreign import beginning, container
+from ensemble.trace.instrument import HINT, UnknownFormatError, available, read_scan
 from ensemble.trace.text import Table, read_table
 from ensemble.trace.units import (
     METRES,
@@ -128,18 +130,14 @@ def read_trace(
             step = checks.real(parameter("step"), step, checks.LENGTH)
         if columns is not None:
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
-    if path.is_dir():
-        raise InputError(f"{path} is a directory: a trace is a file")
-    if not path.exists():
-        raise InputError(f"cannot read {path}: there is no such file")
-    is_text = path.suffix.lower() == ".npy" or _is_text(path)
+    is_text = holds_numbers(path)
     for name, number in ((parameter("row"), row), (parameter("channel"), channel)):
         if is_text and number is not None:
             raise InputError(
                 f"{name} is {number}: {path} holds columns of numbers, no map and no channels "
                 f"({parameter('columns')} chooses columns)"
             )
-    if path.suffix.lower() == ".npy":
+    if is_text and path.suffix.lower() == ".npy":
         return _from_array(path, unit, step)
     if is_text:
         table = read_table(path, delimiter, decimal)
@@ -152,23 +150,28 @@ def read_trace(
     if not available():
         # Say which of both is missing: the extra, or any sense in the file.
         raise InputError(
-            f"{path} is no text: an instrument's file needs the optional package "
-            f"SurfaceTopography, {HINT}"
+            container(path)
+            or f"{path} is no text: export the trace as text, or, if it is an instrument's file, "
+            f"install the optional package SurfaceTopography, {HINT}"
         )
-    scan = read_scan(path, row, channel)
+    try:
+        scan = read_scan(path, row, channel)
+    except UnknownFormatError as error:
+        raise InputError(container(path) or str(error)) from None
     heights, step, said = _even(path, scan.positions, scan.heights, None)
     return _checked(Trace(path, heights, step, (scan.said, *said), scan.tip_radius), told=True)
 
 
-def _is_text(path: Path) -> bool:
-    try:
-        with path.open("rb") as stream:
-            begin = stream.read(4096)
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from None
-    if not begin.strip():
-        raise InputError(f"{path} is empty")
-    if begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
+def holds_numbers(path: Path) -> bool:
+    """Whether a file is a text or a .npy, and no instrument's file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or holds no trace before it is unpacked or exported.
+    """
+    begin, suffix = beginning(path), path.suffix.lower()
+    if suffix == ".npy" or begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return True
     # Text formats of instruments: a header of their own, then numbers that are no two columns.
     if begin[:8] in (b"aISO-1.0", b"aBCR-1.0", b"aISO-2.0") or begin[:7] in (
@@ -176,22 +179,41 @@ def _is_text(path: Path) -> bool:
         b"bISO-1.",
     ):
         return False
-    if path.suffix.lower().lstrip(".") in TEXT:
+    if suffix.lstrip(".") in TEXT:
         return True
     return b"\0" not in begin and not begin.startswith((b"PK\x03\x04", b"\x89HDF", b"CDF"))
 
 
-def _from_array(path: Path, unit: str | None, step: float | None) -> Trace:
+def load_array(path: Path) -> Array:
+    """Load a .npy of real numbers, of one or two dimensions.
+
+    Raises
+    ------
+    InputError
+        If it holds anything else.
+    """
     try:
-        table = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path} is no .npy of numbers: {error}") from None
-    if table.dtype.kind not in "fiu" or table.ndim not in (1, 2):
-        raise InputError(f"{path} holds {table.dtype} of {table.ndim} dimensions: no trace")
+        table: Any = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError, MemoryError, SyntaxError, TypeError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{path} is no .npy of numbers: {reason}") from None
+    if not isinstance(table, np.ndarray):
+        raise InputError(f"{path} is an archive of arrays: save the one of the heights as .npy")
+    if table.dtype.kind not in "fiu" or table.ndim > 2:
+        raise InputError(
+            f"{path} holds {table.dtype} of {table.ndim} dimensions: heights are real numbers in "
+            "one row or column"
+        )
+    with np.errstate(over="ignore"):  # of a longer float; it is refused as not finite
+        return np.asarray(table, dtype=float)
+
+
+def _from_array(path: Path, unit: str | None, step: float | None) -> Trace:
+    table = np.atleast_1d(load_array(path))
     if table.ndim == 2 and 2 in table.shape:
-        columns = np.asarray(table if table.shape[0] == 2 else table.T, dtype=float)
+        columns = table if table.shape[0] == 2 else table.T
     elif table.ndim == 1 or 1 in table.shape:
-        columns = np.asarray(table, dtype=float).reshape(1, -1)
+        columns = table.reshape(1, -1)
     else:
         shape = " × ".join(map(str, table.shape))
         raise InputError(f"{path} holds {shape} numbers: a trace has one column or two")

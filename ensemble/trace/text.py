@@ -12,11 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from ensemble.errors import InputError, parameter
+from ensemble.trace.units import counted
 from solver.profile import Array
 
 MOST_BYTES = 200_000_000
 _ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with
 _SAMPLE = 400  # lines that the form of a file is judged by
+_LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searching more takes long
+_SHOWN = 60  # signs of a line that a message quotes
 
 DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
 _COMMENT = "#%!*"
@@ -75,7 +78,38 @@ def read_table(path: Path, delimiter: str | None = None, decimal: str | None = N
         If the file cannot be read, is no text, holds no columns of numbers, or can be read in two
         ways; the sentence says which line, and which option would settle it.
     """
+    return _table(path, _lines(path), delimiter, decimal)
+
+
+def read_column(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Table:
+    """Read a text of one column, as :func:`read_table` does; its numbers may stand in one row.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_table`, and if a number stands among the lines of the header.
+    """
     lines = _lines(path)
+    rows = [place for place, line in enumerate(lines) if _looks_like_numbers(line)]
+    if len(rows) == 1:
+        row = lines[rows[0]]
+        sign = delimiter or _delimiter(path, [row], decimal)
+        words = _split(row, sign)
+        if len(words) > 1:
+            lines[rows[0] : rows[0] + 1] = words
+            delimiter = "|"  # none is left
+    table = _table(path, lines, delimiter, decimal)
+    for place, line in enumerate(lines[: int(table.lines[0]) - 1]):
+        if _looks_like_numbers(line) and _value(line, table.decimal) is not None:
+            raise InputError(
+                f"line {place + 1} of {path} is {_quoted(line)}, above the numbers that begin on "
+                f"line {table.lines[0]}: mark it with # if it is none of them"
+            )
+    return table
+
+
+def _table(path: Path, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
+    """Find header and columns in the lines of a file."""
     sample = [line for line in lines if _looks_like_numbers(line)]
     if not sample:
         raise InputError(f"{path} holds no line of numbers")
@@ -85,10 +119,15 @@ def read_table(path: Path, delimiter: str | None = None, decimal: str | None = N
     count = Counter(len(row) for row in split if row is not None).most_common(1)[0][0]
     start = _first_row(split, count, decimal)
     if start is None and len(sample) < _ROWS_TO_BEGIN:
-        raise InputError(f"{path} holds {len(sample)} rows of numbers: too few for a trace")
+        raise InputError(
+            f"{path} holds {counted(len(sample), 'row')} of numbers: at least {_ROWS_TO_BEGIN} "
+            "are needed"
+        )
     if start is None:
         raise InputError(f"{path} holds no rows of numbers of one length")
-    header = [line.strip().lstrip(_COMMENT).strip() for line in lines[:start]]
+    header = [
+        line[:_LONGEST_HEADER_LINE].strip().lstrip(_COMMENT).strip() for line in lines[:start]
+    ]
     rows, places = _rows(path, lines, start, count, delimiter, decimal)
     # Of one column, a line of the header is a name as a whole.
     fields = [(line,) if count == 1 else _names(line, delimiter, count) for line in header]
@@ -112,16 +151,27 @@ def _lines(path: Path) -> list[str]:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from None
     if not data.strip():
         raise InputError(f"{path} is empty")
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if data[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
+        text = data.decode("utf-32", errors="replace")
+    elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
     else:
-        if b"\0" in data[:100_000]:
-            raise InputError(f"{path} is neither text nor an instrument format that can be read")
+        if b"\0" in data:
+            raise InputError(
+                f"{path} is neither text nor an instrument format that can be read: it holds zero "
+                "bytes (UTF-16 without a mark is to be saved as UTF-8)"
+            )
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.decode("latin-1")  # one byte a sign: µ and Å are where they should be
     return text.splitlines()
+
+
+def _quoted(line: str) -> str:
+    """A line of the file as a message shows it."""
+    line = line.strip()
+    return repr(line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…")
 
 
 # ---------------------------------------------------------------------- form
@@ -132,7 +182,7 @@ def _looks_like_numbers(line: str) -> bool:
     begin = line.strip()
     if not begin or begin[0] in _COMMENT:
         return False
-    return bool(_FIRST.fullmatch(re.split(r"[;\t |]", begin, maxsplit=1)[0]))
+    return bool(_FIRST.fullmatch(re.split(r"[;\t |]", begin, maxsplit=1)[0].strip('"')))
 
 
 def _form(
@@ -177,7 +227,7 @@ def _delimiter(path: Path, sample: Sequence[str], decimal: str | None) -> str:
         return _one_comma(path, sample)
     if commas == 3:
         raise InputError(
-            f"{path} has rows such as {sample[0].strip()!r}, which can be two numbers or four: "
+            f"{path} has rows such as {_quoted(sample[0])}, which can be two numbers or four: "
             f"give {parameter('decimal')}"
         )
     return ","
@@ -196,7 +246,7 @@ def _one_comma(path: Path, sample: Sequence[str]) -> str:
     if any(len(d) > 1 and d[0] == "0" for d in decimals):
         return " "
     raise InputError(
-        f"{path} has rows such as {sample[0].strip()!r}, which can be one number with a decimal "
+        f"{path} has rows such as {_quoted(sample[0])}, which can be one number with a decimal "
         f"comma or two: give {parameter('decimal')}"
     )
 
@@ -288,7 +338,7 @@ def _rows(
             continue
         if foreign is not None:
             raise InputError(
-                f"line {foreign + 1} of {path} is {lines[foreign].strip()[:60]!r}: within the "
+                f"line {foreign + 1} of {path} is {_quoted(lines[foreign])}: within the "
                 f"numbers every line must hold {count} of them"
             )
         rows.append([float("nan") if v is None else v for v in values])

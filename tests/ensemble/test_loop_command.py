@@ -40,8 +40,11 @@ def run(*words) -> int:
     return main(["loop", *(str(word) for word in words)])
 
 
+MATERIAL = ("--work-of-adhesion", GAMMA, "--young", 1e6, "--poisson", 0.5)
+
+
 def wave_words(path, *more):
-    return ("--heights", path, "--period", PERIOD, "--work-of-adhesion", GAMMA, *more)
+    return ("--heights", path, "--period", PERIOD, *MATERIAL, *more)
 
 
 @pytest.mark.usefixtures("exact_method")
@@ -211,28 +214,28 @@ def no_computing(monkeypatch):
     ("words", "sentence"),
     [
         ((), "give either --heights or --hurst: neither is given"),
-        (("--hurst", 1.0), "hurst is 1.0: it must be a number between 0 and 1"),
-        (("--hurst", -0.2), "hurst is -0.2: it must be a number between"),
-        (("--hurst", "nan"), "hurst is nan: it must be a number between"),
-        ((*OK, "--period", -1e-3), "period is -0.001: it must be a positive number"),
-        ((*OK, "--period", 0), "period is 0.0: it must be a positive number"),
-        ((*OK, "--n0", 0), "n0 is 0: it must be a whole number from 1 to"),
-        ((*OK, "--ratio", -2), "ratio is -2: it must be"),
-        ((*OK, "--seed", -1), "seed is -1: it must be"),
+        (("--hurst", 1.0), "--hurst is 1.0: it must be a number between 0 and 1"),
+        (("--hurst", -0.2), "--hurst is -0.2: it must be a number between"),
+        (("--hurst", "nan"), "--hurst is nan: it must be a number between"),
+        ((*OK, "--period", -1e-3), "--period is -0.001: it must be a positive number"),
+        ((*OK, "--period", 0), "--period is 0.0: it must be a positive number"),
+        ((*OK, "--n0", 0), "--n0 is 0: it must be a whole number from 1 to"),
+        ((*OK, "--ratio", -2), "--ratio is -2: it must be"),
+        ((*OK, "--seed", -1), "--seed is -1: it must be"),
         ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "give exactly one of h_rms, m2 and c0"),
-        ((*OK, "--h-rms=-1e-6"), "h_rms is -1e-06: it must be a positive number"),
-        ((*OK, "--h-rms", 0), "h_rms is 0.0: it must be a positive number"),
-        ((*OK, "--amplitudes", "gauss"), "amplitudes is 'gauss': it must be one of deterministic"),
-        ((*OK, "--work-of-adhesion", -0.01), "work_of_adhesion is -0.01: it must be"),
-        ((*OK, "--work-of-adhesion", "inf"), "work_of_adhesion is inf: it must be 0 or a positive"),
-        ((*OK, "--young", 0), "young is 0.0: it must be a positive number"),
-        ((*OK, "--poisson", 0.6), "poisson is 0.6: it must be a number above -1 and at most 0.5"),
-        ((*OK, "--max-penetration", 1), "max_penetration is 1.0: it must be a number between"),
-        ((*OK, "--max-penetration", 0), "max_penetration is 0.0: it must be a number between"),
-        ((*OK, "--load-steps", 0), "load_steps is 0: it must be a whole number from 1 to 100000"),
-        ((*OK, "--method", "magic"), "method is 'magic': it must be one of grid"),
-        ((*OK, "--accuracy", 0), "accuracy is 0.0: it must be a number of at least 1e-10"),
-        ((*OK, "--nodes-per-wave", 1), "nodes_per_wave is 1: it must be"),
+        ((*OK, "--h-rms=-1e-6"), "--h-rms is -1e-06: it must be a positive number"),
+        ((*OK, "--h-rms", 0), "--h-rms is 0.0: it must be a positive number"),
+        ((*OK, "--amplitudes", "gauss"), "--amplitudes is 'gauss': it must be one of"),
+        ((*OK, "--work-of-adhesion", -0.01), "--work-of-adhesion is -0.01: it must be"),
+        ((*OK, "--work-of-adhesion", "inf"), "--work-of-adhesion is inf: it must be 0 or"),
+        ((*OK, "--young", 0), "--young is 0.0: it must be a positive number"),
+        ((*OK, "--poisson", 0.6), "--poisson is 0.6: it must be a number above -1 and at most 0.5"),
+        ((*OK, "--max-penetration", 1), "--max-penetration is 1.0: it must be a number between"),
+        ((*OK, "--max-penetration", 0), "--max-penetration is 0.0: it must be a number between"),
+        ((*OK, "--load-steps", 0), "--load-steps is 0: it must be a whole number from 1 to 100000"),
+        ((*OK, "--method", "magic"), "--method is 'magic': it must be one of grid"),
+        ((*OK, "--accuracy", 0), "--accuracy is 0.0: it must be a number of at least 1e-10"),
+        ((*OK, "--nodes-per-wave", 1), "--nodes-per-wave is 1: it must be"),
         ((*OK, "--field-penetrations", 0.5), "--field-penetrations needs --fields"),
     ],
 )
@@ -241,19 +244,20 @@ def test_bad_values_are_refused_with_value_and_rule(words, sentence, capsys):
 
 
 @pytest.mark.usefixtures("no_computing")
-def test_grid_too_coarse_for_the_shortest_wave_names_it(capsys):
-    line = refused(capsys, *OK, "--nodes-per-wave", 1)
-    assert "too coarse for the shortest wave" in line
+def test_fields_too_coarse_for_the_shortest_wave_name_it(capsys):
+    line = refused(capsys, *OK, "--nodes-per-wave", 8, "--field-nodes", 9, "--fields", "f.npz")
+    assert line.startswith("9 nodes are too few: the shortest wave has harmonic 1000")
 
 
 @pytest.mark.usefixtures("no_computing")
 def test_heights_take_a_period_and_no_spectrum(wave_file, capsys):
-    assert "--heights needs --period" in refused(capsys, "--heights", wave_file)
-    assert "both are given" in refused(capsys, *OK, "--heights", wave_file, "--period", 1)
+    assert "--heights needs --period" in refused(capsys, "--heights", wave_file, *MATERIAL)
+    words = ("--heights", wave_file, "--period", 1, *MATERIAL)
+    assert "both are given" in refused(capsys, *OK, *words)
     line = refused(capsys, *wave_words(wave_file, "--seed", 4))
     assert line.startswith("--seed belongs to --hurst")
-    line = refused(capsys, "--heights", wave_file, "--period", -1)
-    assert line.startswith("period is -1.0: it must be a positive number")
+    line = refused(capsys, *wave_words(wave_file), "--period", -1)
+    assert line.startswith("--period is -1.0: it must be a positive number")
 
 
 @pytest.mark.usefixtures("no_computing")
@@ -266,19 +270,19 @@ def test_heights_take_a_period_and_no_spectrum(wave_file, capsys):
         ("none.npy", np.empty(0), "heights hold 0 value(s): at least 3 are needed"),
         ("scalar.npy", 1.0, "heights hold 1 value(s): at least 3 are needed"),
         ("flat.npy", [2.0, 2.0, 2.0, 2.0], "the profile is flat"),
-        ("grid.npy", np.ones((4, 4)), "holds 4 × 4 numbers: it must hold one column"),
+        ("grid.npy", np.ones((4, 4)), "holds 4 × 4 numbers: --heights takes one column"),
         ("text.npy", np.array(["a", "b", "c"]), "heights are real numbers"),
         ("complex.npy", np.ones(4) * 1j, "heights are real numbers"),
-        ("object.npy", np.array([{}, 1, 2], dtype=object), "is not a table of numbers"),
-        ("nan.csv", "1\nnan\n2\n3\n", "heights[1] is nan: every height must be a finite"),
-        ("one.csv", "1.0\n", "heights hold 1 value(s): at least 3 are needed"),
-        ("empty.csv", "", "heights hold 0 value(s): at least 3 are needed"),
-        ("two.csv", "0,1\n1,2\n2,1\n3,0\n", "holds 4 × 2 numbers: it must hold one column"),
-        ("words.csv", "height\n1\n2\n", "is not a table of numbers"),
-        ("ragged.csv", "1\n1,2\n3\n", "is not a table of numbers: its lines differ"),
-        ("binary.csv", b"\xff\xfe\x00\x01", "is not a table of numbers"),
-        ("junk.npy", b"junk", "is not a table of numbers"),
-        ("heights.txt", "1\n2\n3\n", "it must be a .npy or a .csv file"),
+        ("object.npy", np.array([{}, 1, 2], dtype=object), "is no .npy of numbers"),
+        ("nan.csv", "1\n2\n3\nnan\n4\n", "has no finite height on line 4: --heights needs every"),
+        ("early.csv", "1\nnan\n2\n3\n4\n", "line 1 of "),
+        ("one.csv", "1.0\n", "holds 1 row of numbers: at least 3 are needed"),
+        ("empty.csv", "", "empty.csv is empty"),
+        ("two.csv", "0,1\n1,2\n2,1\n3,0\n", "holds 4 × 2 numbers: --heights takes one column"),
+        ("words.csv", "a trace\nof words\n", "holds no line of numbers"),
+        ("ragged.csv", "1;2\n1\n3;4;5\n", "holds no rows of numbers of one length"),
+        ("binary.csv", b"\xff\xfe\x00\x01", "holds no line of numbers"),
+        ("junk.npy", b"junk", "is no .npy of numbers"),
     ],
 )
 def test_files_that_are_not_one_period_of_heights_are_refused(
@@ -291,16 +295,16 @@ def test_files_that_are_not_one_period_of_heights_are_refused(
         path.write_text(content)
     else:
         np.save(path, np.asarray(content), allow_pickle=True)
-    assert sentence in refused(capsys, "--heights", path, "--period", 1e-3)
+    assert sentence in refused(capsys, *wave_words(path))
 
 
 @pytest.mark.usefixtures("no_computing")
 def test_a_missing_file_and_unwritable_places_are_refused(wave_file, tmp_path, capsys):
     line = refused(capsys, *wave_words(tmp_path / "no.npy"))
-    assert "no.npy: No such file" in line
+    assert "no.npy: there is no such file" in line
     for place in (tmp_path / "no" / "o.json", tmp_path, "/proc/o.json"):
         line = refused(capsys, *wave_words(wave_file, "--json", place))
-        assert line.startswith(f"cannot write {place}: ")
+        assert line.startswith(f"--json is {place}: ")
     line = refused(capsys, *wave_words(wave_file, "--fields", tmp_path / "no" / "f.npz"))
     assert "there is no directory" in line
     line = refused(capsys, *wave_words(wave_file, "--fields", tmp_path / "f.txt"))

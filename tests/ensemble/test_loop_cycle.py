@@ -73,7 +73,7 @@ def test_a_stiffness_and_a_load(tmp_path, capsys):
         (["--path", "0.5,x"], "must be numbers with commas"),
         (["--path", "0.5", "--max-penetration", "0.5"], "a loop has one of them"),
         (["--max-penetration", "0.5,0.5"], "turning points must differ"),
-        (["--max-penetration", "0.5,1.5"], "max_penetration is 1.5"),
+        (["--max-penetration", "0.5,1.5"], "--max-penetration is 1.5"),
         (["--stiffness", "-1"], "stiffness is -1.0: it must be infinite, 0 or"),
         (["--stiffness", "0"], "needs --max-stress"),
         (["--max-stress", "100"], "belongs to load control"),

@@ -257,14 +257,14 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
         (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
         (["--plan", "--unit", "um", "--tip-radius", "5"], "trusted from 50 µm on (what a tip of"),
         (["--plan", "--unit", "um", "--degree", "9"], "--degree is 9"),
-        (["--plan", "--unit", "um", "--max-penetration", "1.5"], "max_penetration is 1.5"),
+        (["--plan", "--unit", "um", "--max-penetration", "1.5"], "--max-penetration is 1.5"),
         (["--plan", "--unit", "um", "--max-penetration", "deep"], "--max-penetration is 'deep'"),
         (["--plan", "--unit", "um", "--step", "1um"], "--step belongs to heights without"),
         (["--plan", "--unit", "um", "--method", "magic"], "method is 'magic'"),
         (["--unit", "um"], "give --to"),
         (["--plan", "--unit", "um", "--processes", "0"], "--processes is 0"),
-        (["--plan", "--unit", "um", "--young", "-1"], "young is -1"),
-        (["--plan", "--unit", "um", "--work-of-adhesion", "-1"], "work_of_adhesion is -1"),
+        (["--plan", "--unit", "um", "--young", "-1"], "--young is -1"),
+        (["--plan", "--unit", "um", "--work-of-adhesion", "-1"], "--work-of-adhesion is -1"),
     ],
 )
 def test_the_command_refuses_with_one_sentence_and_code_2(

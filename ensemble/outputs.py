@@ -1,0 +1,276 @@
+"""Output files of a command: checked before any work, written whole or not at all.
+
+A command lists its outputs, each with the option that names it, and has them checked before it
+computes. A regular file is written beside its place and renamed; a device or pipe (/dev/stdout) is
+written in place. A failure while writing does not keep the other outputs from being written.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+from ensemble.errors import InputError, WriteError
+
+# Other names of an open descriptor of this process; to rename a file over them would destroy them.
+_DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
+_STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
+
+
+# ---------------------------------------------------------------------- before the work
+
+
+def check_outputs(outputs: Mapping[str, Path], inputs: Mapping[str, Path]) -> None:
+    """Refuse output files that cannot be written, are the same file, or are an input.
+
+    Parameters
+    ----------
+    outputs, inputs : dict
+        Paths by the option that names them.
+
+    Raises
+    ------
+    InputError
+        One sentence with the option and the path.
+    """
+    seen: dict[str, Path] = {}
+    for option, path in outputs.items():
+        with _refusing(option, path):
+            _check_file(option, path)
+            for name, other in inputs.items():
+                if _same_file(path, other):
+                    raise InputError(
+                        f"{option} is {path}, the file that {name} reads: it would be "
+                        "overwritten, so give another file"
+                    )
+            for name, other in seen.items():
+                if _same_file(path, other) and not _is_null(path):
+                    raise InputError(
+                        f"{name} and {option} are both {path}: each output needs a file of its own"
+                    )
+        seen[option] = path
+
+
+def check_output_folder(
+    option: str, folder: Path, names: Iterable[str], inputs: Mapping[str, Path]
+) -> None:
+    """Refuse a folder that cannot be made or written, or in which an input would be overwritten.
+
+    Nothing is made yet.
+
+    Parameters
+    ----------
+    option : str
+        The option that names the folder.
+    folder : Path
+    names : iterable of str
+        Names of the files that are to be written there.
+    inputs : dict
+        Paths of the inputs by the option that names them.
+
+    Raises
+    ------
+    InputError
+        One sentence with the option and the path.
+    """
+    with _refusing(option, folder):
+        place = Path(os.path.abspath(folder))
+        while not os.path.lexists(place) and place.parent != place:
+            _check_name(place)
+            place = place.parent
+        if not place.is_dir():
+            raise InputError(f"{option} is {folder}: {place} is not a directory")
+        tempfile.TemporaryFile(dir=place).close()
+        for name in names:
+            if (folder / name).is_dir():
+                raise InputError(
+                    f"{option} is {folder}: a file {name} is to be written there, "
+                    "and there is a directory of that name"
+                )
+            for source, path in inputs.items():
+                if _same_file(folder / name, path):
+                    raise InputError(
+                        f"{option} is {folder}: {name} would be written there over {path}, the "
+                        f"file that {source} reads, so give another directory"
+                    )
+
+
+@contextmanager
+def _refusing(option: str, path: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise InputError(
+            f"{option} is {path}: it cannot be written ({_reason(error)})"
+        ) from None
+
+
+def _check_file(option: str, path: Path) -> None:
+    if _descriptor(path) is not None:
+        return
+    target = _target(path)
+    if target.is_dir():
+        raise InputError(f"{option} is {path}: it is a directory, not a file to write")
+    if not target.parent.is_dir():
+        raise InputError(f"{option} is {path}: there is no directory {target.parent}")
+    if _in_place(target):
+        if stat.S_ISCHR(target.stat().st_mode):
+            target.open("ab").close()
+        return
+    if target.exists() and not os.access(target, os.W_OK):
+        raise InputError(f"{option} is {path}: the file is write-protected")
+    _check_name(target)
+    tempfile.TemporaryFile(dir=target.parent).close()
+
+
+def _check_name(path: Path) -> None:
+    """Let the system refuse a name that is too long (OSError)."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        path.lstat()
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    """Whether two paths are one file, through links of either kind, or would be."""
+    first, second = _descriptor(one), _descriptor(other)
+    if first is not None or second is not None:
+        return first == second
+    with suppress(OSError):  # one of them is still to be made
+        if os.path.samefile(one, other):
+            return True
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _is_null(path: Path) -> bool:
+    return os.path.realpath(path) == os.devnull
+
+
+# ---------------------------------------------------------------------- writing
+
+
+class Writing:
+    """Outputs that are written one after the other, and which of them failed.
+
+    Attributes
+    ----------
+    written : list of Path
+    failures : list of str
+        One clause for each output that could not be written.
+    """
+
+    def __init__(self) -> None:
+        self.written: list[Path] = []
+        self.failures: list[str] = []
+
+    @contextmanager
+    def output(self, option: str, path: Path) -> Iterator[None]:
+        """Record whether the output that is written inside succeeds; an OSError ends here."""
+        try:
+            yield
+        except OSError as error:
+            self.failures.append(f"{option} {path} could not be written ({_reason(error)})")
+        else:
+            self.written.append(path)
+
+    def finish(self) -> None:
+        """Raise the failures, if there are any.
+
+        Raises
+        ------
+        WriteError
+            One sentence that names every output that is missing.
+        """
+        if self.failures:
+            raise WriteError("; ".join(self.failures))
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[IO[bytes]]:
+    """Open a file to write that appears whole or not at all; devices and pipes in place.
+
+    A link is followed: the file that it points to is replaced.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    descriptor = _descriptor(path)
+    if descriptor is not None:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()  # what was printed before comes first
+        with os.fdopen(os.dup(descriptor), "wb") as file:
+            yield file
+        return
+    target = _target(path)
+    if _in_place(target):
+        with target.open("wb") as file:
+            yield file
+        return
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=".writing-")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+        os.chmod(name, 0o666 & ~_umask())  # mkstemp makes files private; results are for sharing
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def staged_folder(folder: Path) -> Iterator[Path]:
+    """Make a folder and one inside it to write files into, which are then moved to their place.
+
+    If the writing fails, none of the files is moved, and older ones of the same names stay.
+
+    Raises
+    ------
+    OSError
+        If something cannot be made, written or moved.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    staging = Path(tempfile.mkdtemp(dir=folder, prefix=".writing-"))
+    try:
+        yield staging
+        for path in sorted(staging.iterdir()):
+            os.replace(path, folder / path.name)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _umask() -> int:
+    umask = os.umask(0)
+    os.umask(umask)
+    return umask
+
+
+def _target(path: Path) -> Path:
+    """The file that a path leads to through symbolic links."""
+    return Path(os.path.realpath(path))
+
+
+def _in_place(target: Path) -> bool:
+    """Whether a path is a device or pipe, which is written in place and not renamed over."""
+    return target.exists() and not target.is_file()
+
+
+def _descriptor(path: Path) -> int | None:
+    """The descriptor of this process that a path such as /dev/stdout names, or None."""
+    found = _DESCRIPTOR.fullmatch(os.path.abspath(path))
+    if found is None:
+        return None
+    return _STANDARD[found[1]] if found[1] else int(found[2] or found[3])
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__

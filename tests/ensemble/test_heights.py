@@ -1,0 +1,368 @@
+"""The heights of one period: read as traces are, and warned of where the ends do not meet."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ensemble.command.loop as loop_command
+from ensemble.campaign.file import load_campaign
+from ensemble.command.main import main
+from ensemble.errors import InputError
+from ensemble.loop.heights import closure_warning, read_heights
+from ensemble.trace.read import read_trace
+from solver.profile import Array, self_affine_profile, single_wave
+from solver.references.exact_wave import ExactWave
+from solver.references.single_wave import SingleWave
+from tests.support.campaign_support import campaign_text
+
+N = 16
+SINGLE = single_wave(1e-9, 1e-3)
+WAVE = 1e-9 * np.cos(2 * np.pi * np.arange(N) / N)
+GAMMA = SingleWave.with_alpha(0.2, 1e-9, 1e-3, 1e6 / 0.75).work_of_adhesion
+CONTACT = ("--work-of-adhesion", GAMMA, "--young", 1e6, "--poisson", 0.5)
+
+# ---------------------------------------------------------------------- reading
+
+NM = [f"{1e9 * h:.6f}" for h in WAVE]
+METRES = [repr(float(h)) for h in WAVE]
+COMMAS = [h.replace(".", ",") for h in NM]
+
+TEXTS: dict[str, tuple[str, bytes, dict[str, str]]] = {
+    "metres": ("a.csv", "\n".join(METRES).encode(), {}),
+    "another suffix": ("a.txt", "\n".join(METRES).encode(), {}),
+    "no suffix": ("a", "\n".join(METRES).encode(), {}),
+    "a UTF-8 mark": ("a.csv", "\n".join(METRES).encode("utf-8-sig"), {}),
+    "a header without a unit": ("a.csv", "\n".join(["height", *METRES]).encode(), {}),
+    "a comment": ("a.csv", "\n".join(["# one period (in m)", *METRES]).encode(), {}),
+    "a header with a unit": ("a.csv", "\n".join(["z (nm)", *NM]).encode(), {}),
+    "decimal commas": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode(), {}),
+    "Latin-1": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode("latin-1"), {}),
+    "UTF-16": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode("utf-16"), {}),
+    "UTF-32": ("a.csv", "\n".join(["Höhe [nm]", *COMMAS]).encode("utf-32"), {}),
+    "CR LF": ("a.csv", "\r\n".join(["z (nm)", *NM, ""]).encode(), {}),
+    "CR": ("a.csv", "\r".join(["z (nm)", *NM, ""]).encode(), {}),
+    "a unit by option": ("a.csv", "\n".join(NM).encode(), {"unit": "nm"}),
+    "unit twice": ("a.csv", "\n".join(["z (nm)", *NM]).encode(), {"unit": "nm"}),
+    "one row": ("a.csv", ",".join(METRES).encode(), {}),
+    "one row, spaces": ("a.csv", " ".join(METRES).encode(), {}),
+    "one row, decimal commas": ("a.csv", ("z (nm)\n" + ";".join(COMMAS)).encode(), {}),
+    "quoted": ("a.csv", "\n".join(['"z (nm)"', *(f'"{h}"' for h in NM)]).encode(), {}),
+    "a long header": ("a.csv", "\n".join(["x" * 300_000, *METRES]).encode(), {}),
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_every_usual_text_gives_the_same_heights(kind: str, tmp_path: Path) -> None:
+    name, data, options = TEXTS[kind]
+    path = tmp_path / name
+    path.write_bytes(data)
+    np.testing.assert_allclose(read_heights(path, **options), WAVE, rtol=0, atol=2e-15)
+
+
+@pytest.mark.parametrize("header", ["z (µm)", "z (μm)", "z (um)", "z / µm", "Height in microns"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_micrometres_are_recognised_in_every_encoding(
+    header: str, encoding: str, tmp_path: Path
+) -> None:
+    if encoding == "latin-1" and "μ" in header:
+        pytest.skip("Latin-1 has no Greek letters")
+    path = tmp_path / "a.csv"
+    path.write_bytes("\n".join([header, *(f"{1e6 * h:.9f}" for h in WAVE)]).encode(encoding))
+    np.testing.assert_allclose(read_heights(path), WAVE, rtol=0, atol=2e-15)
+
+
+def test_an_array_is_read_in_metres_or_the_unit_given(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", 1e9 * WAVE[:, None])
+    np.testing.assert_allclose(read_heights(tmp_path / "a.npy", unit="nm"), WAVE, rtol=1e-12)
+    np.save(tmp_path / "b.npy", WAVE)
+    assert np.array_equal(read_heights(tmp_path / "b.npy"), WAVE)
+
+
+def archive(name: str) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as file:
+        file.writestr(name, "1")
+    return stream.getvalue()
+
+
+def saved(*arrays: Array) -> bytes:
+    stream = io.BytesIO()
+    np.savez(stream, *arrays)
+    return stream.getvalue()
+
+
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
+# What neither --heights nor adhesis trace takes: name, content, sentence.
+FOREIGN: dict[str, tuple[str, bytes, str]] = {
+    "gzip": ("x.csv.gz", gzip.compress(b"1\n2\n3\n"), r"compressed \(gzip\): .* \(gunzip .*gz\)"),
+    "gzip by content": ("x.csv", gzip.compress(b"1\n2\n3\n"), r"compressed \(gzip\)"),
+    "bzip2": ("x.bz2", b"BZh91AY&SY", r"compressed \(bzip2\)"),
+    "xz": ("x.xz", b"\xfd7zXZ\0\0", r"compressed \(xz\): unpack it first \(unxz"),
+    "zip": ("x.zip", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
+    "xlsx": ("x.xlsx", archive("xl/workbook.xml"), r"is a workbook: save its columns as text"),
+    "xls": ("x.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "is a workbook"),
+    "npz": ("x.npz", saved(WAVE), r"archive of arrays: save the one of the heights as \.npy"),
+    "npz as npy": ("x.npy", saved(WAVE), "archive of arrays"),
+    "pdf": ("x.pdf", b"%PDF-1.7\n", "is a PDF: export the heights as text"),
+    "png": ("x.png", PNG, r"is a picture \(PNG\)"),
+    "png as csv": ("x.csv", PNG, r"is a picture \(PNG\)"),
+    "jpeg": ("x.jpg", b"\xff\xd8\xff\xe0" + bytes(40), r"is a picture \(JPEG\)"),
+    "empty": ("x.csv", b"", "is empty"),
+    "blank": ("x.csv", b" \n\n", "is empty"),
+    "binary": ("x.csv", bytes(range(256)) * 9, "neither text nor an instrument"),
+    "zero bytes": ("x.csv", b"1\n2\n3\n" * 9000 + b"\0", "it holds zero bytes"),
+    "UTF-16 without a mark": ("x.csv", "1\n2\n3".encode("utf-16-le"), "zero bytes.*UTF-16 with"),
+    "words": ("x.csv", b"a trace\nof words\n", "holds no line of numbers"),
+    "one long line": ("x.csv", b"y" * 2_000_000, "holds no line of numbers"),
+    "ambiguous and long": ("x.csv", b"1,2,3,4\n" + b"1" * 999 + b",2,3,4\n" * 9, r"give --decimal"),
+    "no array": ("x.npy", b"junk", r"is no \.npy of numbers"),
+    "half an array": ("x.npy", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', '", r"is no \.npy"),
+}
+
+
+@pytest.mark.parametrize("read", [read_heights, read_trace], ids=["heights", "trace"])
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_foreign_files_are_refused_in_one_short_sentence(
+    kind: str, read: Callable[[Path], object], tmp_path: Path
+) -> None:
+    name, data, words = FOREIGN[kind]
+    path = tmp_path / name
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=words) as refusal:
+        read(path)
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 300 + len(str(path))
+
+
+@pytest.mark.parametrize("read", [read_heights, read_trace], ids=["heights", "trace"])
+def test_what_is_no_readable_file_is_refused(
+    read: Callable[[Path], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    for name, words in (
+        ("none.csv", "there is no such file"),
+        (".", "is a directory"),
+        ("fifo", "is a pipe or a device: write its content to a file first"),
+        (300 * "x", "File name too long"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read(tmp_path / name)
+    path = tmp_path / "a.csv"
+    path.write_text("1")
+
+    def refuse(self: Path, *_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied", str(self))  # root may read everything
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(InputError, match=r"cannot read .*a\.csv: Permission denied"):
+        read(path)
+
+
+DOUBTFUL: dict[str, tuple[list[str], dict[str, str], str]] = {
+    "a unit that was damaged": (["z [æm]", *METRES], {}, r"'\[æm\]', from which the unit .*--unit"),
+    "another unit": (["z [pm]", *METRES], {}, "from which the unit of the heights is not clear"),
+    "header against option": (["z [µm]", *NM], {"unit": "nm"}, "--unit is nm and the header"),
+    "two units": (METRES, {"unit": "mm,um"}, "--unit is 'mm,um': with --heights it is one unit"),
+    "unknown unit": (METRES, {"unit": "furlong"}, "'furlong' is no unit of length"),
+    "positions": ([f"{k} {h}" for k, h in enumerate(METRES)], {}, "holds 16 × 2 numbers: --hei"),
+    "nan": ([*METRES[:5], "nan", *METRES[5:]], {}, "has no finite height on line 6: --heights"),
+    "inf": ([*METRES[:5], "-inf", *METRES[5:]], {}, "has no finite height on line 6"),
+    "overflow": ([*METRES[:5], "1e400", *METRES[5:]], {}, "has no finite height on line 6"),
+    "an empty line": ([*METRES[:5], "", *METRES[5:]], {}, "has no finite height on line 6"),
+    "nan at the beginning": (["1", "nan", *METRES], {}, "line 1 of .* is '1', above the numbers"),
+    "words within": ([*METRES[:5], "pause", *METRES[5:]], {}, "line 6 of .* is 'pause'"),
+    "two rows": (METRES[:2], {}, "holds 2 rows of numbers: at least 3 are needed"),
+}
+
+
+@pytest.mark.parametrize("kind", DOUBTFUL)
+def test_doubtful_heights_are_refused(kind: str, tmp_path: Path) -> None:
+    lines, options, words = DOUBTFUL[kind]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines))
+    with pytest.raises(InputError, match=words):
+        read_heights(path, **options)
+
+
+# ---------------------------------------------------------------------- closure
+
+
+def rough(seed: int, n0: int) -> Array:
+    """A self-affine profile of 801 points; of one period for n0 = 1, else a part of it."""
+    profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=20, seed=seed, h_rms=1e-6)
+    return profile.heights(800 * n0)[:800]
+
+
+X = np.arange(200) / 200
+PERIODIC: dict[str, Array] = {
+    "self-affine": rough(1, 1),
+    "sine": np.sin(2 * np.pi * X),
+    "four points of a wave": np.array([0.0, 1.0, 0.0, -1.0]),
+    "three points": np.array([0.0, 1.0, 2.0]),
+    "five points": np.array([0.0, 1.0, 2.0, 3.0, 4.0]),
+    "cylinders": -((X - 0.5) ** 2),
+    "cylinders, from crest to crest": -(np.minimum(X, 1 - X) ** 2),
+    "saw of one tooth": X,
+    "saw of one tooth, from its middle": (X + 0.5) % 1,
+    "saw of two teeth": (2 * X) % 1,
+    "steps": (X < 0.5).astype(float),
+    "white noise": np.random.default_rng(0).standard_normal(300),
+    "one spike": np.eye(50)[7],
+    "flat": np.ones(20),
+}
+RNG = np.random.default_rng(3)
+CUT: dict[str, Array] = {
+    "tilted": rough(1, 1) + 20e-6 * X.repeat(4),
+    "tilted and noisy": rough(1, 1) + 2e-5 * X.repeat(4) + 5e-9 * RNG.standard_normal(800),
+    "part of a profile": rough(1, 4),
+    "with a speck of dust": rough(1, 1) + 2e-5 * X.repeat(4) + 2e-5 * np.eye(800)[300],
+}
+
+
+@pytest.mark.parametrize("kind", PERIODIC)
+def test_a_period_is_not_warned_of(kind: str) -> None:
+    assert closure_warning(PERIODIC[kind], "it") is None
+
+
+@pytest.mark.parametrize("kind", CUT)
+def test_ends_that_do_not_meet_are_warned_of(kind: str) -> None:
+    sentence = closure_warning(CUT[kind], "it.csv")
+    assert sentence is not None
+    assert sentence.startswith("the ends of it.csv do not meet: from its last height")
+    assert "adhesis trace" in sentence
+
+
+def test_no_shift_of_a_periodic_profile_is_warned_of() -> None:
+    """The warning compares steps, so that it must not depend on where a period begins."""
+    for seed in range(20):
+        heights = rough(seed, 1)
+        assert not any(closure_warning(np.roll(heights, k), "it") for k in range(0, 800, 37))
+
+
+@pytest.mark.parametrize("path", [(), ("--path", "0.5,0.2,0.4,out")], ids=["loop", "path"])
+def test_the_warning_goes_to_stderr_json_and_exit_code(
+    path: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    # The method is of a single wave: only the heights that are read are tilted.
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
+    monkeypatch.setattr(loop_command, "profile_from_heights", lambda heights, period: SINGLE)
+    Path("a.csv").write_text("\n".join(repr(float(h)) for h in CUT["tilted"]))
+    Path("b.csv").write_text("\n".join(METRES))
+    words = (*CONTACT, "--period", 1e-3, "--load-steps", 2, "--json", "o.json", "--quiet", *path)
+
+    def run(*more: object) -> tuple[int, str]:
+        code = main(["loop", *map(str, (*words, *more))])
+        return code, capsys.readouterr().err
+
+    code, told = run("--heights", "a.csv")
+    (sentence,) = told.splitlines()
+    assert code == 0
+    assert sentence.startswith("adhesis loop: the ends of a.csv do not meet")
+    data = json.loads(Path("o.json").read_text())
+    assert data["warnings"] == [sentence.removeprefix("adhesis loop: ")]
+    assert run("--heights", "a.csv", "--strict") == (1, told)
+    assert run("--heights", "b.csv", "--strict") == (0, "")
+    assert json.loads(Path("o.json").read_text())["warnings"] == []
+
+
+# ---------------------------------------------------------------------- material and bounds
+
+H = ("--heights", "a.csv", "--period", 1e-3)
+S = ("--hurst", 0.8)
+OPTIONS: dict[str, tuple[tuple[object, ...], str]] = {
+    "no material": (
+        H,
+        "--work-of-adhesion, --young, --poisson are missing: with --heights the material has to "
+        "be given",
+    ),
+    "no ratio of Poisson": ((*H, *CONTACT[:4]), "--poisson is missing: with --heights"),
+    "a step": ((*H, *CONTACT, "--step", "1um"), "--step belongs to --trace"),
+    "a degree": ((*H, *CONTACT, "--degree", 2), "--degree belongs to --trace"),
+    "a unit of a spectrum": ((*S, "--unit", "um"), "--unit belongs to --trace"),
+    "a long period": ((*S, "--period", 1e300), "--period is 1e+300: "),
+    "a short period": ((*S, "--period", 1e-300), "--period is 1e-300: "),
+    "many load steps": (
+        (*S, "--load-steps", 10**9),
+        "--load-steps is 1000000000: it must be a whole number",
+    ),
+    "many nodes": (
+        (*S, "--nodes-per-wave", 10**8),
+        "--nodes-per-wave is 100000000: it must be a whole number",
+    ),
+    "many waves": ((*S, "--n0", 10**6), "n0 · ratio is 100000000: at most 100000 waves"),
+    "many digits": ((*S, "--ratio", 10**400), "--ratio is 1000"),
+    "accuracy": ((*S, "--accuracy", 0), "--accuracy is 0.0: it must"),
+    "Poisson's ratio": ((*S, "--poisson", 0.7), "--poisson is 0.7: it must be"),
+    "adhesion": ((*S, "--work-of-adhesion", "nan"), "--work-of-adhesion is nan: it must be"),
+    "turning point": ((*S, "--max-penetration", 2), "--max-penetration is 2.0: it must lie"),
+    "a delimiter": ((*H, *CONTACT, "--delimiter", ":"), "--delimiter is ':': it must be one of"),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", OPTIONS)
+def test_options_are_refused_by_name(
+    kind: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def start(*_: object, **__: object) -> None:
+        raise AssertionError("bad input reached the computation")
+
+    monkeypatch.setattr(loop_command, "run_loop", start)
+    monkeypatch.chdir(tmp_path)
+    Path("a.csv").write_text("\n".join(METRES))
+    words, sentence = OPTIONS[kind]
+    assert main(["loop", *map(str, words)]) == 2
+    text = capsys.readouterr()
+    assert text.out == ""
+    (line,) = text.err.splitlines()
+    assert line.startswith(f"adhesis loop: {sentence}")
+
+
+def test_trace_has_the_bounds_of_a_campaign(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["trace", "none.csv", *map(str, CONTACT), "--plan"]
+    assert main([*words, "--load-steps", "1000000000"]) == 2
+    assert "--load-steps is 1000000000: it must be a whole number" in capsys.readouterr().err
+
+
+# ---------------------------------------------------------------------- campaign files
+
+
+def test_a_campaign_may_have_a_utf_8_mark(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_bytes(campaign_text().encode("utf-8-sig"))
+    assert load_campaign(path).text == campaign_text()
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (campaign_text().encode("utf-16"), "it is not UTF-8 text (UTF-16), so save it as UTF-8"),
+        (campaign_text().encode("utf-16-le"), "it is not UTF-8 text (it holds zero bytes), so"),
+        (b"# a\n# \xe4\n", "it is not UTF-8 text (line 2 holds the byte 0xe4), so save it as"),
+        (b"\x89PNG\r\n\x1a\n\0\0", "it is not UTF-8 text (it holds zero bytes)"),
+    ],
+)
+def test_a_campaign_in_another_encoding_is_refused(
+    data: bytes, reason: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "c.toml"
+    path.write_bytes(data)
+    with pytest.raises(InputError) as refusal:
+        load_campaign(path)
+    assert str(refusal.value).startswith(f"{path} is not a campaign file: {reason}")

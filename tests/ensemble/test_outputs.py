@@ -1,0 +1,280 @@
+"""Outputs of commands: refused before any work where they would destroy something, else whole."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ensemble.command.bench as bench_command
+import ensemble.command.loop as loop_command
+import ensemble.command.trace as trace_command
+from ensemble.command.main import main
+from ensemble.errors import InputError
+from ensemble.loop.record import write_json
+from ensemble.outputs import check_outputs, staged_folder, whole_file
+from solver.references.exact_wave import ExactWave
+from solver.references.single_wave import SingleWave
+from tests.support.synthetic_results import campaign, rows, write
+
+PERIOD, AMPLITUDE = 1e-3, 1e-9
+GAMMA = SingleWave.with_alpha(0.2, AMPLITUDE, PERIOD, 1e6 / 0.75).work_of_adhesion
+HEIGHTS = AMPLITUDE * np.cos(2 * np.pi * np.arange(16) / 16)
+CONTACT = ("--work-of-adhesion", GAMMA, "--young", 1e6, "--poisson", 0.5)
+LOOP = (*("--heights", "wave.csv", "--period", PERIOD), *CONTACT, "--load-steps", 2, "--quiet")
+
+Ask = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def ask(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Ask:
+    """Run a command in a folder that holds wave.csv; gives exit code, output and last error."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
+    Path("wave.csv").write_text("\n".join(map(repr, HEIGHTS.tolist())))
+
+    def run(*words: object) -> tuple[int, str, str]:
+        code = main([str(word) for word in words])
+        text = capsys.readouterr()
+        return code, text.out, text.err
+
+    return run
+
+
+def no_work(*_: object, **__: object) -> None:
+    raise AssertionError("the work began before the outputs were checked")
+
+
+@pytest.fixture
+def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("run_loop", "run_loops", "run_path"):
+        monkeypatch.setattr(loop_command, name, no_work)
+    monkeypatch.setattr(trace_command, "run_plan", no_work)
+    monkeypatch.setattr(bench_command, "benchmark", no_work)
+    monkeypatch.setattr("ensemble.report.write.write_report", no_work)
+
+
+# ---------------------------------------------------------------------- adhesis loop
+
+HOSTILE: dict[str, tuple[tuple[str, ...], str]] = {
+    "the input": (
+        ("--json", "wave.csv"),
+        "--json is wave.csv, the file that --heights reads: it would be overwritten, so give "
+        "another file",
+    ),
+    "the input by another way": (("--json", "sub/../wave.csv"), "the file that --heights reads"),
+    "the input through a symlink": (("--json", "soft.csv"), "the file that --heights reads"),
+    "the input through a hard link": (("--json", "hard.csv"), "the file that --heights reads"),
+    "one file twice": (
+        ("--json", "new.png", "--figure", "new.png"),
+        "--json and --figure are both new.png: each output needs a file of its own",
+    ),
+    "one file by two ways": (
+        ("--json", "new.npz", "--fields", "./sub/../new.npz"),
+        "--json and --fields are both",
+    ),
+    "one file through a dangling link": (
+        ("--json", "there.json", "--figure", "there.png"),
+        "--json and --figure are both there.png",
+    ),
+    "a directory": (("--json", "sub"), "--json is sub: it is a directory"),
+    "nothing": (("--json", ""), "--json is .: it is a directory"),
+    "no directory": (("--fields", "no/f.npz"), "--fields is no/f.npz: there is no directory"),
+    "a file for a directory": (("--json", "wave.csv/o.json"), "there is no directory"),
+    "unwritable": (("--figure", "/proc/f.png"), "--figure is /proc/f.png: it cannot be written"),
+    "a name too long": (("--json", 300 * "x"), "it cannot be written (File name too long)"),
+    "a zero byte": (("--json", "a\0b"), "it cannot be written"),
+    "no figure": (("--figure", "f.txt"), "--figure is f.txt: the name must end in .png"),
+    "nodes beyond memory": (
+        ("--fields", "f.npz", "--field-nodes", str(10**12)),
+        "--field-nodes is 1000000000000: with the fields of 8 states it must be at most 8388608",
+    ),
+}
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_loop_refuses_outputs_before_any_work(kind: str, ask: Ask, tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    os.link("wave.csv", "hard.csv")
+    Path("soft.csv").symlink_to("wave.csv")
+    Path("there.json").symlink_to("there.png")
+    before = {path.name for path in tmp_path.iterdir()}, Path("wave.csv").read_bytes()
+    words, sentence = HOSTILE[kind]
+    code, out, error = ask("loop", *LOOP, *words)
+    assert (code, out) == (2, "")
+    (line,) = error.splitlines()
+    assert sentence in line
+    assert ({path.name for path in tmp_path.iterdir()}, Path("wave.csv").read_bytes()) == before
+
+
+@pytest.mark.usefixtures("no_loop")
+def test_loop_refuses_to_write_over_its_trace(ask: Ask) -> None:
+    code, _, error = ask("loop", "--trace", "wave.csv", "--json", "wave.csv")
+    assert (code, "the file that --trace reads" in error) == (2, True)
+
+
+def test_a_write_protected_file_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "o.json"
+    path.write_text("old")
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everything
+    with pytest.raises(InputError, match=r"o\.json: the file is write-protected"):
+        check_outputs({"--json": path}, {})
+
+
+def test_a_full_disk_costs_one_output_and_neither_the_others_nor_the_loss(ask: Ask) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("needs /dev/full")
+    words = ("--json", "/dev/full", "--fields", "f.npz", "--figure", "f.svg")
+    code, out, error = ask("loop", *LOOP, *words)
+    assert code == 74
+    assert error.splitlines()[-1] == (
+        "adhesis loop: --json /dev/full could not be written (No space left on device)"
+    )
+    assert "\nloss  " in out
+    assert [line for line in out.splitlines() if line.startswith("wrote")] == [
+        "wrote       f.npz",
+        "wrote       f.svg",
+    ]
+    assert np.load("f.npz")["stress"].shape[0] == 8
+    assert "</svg>" in Path("f.svg").read_text()
+
+
+def test_a_failure_in_the_middle_leaves_the_old_file(
+    ask: Ask, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    Path("o.json").write_text("old")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    code, out, error = ask("loop", *LOOP, "--json", "o.json", "--figure", "f.png")
+    assert code == 74
+    assert "--json o.json could not be written" in error
+    assert "--figure f.png could not be written" in error
+    assert len(error.splitlines()) == 1
+    assert "\nloss  " in out
+    assert Path("o.json").read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["o.json", "wave.csv"]
+
+
+def test_links_stay_and_what_they_point_to_is_replaced(ask: Ask) -> None:
+    Path("real.json").write_text("old")
+    Path("link.json").symlink_to("real.json")
+    assert ask("loop", *LOOP, "--json", "link.json")[0] == 0
+    assert Path("link.json").is_symlink()
+    assert json.loads(Path("real.json").read_text())["loss"] > 0
+
+
+def test_standard_output_is_a_file_of_its_own(capfd: pytest.CaptureFixture[str]) -> None:
+    devices = {"--json": Path("/dev/stdout"), "--fields": Path("/dev/fd/1")}
+    with pytest.raises(InputError, match="--json and --fields are both"):
+        check_outputs(devices, {})
+    check_outputs({"--json": Path("/dev/null"), "--fields": Path("/dev/null")}, {})
+    print("before")
+    write_json(Path("/dev/stdout"), {"a": 1})
+    print("behind")
+    assert capfd.readouterr().out == 'before\n{\n "a": 1\n}\nbehind\n'
+    assert Path("/dev/stdout").is_symlink()
+
+
+def test_a_pipe_is_written_in_place(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    check_outputs({"--json": pipe}, {})
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    with whole_file(pipe) as stream:
+        stream.write(b"through")
+    assert os.read(reader, 100) == b"through"
+    os.close(reader)
+    assert pipe.is_fifo()
+
+
+def test_staged_files_are_moved_together_or_not_at_all(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("old")
+
+    def fail() -> None:
+        with staged_folder(tmp_path) as folder:
+            (folder / "a").write_text("new")
+            raise OSError("full")
+
+    with pytest.raises(OSError, match="full"):
+        fail()
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a", "old")]
+    with staged_folder(tmp_path) as folder:
+        (folder / "a").write_text("new")
+        (folder / "b").write_text("more")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "new", "b": "more"}
+
+
+# ---------------------------------------------------------------------- folders of other commands
+
+TRACE = ("trace", "ow/trace.md", *CONTACT, "--unit", "um", "--to")
+REPORT = ("report", "r/curves.nc", "--to")
+FOLDERS: dict[str, tuple[tuple[object, ...], str]] = {
+    "trace over its input": (
+        (*TRACE, "ow"),
+        "--to is ow: trace.md would be written there over ow/trace.md, the file that the command "
+        "reads, so give another directory",
+    ),
+    "trace over its input, through a link": ((*TRACE, "linked"), "--to is linked: trace.md would"),
+    "trace under a file": ((*TRACE, "wave.csv/x"), "wave.csv is not a directory"),
+    "trace to a file": ((*TRACE, "wave.csv"), "wave.csv is not a directory"),
+    "trace, unwritable": ((*TRACE, "/proc/x"), "--to is /proc/x: it cannot be written"),
+    "trace, a directory in the way": ((*TRACE, "way"), "trace.html is to be written there"),
+    "report over its input": ((*REPORT, "r"), "curves.nc would be written there over r/curves.nc"),
+    "report, unwritable": ((*REPORT, "/proc/x/y"), "--to is /proc/x/y: it cannot be written"),
+    "report to a file": ((*REPORT, "wave.csv"), "--to is wave.csv:"),
+    "bench, unwritable": (("bench", "--quick", "--to", "/proc/x"), "--to is /proc/x: it cannot"),
+    "bench to a file": (("bench", "--quick", "--to", "wave.csv"), "is not a directory"),
+}
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("kind", FOLDERS)
+def test_folders_are_refused_before_any_work(kind: str, ask: Ask, tmp_path: Path) -> None:
+    for name in ("ow", "r", "way/trace.html"):
+        Path(name).mkdir(parents=True)
+    x = np.arange(200)
+    lines = [f"{a} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
+    Path("ow/trace.md").write_text("\n".join(lines))
+    Path("r/curves.nc").write_bytes(b"")
+    Path("linked").symlink_to("ow")
+    before = sorted(tmp_path.rglob("*")), Path("ow/trace.md").read_bytes()
+    words, sentence = FOLDERS[kind]
+    code, out, error = ask(*words)
+    assert (code, out) == (2, "")
+    (line,) = error.splitlines()
+    assert sentence in line
+    assert (sorted(tmp_path.rglob("*")), Path("ow/trace.md").read_bytes()) == before
+
+
+def test_a_report_that_cannot_be_written_leaves_the_old_one(
+    ask: Ask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
+    write(Path("r.h5"), small, rows(small))
+    Path("out").mkdir()
+    Path("out/losses.csv").write_text("old")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("ensemble.report.write._write_files", full)
+    code, _, error = ask("report", "r.h5", "--to", "out")
+    assert code == 74
+    assert error.splitlines()[-1] == (
+        "adhesis report: the report in out could not be written (No space left on device)"
+    )
+    assert [(path.name, path.read_text()) for path in Path("out").iterdir()] == [
+        ("losses.csv", "old")
+    ]
