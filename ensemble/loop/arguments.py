@@ -16,7 +16,8 @@ from ensemble.trace.arguments import add_reading_arguments
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6
 EXAMPLES = (
     "adhesis loop --hurst 0.8 --seed 1 --json loop.json",
-    "adhesis loop --heights heights.csv --period 1e-3 --work-of-adhesion 0.04 --figure loop.png",
+    "adhesis loop --heights heights.csv --period 1e-3 --work-of-adhesion 0.04 --young 1e6 "
+    "--poisson 0.5 --figure loop.png",
 )
 
 
