@@ -1,4 +1,4 @@
-"""What comes from others' hands, names of files and texts in them, made harmless to use."""
+"""Show names and texts from files as plain text, and find the file that a link leads to."""
 
 from __future__ import annotations
 
