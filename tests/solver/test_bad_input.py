@@ -45,6 +45,7 @@ from adhesis import (
     single_wave,
 )
 from ensemble.errors import naming_options
+from ensemble.loop.record import loop_summary, path_summary
 from ensemble.trace.prepare import Prepared
 from ensemble.trace.read import Trace
 from solver.checks import Bounds, plain, real, shown, whole
@@ -1013,6 +1014,11 @@ def test_a_penetration_within_rounding_of_first_touch_is_0() -> None:
 
 def test_one_is_not_several() -> None:
     assert [counted(n, "jump") for n in (0, 1, 2)] == ["0 jumps", "1 jump", "2 jumps"]
+    single = replace(one_loop(), jumps=one_loop().jumps[:1])
+    assert ", 1 jump, " in repr(single)
+    assert "J/m² in 1 jump, residual" in loop_summary(single)
+    one_left = replace(one_path(), jumps=one_path().jumps[:1])
+    assert "J/m² in 1 jump, residual" in path_summary(one_left)
 
 
 def test_bounds_are_spelt_as_one_would_write_them() -> None:
