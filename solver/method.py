@@ -30,20 +30,17 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial, wraps
-from threading import RLock
-from typing import Any, ClassVar, Self, TypeVar
+from functools import partial
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from solver.jumps import BRANCHES, Branch, Jump
+from solver.one_thread import new_lock
 from solver.problem import Problem
 from solver.profile import Array
 from solver.state import ContactState
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 __all__ = [
     "BRANCHES",
@@ -54,7 +51,6 @@ __all__ = [
     "MethodReport",
     "Path",
     "PathError",
-    "one_at_a_time",
 ]
 
 
@@ -152,23 +148,6 @@ class MethodReport:
     chosen: str | None
 
 
-def one_at_a_time(function: F) -> F:
-    """Let one thread at a time call the decorated methods of an object; the others wait.
-
-    Methods reuse work arrays and plans from call to call. Between calls nothing but counters and
-    caches is kept, so threads that take turns get the same bits as one alone.
-    """
-
-    @wraps(function)
-    def waiting(self: Method, *args: Any, **options: Any) -> Any:
-        with self._in_use:
-            return function(self, *args, **options)
-
-    guarded: Any = waiting
-    answer: F = guarded
-    return answer
-
-
 class Method(ABC):
     """Finds and follows contact states of one problem; see the module's numbered contract.
 
@@ -219,7 +198,7 @@ class Method(ABC):
         self._check_adhesion(problem)
         self.problem = problem
         self.chosen = chosen
-        self._in_use = RLock()
+        self.in_use = new_lock()  # of one_at_a_time
 
     @classmethod
     def _check_adhesion(cls, problem: Problem) -> None:
@@ -233,7 +212,7 @@ class Method(ABC):
             advice += ", or take 0, which is contact without adhesion"
         raise ValueError(
             f"work_of_adhesion is {gamma:g} J/m²: for this profile and E* = "
-            f"{problem.half_space.modulus:g} Pa the method '{cls.name}' resolves a loss from "
+            f"{problem.half_space.modulus:g} Pa the method '{cls.name}' takes from "
             f"{least:.2g} to {largest:.2g} J/m² ({cls.adhesion_range[0]:g} to "
             f"{cls.adhesion_range[1]:g} times the elastic energy of full contact); {advice}"
         )
