@@ -30,22 +30,19 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial, wraps
-from threading import RLock
-from typing import Any, ClassVar, Self, TypeVar
+from functools import partial
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from solver.checks import instance
 from solver.jumps import BRANCHES, Branch, Jump
+from solver.one_thread import new_lock
 from solver.problem import Problem
 from solver.profile import Array
 from solver.state import ContactState
 from solver.values import ByValue
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 __all__ = [
     "BRANCHES",
@@ -56,7 +53,6 @@ __all__ = [
     "MethodReport",
     "Path",
     "PathError",
-    "one_at_a_time",
 ]
 
 
@@ -159,23 +155,6 @@ class MethodReport:
     chosen: str | None
 
 
-def one_at_a_time(function: F) -> F:
-    """Let one thread at a time call the decorated methods of an object; the others wait.
-
-    Methods reuse work arrays and plans from call to call. Between calls nothing but counters and
-    caches is kept, so threads that take turns get the same bits as one alone.
-    """
-
-    @wraps(function)
-    def waiting(self: Method, *args: Any, **options: Any) -> Any:
-        with self._in_use:
-            return function(self, *args, **options)
-
-    guarded: Any = waiting
-    answer: F = guarded
-    return answer
-
-
 class Method(ABC):
     """Finds and follows contact states of one problem; see the module's numbered contract.
 
@@ -227,7 +206,7 @@ class Method(ABC):
         self.problem = instance("problem", problem, Problem, how)
         self._check_adhesion(self.problem)
         self.chosen = chosen
-        self._in_use = RLock()
+        self.in_use = new_lock()  # of one_at_a_time
 
     @classmethod
     def _check_adhesion(cls, problem: Problem) -> None:
@@ -241,7 +220,7 @@ class Method(ABC):
             advice += ", or take 0, which is contact without adhesion"
         raise ValueError(
             f"work_of_adhesion is {gamma:g} J/m²: for this profile and E* = "
-            f"{problem.half_space.modulus:g} Pa the method '{cls.name}' resolves a loss from "
+            f"{problem.half_space.modulus:g} Pa the method '{cls.name}' takes from "
             f"{least:.2g} to {largest:.2g} J/m² ({cls.resolved_adhesion[0]:g} to "
             f"{cls.resolved_adhesion[1]:g} times the elastic energy of full contact); {advice}"
         )

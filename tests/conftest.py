@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from tests.support import one_thread  # noqa: F401  # before what loads numpy
 from tests.support.launchers import without_mpi, without_slurm
 from tests.support.progress import Waiting
 from tests.support.two_processes import rank_of, scheduler

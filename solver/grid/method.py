@@ -17,16 +17,8 @@ from solver.grid.lattice import Lattice
 from solver.grid.path import Counters, Steps
 from solver.grid.relax import Relaxation
 from solver.grid.states import mask_of
-from solver.method import (
-    Branch,
-    ContactState,
-    Fields,
-    Method,
-    MethodReport,
-    Opening,
-    Path,
-    one_at_a_time,
-)
+from solver.method import Branch, ContactState, Fields, Method, MethodReport, Opening, Path
+from solver.one_thread import one_at_a_time
 from solver.problem import Problem
 
 _FEWEST_NODES_PER_WAVE = 8

@@ -24,9 +24,8 @@ from solver.method import (
     Opening,
     Path,
     PathError,
-    one_at_a_time,
 )
-from solver.one_thread import on_one_thread
+from solver.one_thread import on_one_thread, one_at_a_time
 from solver.problem import Problem
 from solver.profile import Profile
 from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, NoState

@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.compiled import compiled
-from solver.method import PathError
 from solver.problem import Problem
 from solver.profile import EQUAL_CRESTS, Array
 from solver.sharp.aim import Closing
 from solver.sharp.bottom import bottoms_of
 from solver.sharp.clearance import Clearances
-from solver.sharp.edges import CORRECTED, EdgeMechanics
+from solver.sharp.edges import CORRECTED, EdgeMechanics, NoState
 from solver.sharp.field import GapField
 from solver.sharp.gaps import with_patches
 from solver.sharp.point import Point
@@ -211,7 +210,7 @@ class Nucleation:
             else:
                 hit, hit_minima, hit_value = point, minima, value
         if hit_value < -self.overlap and self.edges.critical > 0:
-            raise PathError(f"surfaces overlap at q0 s = {hit.at:.9g}, where no touch is found")
+            raise NoState("surfaces overlap, and no first touch is found", hit.at)
         # the surfaces touched so much earlier as the overlap says
         late = abs(clear - hit.at)
         if clear_value > hit_value:

@@ -123,7 +123,7 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "UTF-16 without a mark": ("x.csv", "1\n2\n3".encode("utf-16-le"), "zero bytes.*UTF-16 with"),
     "words": ("x.csv", b"a trace\nof words\n", "holds no line of numbers"),
     "one long line": ("x.csv", b"y" * 2_000_000, "holds no line of numbers"),
-    "ambiguous and long": ("x.csv", b"1,2,3,4\n" + b"1" * 999 + b",2,3,4\n" * 9, r"give --decimal"),
+    "ambiguous and long": ("x.csv", b"1,2,3,4\n" + b"1" * 999 + b",2,3,4\n" * 9, r"give decimal"),
     "no array": ("x.npy", b"junk", r"is no \.npy of numbers"),
     "half an array": ("x.npy", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', '", r"is no \.npy"),
 }
@@ -302,12 +302,12 @@ OPTIONS: dict[str, tuple[tuple[object, ...], str]] = {
         (*S, "--nodes-per-wave", 10**8),
         "--nodes-per-wave is 100000000: it must be a whole number",
     ),
-    "many waves": ((*S, "--n0", 10**6), "n0 · ratio is 100000000: at most 100000 waves"),
+    "many waves": ((*S, "--n0", 10**6), "--n0 is 1000000: it must be a whole number from 1 to"),
     "many digits": ((*S, "--ratio", 10**400), "--ratio is 1000"),
     "accuracy": ((*S, "--accuracy", 0), "--accuracy is 0.0: it must"),
     "Poisson's ratio": ((*S, "--poisson", 0.7), "--poisson is 0.7: it must be"),
     "adhesion": ((*S, "--work-of-adhesion", "nan"), "--work-of-adhesion is nan: it must be"),
-    "turning point": ((*S, "--max-penetration", 2), "--max-penetration is 2.0: it must lie"),
+    "turning point": ((*S, "--max-penetration", 2), "--max-penetration is 2.0: it must be"),
     "a delimiter": ((*H, *CONTACT, "--delimiter", ":"), "--delimiter is ':': it must be one of"),
 }
 

@@ -150,8 +150,8 @@ def test_no_file_appears_if_the_fields_cannot_be_had(wave_file, tmp_path, monkey
 
     monkeypatch.setattr(ExactWave, "fields", broken)
     out, fields = tmp_path / "loop.json", tmp_path / "fields.npz"
-    with pytest.raises(FloatingPointError):
-        run(*wave_words(wave_file, "--load-steps", 2, "--json", out, "--fields", fields))
+    words = wave_words(wave_file, "--load-steps", 2, "--json", out, "--fields", fields)
+    assert run(*words) == 70
     assert [p.name for p in tmp_path.iterdir()] == ["wave.npy"]
 
 

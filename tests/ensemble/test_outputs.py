@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ensemble.command.bench as bench_command
 import ensemble.command.loop as loop_command
 import ensemble.command.trace as trace_command
 from ensemble.command.main import main
@@ -56,7 +55,7 @@ def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("run_loop", "run_loops", "run_path"):
         monkeypatch.setattr(loop_command, name, no_work)
     monkeypatch.setattr(trace_command, "run_plan", no_work)
-    monkeypatch.setattr(bench_command, "benchmark", no_work)
+    monkeypatch.setattr("ensemble.bench.compare.benchmark", no_work)
     monkeypatch.setattr("ensemble.report.write.write_report", no_work)
 
 

@@ -61,8 +61,9 @@ NOT_IN_SOLVER = {
     "threading",
     "xarray",
 }
-# One thread, which does no mechanics: it keeps the handlers of signals out of the compiler.
-THREADS = {"solver.uninterrupted"}
+# The mechanics start no threads for their work: one module keeps the handlers of signals out of the
+# compiler, the other has locks against the threads of callers.
+THREADING = {"solver.uninterrupted", "solver.one_thread"}
 # All that campaigns know of the mechanics.
 SOLVER_FOR_ENSEMBLE = {
     "solver.checks",
@@ -161,8 +162,8 @@ def test_no_circle_of_rooms() -> None:
 def test_mechanics_know_nothing_of_campaigns_ranks_and_files() -> None:
     for module, names in IMPORTS.items():
         if module.split(".")[0] == "solver":
-            known = {name.split(".")[0] for name in names} & NOT_IN_SOLVER
-            assert known == ({"threading"} if module in THREADS else set()), module
+            found = {name.split(".")[0] for name in names} & NOT_IN_SOLVER
+            assert found == ({"threading"} if module in THREADING else set()), module
 
 
 def test_campaigns_know_the_public_modules_of_mechanics_alone() -> None:

@@ -59,7 +59,7 @@ def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) ->
     ],
 )
 def test_adhesion_that_no_method_resolves_is_refused(name, share, young, advice):
-    rule = rf"work_of_adhesion is \S+ J/m².* resolves a loss from \S+ to \S+ J/m².*{advice}"
+    rule = rf"work_of_adhesion is \S+ J/m².* takes from \S+ to \S+ J/m².*{advice}"
     with pytest.raises(ValueError, match=rule):
         make_method(name, wave_problem(share, young=young))
 
