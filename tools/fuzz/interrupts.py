@@ -121,10 +121,8 @@ class First:
         """Interrupt once; then the loop runs to its end."""
         from solver.loop import run_loop
 
-        method = make("sharp", 0.04, 4)
-
         def loop() -> str:
-            found = run_loop(method, max_penetration=0.8, load_steps=4)
+            found = run_loop(make("sharp", 0.04, 4), max_penetration=0.8, load_steps=4)
             return found.loss.hex()
 
         ended = interrupted(loop, float(rng.uniform(0.0, self._longest)) + 1e-6)
@@ -221,7 +219,7 @@ def kind_of(name: str) -> Any:
     if name == "grid":
         return Loops("grid", 0.04, 8)
     if name == "first":
-        return First(4.0, compare=True)
+        return First(3.0, compare=True)
     if name == "compile":
         return First(60.0, compare=False)
     if name == "trace":
