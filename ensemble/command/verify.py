@@ -1,7 +1,7 @@
 """Check a results file: its head, its tasks and axes, and the checksum of every row.
 
-Exit codes: 0 no damage was found, 1 rows are damaged and named, 2 the file is no results file, or is
-damaged beside its rows. Rows that are damaged count as pending: the next run computes them again.
+Exit codes: 0 no damage was found, 1 rows are damaged and named, 2 the file is no results file, or
+is damaged beside its rows. The next run computes damaged rows again, as if they were pending.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print what is damaged; returns 0, or 1 if rows are."""
-    from ensemble.results.status import damage_lines, read_status
     from ensemble.results.read import NO_CHECKSUMS
+    from ensemble.results.status import damage_lines, read_status
 
     status = read_status(args.file)
     damaged = status["damaged"]
