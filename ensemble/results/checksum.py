@@ -53,7 +53,7 @@ def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
     """
     for part in parts:
         little = part.astype(part.dtype.newbyteorder("<"), copy=False)
-        start = zlib.crc32(np.ascontiguousarray(little).reshape(-1).view(np.uint8), start)
+        start = zlib.crc32(np.ascontiguousarray(little).reshape(-1).view(np.uint8).data, start)
     return start
 
 
@@ -89,7 +89,7 @@ def row_checksums(
         block = _side_by_side(read, of_tasks, slice(first, int(rows[last - 1]) + 1), widths)
         for place in range(done, last):
             row = int(rows[place])
-            value = zlib.crc32(block[row - first])
+            value = zlib.crc32(block[row - first].data)
             where = int(np.searchsorted(kept, row))
             if where < kept.size and kept[where] == row:
                 here = slice(where, where + 1)

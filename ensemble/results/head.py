@@ -63,7 +63,8 @@ def check_head(path: Path) -> bool | None:
         if count > (SIZE - _START.size) // _RANGE.size or size != os.fstat(handle.fileno()).st_size:
             return False
         table = handle.read(count * _RANGE.size)
-        return _checksum(handle, list(_RANGE.iter_unpack(table)), size) == checksum
+        found = _checksum(handle, list(_RANGE.iter_unpack(table)), size)
+        return bool(found == checksum)
 
 
 def _checksum(handle: BinaryIO, ranges: list[tuple[int, int]], size: int) -> int:

@@ -148,7 +148,8 @@ class Results:
             raise ValueError("truncated")
         wanted = scales(self.campaign, self.part)
         known = [d for d in self._datasets if self.has_checksums or d.name not in LATER_DATASETS]
-        missing = [d.name for d in (*wanted, *known) if d.name not in self._file]
+        names = [scale.name for scale in wanted] + [d.name for d in known]
+        missing = [name for name in names if name not in self._file]
         if missing:
             by = str(self.attributes.get("adhesis_version", "an unknown version"))
             commit = str(self.attributes.get("commit", "unknown"))

@@ -5,8 +5,8 @@
 
 Bits of a random byte are inverted, in bytes that rows hold and in all others, and the file is cut
 short at random places. Each case is judged in a process of its own, so that a crash of HDF5 is
-seen, within 4 GB of memory. With --seconds new cases are drawn until the time is over. A case is repeated
-by its seed, kind and number.
+seen, within 4 GB of memory. With --seconds new cases are drawn until the time is over. A case is
+repeated by its seed, kind and number.
 """
 
 from __future__ import annotations
