@@ -21,7 +21,7 @@ def versions() -> dict[str, str]:
         "scipy": _package("scipy"),
         "numba": _package("numba"),
         "llvmlite": _package("llvmlite"),
-        "processor": _processor(),
+        "processor": processor(),
         "mpi": _mpi(),
         "hdf5": _hdf5(),
         "fftw": _fftw(),
@@ -103,7 +103,8 @@ def _mpi() -> str:
     return _short(mpi.Get_library_version())
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return the name of this processor, as LLVM knows it."""
     from llvmlite import binding
 
     return str(binding.get_host_cpu_name())

@@ -1,7 +1,7 @@
 """Check a results file: its head, its tasks and axes, and the checksum of every row.
 
-Exit codes: 0 no damage was found, 1 rows are damaged and named, 2 the file is no results file, or is
-damaged beside its rows. Rows that are damaged count as pending: the next run computes them again.
+Exit codes: 0 no damage was found, 1 rows are damaged and named, 2 the file is no results file, or
+is damaged beside its rows. The next run computes damaged rows again, as if they were pending.
 """
 
 from __future__ import annotations

@@ -10,14 +10,15 @@ checksum of every row, and BLAKE2b takes more than four times as long.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.results.schema import CHECKSUM
-from ensemble.task.dataset import KEPT, Dataset
+from ensemble.task.dataset import KEPT, Dataset, row_shape
 
 _BLOCK_BYTES = 16 * 2**20
 
@@ -52,12 +53,16 @@ def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
     """
     for part in parts:
         little = part.astype(part.dtype.newbyteorder("<"), copy=False)
-        start = zlib.crc32(np.ascontiguousarray(little).reshape(-1).view(np.uint8), start)
+        start = zlib.crc32(np.ascontiguousarray(little).reshape(-1).view(np.uint8).data, start)
     return start
 
 
 def row_checksums(
-    read: Read, datasets: Iterable[Dataset], kept: NDArray[np.intp], rows: NDArray[np.intp]
+    read: Read,
+    datasets: Iterable[Dataset],
+    sizes: Mapping[str, int],
+    kept: NDArray[np.intp],
+    rows: NDArray[np.intp],
 ) -> NDArray[np.uint32]:
     """Compute the checksums of some rows from what they hold; a block is in memory at a time.
 
@@ -66,6 +71,8 @@ def row_checksums(
     read : callable
     datasets : iterable of Dataset
         All datasets of the file.
+    sizes : mapping of int
+        Lengths of the dimensions.
     kept : int array
         Rows of the tasks that keep their fields, ascending.
     rows : int array
@@ -73,19 +80,16 @@ def row_checksums(
     """
     of_tasks, of_kept = covered(datasets)
     out = np.zeros(rows.size, np.uint32)
-    if not rows.size:
-        return out
-    first_row = {d.name: read(d.name, slice(int(rows[0]), int(rows[0]) + 1)) for d in of_tasks}
-    width = sum(values.nbytes for values in first_row.values())
-    step = max(1, _BLOCK_BYTES // width)
+    widths = [prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in of_tasks]
+    step = max(1, _BLOCK_BYTES // sum(widths))
     done = 0
     while done < rows.size:
         first = int(rows[done])
         last = done + int(np.searchsorted(rows[done:], first + step))
-        block = _side_by_side(read, of_tasks, slice(first, int(rows[last - 1]) + 1), width)
+        block = _side_by_side(read, of_tasks, slice(first, int(rows[last - 1]) + 1), widths)
         for place in range(done, last):
             row = int(rows[place])
-            value = zlib.crc32(block[row - first])
+            value = zlib.crc32(block[row - first].data)
             where = int(np.searchsorted(kept, row))
             if where < kept.size and kept[where] == row:
                 here = slice(where, where + 1)
@@ -96,16 +100,15 @@ def row_checksums(
 
 
 def _side_by_side(
-    read: Read, datasets: Iterable[Dataset], rows: slice, width: int
+    read: Read, datasets: Iterable[Dataset], rows: slice, widths: Sequence[int]
 ) -> NDArray[np.uint8]:
     """Return the bytes of rows of several datasets, those of a row in one piece."""
     count = rows.stop - rows.start
-    out = np.empty((count, width), np.uint8)
+    out = np.empty((count, sum(widths)), np.uint8)
     place = 0
-    for dataset in datasets:
+    for dataset, width in zip(datasets, widths, strict=True):
         values = read(dataset.name, rows)
         little = values.astype(values.dtype.newbyteorder("<"), copy=False)
-        size = little.nbytes // count
-        out[:, place : place + size] = little.reshape(-1).view(np.uint8).reshape(count, size)
-        place += size
+        out[:, place : place + width] = little.reshape(-1).view(np.uint8).reshape(count, width)
+        place += width
     return out

@@ -1,51 +1,63 @@
 """The checksum of all bytes of a results file that belong to no row.
 
 A run changes rows alone: what HDF5 keeps about the datasets, the root attributes, the dimension
-scales and the tasks never change after the file is laid out. Their checksum stands before HDF5's
-own bytes, in the user block, together with the places of the rows. It is compared before HDF5 reads
-the file, because HDF5 can crash over damaged bytes of its own.
+scales and the tasks never change after the file is laid out. Their checksum stands, together with
+the places of the rows, in the text of the root attribute ``head``. It is found by its first words
+and compared before HDF5 reads the file, because HDF5 can crash over damaged bytes of its own.
 """
 
 from __future__ import annotations
 
 import os
-import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 import h5py
+import numpy as np
 
 from ensemble.results.schema import ROW_DATASETS
 
-SIZE = 4096  # of the user block: a power of two of at least 512
-_MARK = b"adhesis head 1\n\0"
-# After the mark: checksum, number of ranges of rows, size of the file; then (first byte, bytes) of
-# each range, ascending.
-_START, _RANGE = struct.Struct("<16sIIQ"), struct.Struct("<QQ")
+HEAD = "head"
+_MARK = b"adhesis head 1: "
+_LENGTH = 8192  # of the attribute: eighty places of rows and more
+# The attribute is the first thing that is written: it lies within so many bytes.
+_NEAR = 2**16
 _PIECE = 2**20
-# HDF5 marks its first bytes (version 0 of its superblock) while a file is open for writing.
-_FLAGS = (SIZE + 20, 4)
+# HDF5 marks these bytes of its superblock (version 0) while a file is open for writing.
+_FLAGS = (20, 4)
+
+_Ranges = Sequence[tuple[int, int]]
+
+
+def reserve_head(file: h5py.File) -> None:
+    """Make the attribute, before anything else, in a file that is laid out."""
+    file.attrs.create(HEAD, np.bytes_(_MARK.ljust(_LENGTH, b".")))
 
 
 def write_head(path: Path) -> None:
-    """Write the user block of a file that is laid out."""
+    """Fill the attribute of a file that is laid out."""
     with h5py.File(path, "r", locking=False) as file:
         found = [file[d.name].id for d in ROW_DATASETS if d.name in file]
-        ranges = sorted(
+        rows = [
             (place, dataset.get_storage_size())
             for dataset in found
             if (place := dataset.get_offset()) is not None
-        )
-    ranges.insert(0, _FLAGS)
-    table = b"".join(_RANGE.pack(*entry) for entry in ranges)
+        ]
     size = path.stat().st_size
     with path.open("r+b") as handle:
-        handle.write((_START.pack(_MARK, 0, len(ranges), size) + table).ljust(SIZE, b"\0"))
-        checksum = _checksum(handle, ranges, size)
-        handle.seek(0)
-        handle.write(_START.pack(_MARK, checksum, len(ranges), size))
+        place = handle.read(_NEAR).find(_MARK)
+        if place < 0:
+            raise ValueError(f"{path} has no attribute '{HEAD}'")
+        ranges = sorted([_FLAGS, (place, _LENGTH), *rows])
+        table = f"{size} " + " ".join(f"{first}+{length}" for first, length in ranges) + " "
+        checksum = _checksum(handle, table.encode(), ranges, size)
+        text = (_MARK + f"{checksum:08x} ".encode() + table.encode()).ljust(_LENGTH, b".")
+        if len(text) > _LENGTH:
+            raise ValueError(f"{len(ranges)} places of rows do not fit into '{HEAD}'")
+        handle.seek(place)
+        handle.write(text)
 
 
 def check_head(path: Path) -> bool | None:
@@ -57,23 +69,29 @@ def check_head(path: Path) -> bool | None:
         If it cannot be read.
     """
     with path.open("rb") as handle:
-        mark, checksum, count, size = _START.unpack(handle.read(_START.size).ljust(_START.size))
-        if mark != _MARK:
+        place = handle.read(_NEAR).find(_MARK)
+        if place < 0:
             return None
-        if count > (SIZE - _START.size) // _RANGE.size or size != os.fstat(handle.fileno()).st_size:
+        handle.seek(place)
+        text = handle.read(_LENGTH).removeprefix(_MARK)
+        try:
+            checksum, table = int(text[:8], 16), text[9:].rstrip(b".")
+            size, *words = table.split()
+            ranges = [(int(a), int(b)) for a, b in (word.split(b"+") for word in words)]
+            known = os.fstat(handle.fileno()).st_size
+            whole = (_MARK + text[:8] + b" " + table).ljust(_LENGTH, b".") == _MARK + text
+            if int(size) != known or not whole or (place, _LENGTH) not in ranges:
+                return False
+        except ValueError:
             return False
-        table = handle.read(count * _RANGE.size)
-        return _checksum(handle, list(_RANGE.iter_unpack(table)), size) == checksum
+        return _checksum(handle, table, ranges, known) == checksum
 
 
-def _checksum(handle: BinaryIO, ranges: list[tuple[int, int]], size: int) -> int:
-    """Return the CRC-32 of a file, without the ranges, its own four bytes taken for zero."""
-    place, value = 0, 0
+def _checksum(handle: BinaryIO, table: bytes, ranges: _Ranges, size: int) -> int:
+    """Return the CRC-32 of the places of the rows, and of a file without them."""
+    place, value = 0, zlib.crc32(table)
     for first, length in [*ranges, (size, 0)]:
         for piece in _pieces(handle, place, first):
-            if place == 0:
-                start, place = len(_MARK), 1
-                piece = piece[:start] + b"\0\0\0\0" + piece[start + 4 :]
             value = zlib.crc32(piece, value)
         place = max(place, first + length)
     return value

@@ -25,7 +25,7 @@ from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
 from ensemble.foreign import target
-from ensemble.results.head import SIZE, write_head
+from ensemble.results.head import reserve_head, write_head
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
     DAMAGED,
@@ -83,7 +83,8 @@ def create(
             )
         # Made anew, so that a link of that name is removed and not followed.
         unfinished.unlink(missing_ok=True)
-        with h5py.File(unfinished, "x", userblock_size=SIZE, locking=False) as file:
+        with h5py.File(unfinished, "x", locking=False) as file:
+            reserve_head(file)
             _lay_out(file, campaign, part)
             _describe(file, campaign, part, versions or {}, grown_from)
             if grown_from is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -21,6 +21,7 @@ from ensemble.results.schema import (
     CHECKSUM,
     DAMAGED,
     DATASETS,
+    DONE,
     LATER_DATASETS,
     NOT_NEEDED,
     ORIGIN,
@@ -147,7 +148,8 @@ class Results:
             raise ValueError("truncated")
         wanted = scales(self.campaign, self.part)
         known = [d for d in self._datasets if self.has_checksums or d.name not in LATER_DATASETS]
-        missing = [d.name for d in (*wanted, *known) if d.name not in self._file]
+        names = [scale.name for scale in wanted] + [d.name for d in known]
+        missing = [name for name in names if name not in self._file]
         if missing:
             by = str(self.attributes.get("adhesis_version", "an unknown version"))
             commit = str(self.attributes.get("commit", "unknown"))
@@ -159,11 +161,11 @@ class Results:
                 f"{', '.join(missing[:3])}{more}: read it with that version, or compute the "
                 "campaign again into another file"
             )
-        sizes = sizes_of(wanted)
+        self._sizes = sizes_of(wanted)
         for scale in wanted:
             self._check_dataset(scale.name, scale.values.shape, scale.values.dtype)
         for column in known:
-            self._check_dataset(column.name, shape_of(column, sizes), np.dtype(column.dtype))
+            self._check_dataset(column.name, shape_of(column, self._sizes), np.dtype(column.dtype))
 
     def _check_dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
         found = self._file[name]
@@ -266,11 +268,24 @@ class Results:
         rows = self.damaged()
         return f"{self.path} is damaged in {named_rows(rows.tolist())}" if rows.size else ""
 
+    def origins(self) -> dict[str, int]:
+        """Return the versions and processors that computed the done rows, and how many rows each.
+
+        A text is empty where a program other than a run has written rows.
+        """
+        done = np.flatnonzero(self.status() == DONE)
+        names, counts = np.unique(self.column(ORIGIN.name)[done], return_counts=True)
+        texts = (name.decode("utf-8", "replace") for name in names.tolist())
+        return dict(zip(texts, counts.tolist(), strict=True))
+
     def doubts(self) -> tuple[str, ...]:
-        """Return a sentence for each reason not to take the file for sound and whole."""
-        age = "" if self.has_checksums else f"{self.path} {NO_CHECKSUMS}"
-        damage = self.damage()
-        return tuple(s for s in (age, f"{damage}; they are left out" if damage else "") if s)
+        """Return a sentence for each reason not to take the rows for sound, whole, and alike."""
+        out = [] if self.has_checksums else [f"{self.path} {NO_CHECKSUMS}"]
+        if damage := self.damage():
+            out.append(f"{damage}; no number of {them(self.damaged())} is used")
+        if mixed := mixture(self.origins()):
+            out.append(f"{self.path} {mixed}")
+        return tuple(out)
 
     def _checked_status(self) -> NDArray[np.uint8]:
         status = self.column(STATUS.name)
@@ -301,7 +316,8 @@ class Results:
 
     def _checksums(self, rows: NDArray[np.intp]) -> NDArray[np.uint32]:
         """Compute the checksums of some rows (ascending) from what they hold."""
-        return row_checksums(self.column, self._datasets, self.column(KEPT), rows)
+        kept = self.column(KEPT)
+        return row_checksums(self.column, self._datasets, self._sizes, kept, rows)
 
     def _origins(self, rows: NDArray[np.intp]) -> NDArray[np.bytes_]:
         """Take the versions that laid the file out for those that computed its rows."""
@@ -315,6 +331,22 @@ class Results:
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""
         return [text.decode("utf-8", "replace") for text in self.column("error", rows).tolist()]
+
+
+def mixture(origins: Mapping[str, int]) -> str:
+    """Return, after the name of a file, that its rows were not all computed alike; or nothing."""
+    if len(origins) < 2:
+        return ""
+    counts = (f"{count} by {text or 'an unknown version'}" for text, count in origins.items())
+    return (
+        f"has rows of {len(origins)} versions or processors, on which their last bits depend: "
+        + "; ".join(counts)
+    )
+
+
+def them(rows: Sequence[object] | NDArray[np.intp]) -> str:
+    """Return "it" for one row, else "them"."""
+    return "it" if len(rows) == 1 else "them"
 
 
 def named_rows(rows: Sequence[int]) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ensemble.campaign.precision import relative_error
 from ensemble.foreign import one_line, printable
-from ensemble.results.read import NO_CHECKSUMS, Results, named_rows
+from ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows, them
 from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful
 
@@ -36,7 +36,8 @@ def read_status(path: Path | str) -> dict[str, Any]:
     dict
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
         dict for each row that does not have its checksum (it counts as nothing else), and
-        ``checksums``, whether the file has any; ``seconds`` per done task (``mean``,
+        ``checksums``, whether the file has any; ``computed_by``, the number of done rows by the
+        versions and the processor that computed them; ``seconds`` per done task (``mean``,
         ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each cell (a
         value of each of the ``axes``) with
         its counts, its mean time and its mean loss with standard error (J/m², and W~);
@@ -67,7 +68,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
         damaged = results.damaged()
-        has_checksums = results.has_checksums
+        has_checksums, origins = results.has_checksums, results.origins()
     times = column["wall_time"][state == DONE]
     failures = [
         {
@@ -86,6 +87,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "not_needed": int(np.sum(state == NOT_NEEDED)),
         "damaged": named(column, damaged),
         "checksums": has_checksums,
+        "computed_by": origins,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
@@ -192,6 +194,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     ]
     if not status["checksums"]:
         lines.append(f"the file {NO_CHECKSUMS}")
+    if mixed := mixture(status["computed_by"]):
+        lines.append(f"the file {mixed}")
     if seconds := status["seconds"]:
         lines.append(
             f"time per task: mean {seconds['mean']:.3g} s, median {seconds['median']:.3g} s, "
@@ -255,7 +259,8 @@ def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
 
 def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the damaged rows as lines for people, and what is to be done."""
-    lines = [f"damaged: {named_rows([d['row'] for d in damaged])}; no number of them is used"]
+    rows = named_rows([d["row"] for d in damaged])
+    lines = [f"damaged: {rows}; no number of {them(damaged)} is used"]
     for d in damaged[:_MOST_FAILURES_SHOWN]:
         lines.append(
             f"  row {d['row']}: H = {d['hurst']:g}, γ = {d['work_of_adhesion']:g} J/m², "

@@ -15,6 +15,7 @@ import h5py
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
 from ensemble.foreign import target
+from ensemble.results.schema import origin_of
 from ensemble.results.write import Writer
 from ensemble.run.attempt import Compute, Outcome, StopCheck
 from ensemble.run.dispatch import Limits, Master, Worker, work_alone
@@ -28,6 +29,7 @@ from ensemble.run.units import Units
 from ensemble.task.compute import Runner, check_task, methods_of
 from ensemble.task.doubt import doubtful
 from ensemble.task.row import Row
+from ensemble.versions import processor, versions
 from solver.loop import Progress
 
 
@@ -78,7 +80,8 @@ class Engine:
     check : callable
         Raises InputError if a task cannot be set up.
     writer : callable
-        Opens the results file for writing: path, and the communicator if all ranks write.
+        Opens the results file for writing: path, the communicator if all ranks write, and what
+        returns the versions and the processor of a rank.
     all_write : bool
         Whether each rank writes the rows that it computed, as parallel HDF5 allows.
     watch : callable
@@ -89,7 +92,7 @@ class Engine:
 
     compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
     check: Callable[[Campaign, Task], None] = check_task
-    writer: Callable[[Path, Any], RowWriter] = Writer
+    writer: Callable[[Path, Any, Callable[[int], str]], RowWriter] = Writer
     all_write: bool = bool(h5py.get_config().mpi)
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
     methods: Callable[[Campaign, Iterable[Task]], Collection[str]] = methods_of
@@ -199,14 +202,17 @@ def run_campaign(
                 check=engine.check,
             ),
         )
+        origins = [""] * size
         if plan.rows:
+            origins = _origins(comm)
             _warm_up(comm, engine.methods(campaign, [plan.tasks[row] for row in plan.rows]), say)
         own_rows = comm is not None and engine.all_write
         if own_rows and rank > 0:
             lock.join()
         writer = None
         if own_rows or rank == 0:
-            writer = stack.enter_context(engine.writer(path, comm if own_rows else None))
+            all_of_them = comm if own_rows else None
+            writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
         session = _Session(campaign, plan, writer, options, signals, engine)
         with engine.watch():
             if comm is None:
@@ -217,6 +223,17 @@ def run_campaign(
                 session.worker(MpiChannel(comm), own_rows)
                 stopped = None
     return together(comm, lambda: session.summary(stopped))
+
+
+def _origins(comm: Any) -> list[str]:
+    """Return versions and processor of each rank, on which the last bits of its rows depend.
+
+    All ranks run one installation, but nodes may have different processors.
+    """
+    known = together(comm, versions)
+    own = processor()
+    processors = [own] if comm is None else comm.allgather(own)
+    return [origin_of(known | {"processor": name}) for name in processors]
 
 
 def _warm_up(comm: Any, methods: Collection[str], say: Callable[[str], None]) -> None:

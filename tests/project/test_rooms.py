@@ -25,6 +25,7 @@ FOLDERS = (*PACKAGES, "tests")
 MPI = {"ensemble.run.ranks", "ensemble.doctor.probe"}
 HDF5 = {
     "ensemble.results.merge",
+    "ensemble.results.head",
     "ensemble.results.layout",
     "ensemble.results.read",
     "ensemble.results.write",

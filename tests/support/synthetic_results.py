@@ -10,7 +10,7 @@ import numpy as np
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tables import Campaign
 from ensemble.results.checksum import row_checksums
-from ensemble.results.head import SIZE, write_head
+from ensemble.results.head import HEAD, write_head
 from ensemble.results.layout import create
 from ensemble.results.schema import LATER_DATASETS, axis_datasets, datasets, kept_rows
 from ensemble.task.dataset import KEPT
@@ -175,10 +175,11 @@ def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
 def sign(path: Path) -> Path:
     """Give a results file and its rows the checksums of what they hold, as if all were written."""
     with h5py.File(path, "r+") as file:
-        known = datasets(parse_campaign(file.attrs["campaign"]))
-        rows = np.arange(file["task"].size)
+        plan = parse_campaign(file.attrs["campaign"])
+        sizes = {name: data.size for name, data in file.items() if data.is_scale}
         file["checksum"][...] = row_checksums(
-            lambda name, rows: file[name][rows], known, file[KEPT][:], rows
+            lambda name, rows: file[name][rows],
+            *(datasets(plan), sizes, file[KEPT][:], np.arange(file["task"].size)),
         )
     write_head(path)
     return path
@@ -190,6 +191,5 @@ def age(path: Path) -> Path:
         for name in LATER_DATASETS:
             del file[name]
         file.attrs["file_version"] = np.array([1, 0], "i4")
-    with path.open("r+b") as handle:
-        handle.write(bytes(SIZE))
+        del file.attrs[HEAD]
     return path

@@ -1,0 +1,346 @@
+"""Damaged results files: found, named, never taken for sound; whole in bytes that a run wrote."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+import adhesis
+import ensemble.results.read as reading
+from ensemble.aggregate.average import aggregate
+from ensemble.campaign.file import load_campaign
+from ensemble.command.main import main
+from ensemble.errors import InputError
+from ensemble.report.findings import missing
+from ensemble.results.head import write_head
+from ensemble.results.merge import merge
+from ensemble.results.read import Results
+from ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING
+from ensemble.results.status import as_text, read_status
+from ensemble.run.session import Options, run_campaign
+from tests.support.campaign_support import differences, write_campaign
+from tests.support.fake_run import fake_engine
+from tests.support.synthetic_results import age
+from tools.damage import Damage
+
+
+@pytest.fixture(scope="module")
+def damage(tmp_path_factory) -> Damage:
+    return Damage(tmp_path_factory.mktemp("damage"))
+
+
+@pytest.fixture
+def path(damage, tmp_path):
+    return shutil.copy(damage.sound, tmp_path / "r.h5")
+
+
+def changed(path, change) -> bytes:
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path.read_bytes()
+
+
+# ---------------------------------------------------------------- at random
+
+
+def test_a_sound_file_is_sound(damage):
+    assert damage.judge(damage.content) == ("harmless", "")
+
+
+def test_random_bytes_of_rows_are_found_and_computed_again(damage, path):
+    rng = np.random.default_rng(1)
+    places = damage.places(of_rows=True)
+    for number in range(12):
+        content = damage.flipped(int(rng.choice(places)), 1 << int(rng.integers(8)))
+        path.write_bytes(content)
+        with Results(path) as results:
+            assert results.damaged().size == 1
+        if number < 1:
+            verdict, reason = damage.judge(content)
+            assert verdict == "named", reason
+
+
+def test_random_bytes_beside_the_rows_and_cuts_are_refused(damage):
+    rng = np.random.default_rng(2)
+    places = damage.places(of_rows=False)
+    for _ in range(32):
+        place, mask = int(rng.choice(places)), 1 << int(rng.integers(8))
+        verdict, reason = damage.judge(damage.flipped(place, mask))
+        assert verdict == "refused", (place, mask, reason)
+    for size in rng.integers(0, len(damage.content), 10).tolist():
+        verdict, reason = damage.judge(damage.content[:size])
+        assert verdict == "refused", (size, reason)
+
+
+# ---------------------------------------------------------------- chosen
+
+
+def _set(name, row, value):
+    def change(file):
+        where = (row,) + (0,) * (file[name].ndim - 1)
+        file[name][where] = value
+
+    return change
+
+
+ROWS = {
+    "status that is none": ("status", 5, 7),
+    "status of a pending row": ("status", 5, 4),
+    "done to failed": ("status", 5, FAILED),
+    "failed to done": ("status", 7, DONE),
+    "done to not needed": ("status", 5, 3),
+    "kind of a jump": ("jump_kind", 2, 93),
+    "branch of a jump": ("jump_branch", 2, 5),
+    "loss": ("loss", 0, 1.0),
+    "loss that is no number": ("loss", 0, np.nan),
+    "curve": ("unloading_energy", 3, 0.5),
+    "spectrum": ("gap_density", 6, 0.5),
+    "kept field": ("field_height", 0, 0.5),
+    "error text": ("error", 7, b"no error"),
+    "version": ("computed_by", 1, b"another"),
+    "checksum": ("checksum", 4, 5),
+}
+
+
+@pytest.mark.parametrize("case", ROWS)
+def test_a_damaged_row_is_named(path, case):
+    name, row, value = ROWS[case]
+    changed(path, _set(name, row, value))
+    with Results(path) as results:
+        assert results.damaged().tolist() == [row]
+
+
+@pytest.mark.parametrize("case", ["status that is none", "kind of a jump"])
+def test_a_damaged_row_is_left_out_and_computed_again(damage, path, case):
+    name, row, value = ROWS[case]
+    content = changed(path, _set(name, row, value))
+    assert damage.judge(content) == ("named", f"rows ({row},)")
+
+
+def test_a_row_that_lost_its_status_is_pending_and_not_damaged(damage, path):
+    """A kill between checksum and status leaves just that behind."""
+    assert damage.judge(changed(path, _set("status", 2, PENDING))) == ("pending", "rows (2,)")
+
+
+@pytest.mark.parametrize("name", ["hurst", "work_of_adhesion", "realisation", "seed"])
+@pytest.mark.parametrize("pending", [False, True])
+def test_a_task_of_another_campaign_is_refused(damage, path, name, pending):
+    """Whatever the status of its row, and also where all checksums are right."""
+
+    def change(file):
+        file[name][3] = file[name][3] + 1
+        if pending:
+            file["status"][3] = PENDING
+
+    assert damage.judge(changed(path, change))[0] == "refused"
+    write_head(path)
+    verdict, sentence = damage.judge(path.read_bytes())
+    assert verdict == "refused"
+    assert f"its tasks are not those of its campaign ({name} of row 3 is" in sentence
+
+
+def test_an_axis_that_is_not_the_campaigns_is_refused(damage, path):
+    changed(path, _set("unloading_penetration", 4, 0.123))
+    write_head(path)
+    verdict, sentence = damage.judge(path.read_bytes())
+    assert verdict == "refused"
+    assert "its unloading_penetration is not that of its campaign" in sentence
+
+
+def _huge(file):
+    del file["loss"]
+    file.create_dataset("loss", (10**12,), "f8")
+
+
+def _elsewhere(file):
+    del file["loss"]
+    file["loss"] = h5py.ExternalLink("sound.h5", "/loss")
+
+
+def _virtual(file):
+    shape = file["loss"].shape
+    del file["loss"]
+    layout = h5py.VirtualLayout(shape, "f8")
+    layout[:] = h5py.VirtualSource("sound.h5", "loss", shape)
+    file.create_virtual_dataset("loss", layout)
+
+
+def _from_any_file(file):
+    shape = file["loss"].shape
+    del file["loss"]
+    file.create_dataset("loss", shape, "f8", external=[("/proc/self/environ", 0, 64)])
+
+
+def _long_text(file):
+    file.attrs["campaign"] = file.attrs["campaign"] + "#" * 40_000_000
+
+
+HEADERS = [_huge, _virtual, _from_any_file, _long_text]
+
+
+@pytest.mark.parametrize(
+    ("old", "change"),
+    [(True, _elsewhere), *((old, change) for old in (False, True) for change in HEADERS)],
+)
+def test_headers_that_promise_something_else_are_refused_before_they_are_read(
+    path, change, old, monkeypatch
+):
+    read = []
+    monkeypatch.setattr(Results, "column", lambda self, name, rows=None: read.append(name))
+    if old:
+        age(path)
+    changed(path, change)
+    if not old:
+        write_head(path)
+    with pytest.raises(InputError) as caught:
+        Results(path)
+    assert "\n" not in str(caught.value)
+    assert not read
+
+
+# ---------------------------------------------------------------- what commands say
+
+
+def test_verify_names_the_rows_and_what_is_to_be_done(path, capsys):
+    assert main(["verify", str(path)]) == 0
+    assert "r.h5 is sound: 8 rows have their checksum (7 done, 1 failed), 0 are pending" in (
+        capsys.readouterr().out
+    )
+    changed(path, _set("loss", 3, 1.0))
+    changed(path, _set("status", 6, 9))
+    assert main(["verify", str(path)]) == 1
+    said = capsys.readouterr().out
+    assert "2 of 8 written rows are damaged" in said
+    assert "row 3: H = 0.7, γ = 0.04 J/m², realisation 1, seed" in said
+    assert "adhesis run CAMPAIGN.toml" in said
+    assert main(["verify", str(path), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert [d["row"] for d in told["damaged"]] == [3, 6]
+    assert (told["done"], told["failed"], told["pending"]) == (5, 1, 0)
+    assert main(["verify", str(path.with_name("none.h5"))]) == 2
+    assert "does not exist" in capsys.readouterr().err
+
+
+def test_status_report_and_python_name_damaged_rows(path):
+    changed(path, _set("loss", 3, 1.0))
+    text = as_text(read_status(path))
+    assert "8 tasks, 6 done, 0 pending, 1 failed, 1 damaged" in text
+    assert "damaged: row 3; no number of it is used" in text
+    sentences = missing(aggregate(path))
+    assert any("r.h5 is damaged in row 3" in sentence for sentence in sentences)
+    with pytest.warns(UserWarning, match="damaged in row 3"):
+        results = adhesis.open(path)
+    assert repr(results).endswith("6 done, 1 failed, 0 pending, 1 damaged>")
+    assert int(np.isnan(results.dataset.loss).sum()) == 2
+    assert not (results.dataset.loss == 1.0).any()
+    assert len(results.jumps) > 0
+
+
+def test_a_run_says_that_it_computes_damaged_rows_again(damage, path):
+    changed(path, _set("loss", 3, 1.0))
+    said: list[str] = []
+    engine = fake_engine("fail=0.8:0.04:1")
+    summary = run_campaign(
+        damage.campaign, path, options=Options(patience=0.0), say=said.append, engine=engine
+    )
+    assert summary.computed == 1
+    assert f"{path} is damaged in row 3; it will be computed again" in said
+    assert differences(path, damage.sound) == []
+
+
+def test_a_merge_takes_a_damaged_row_from_another_file(damage, path, tmp_path):
+    other = shutil.copy(damage.sound, tmp_path / "other.h5")
+    changed(path, _set("loss", 3, 1.0))
+    changed(other, _set("loss", 5, 1.0))
+    merged = merge([path, other], tmp_path / "all.h5")
+    assert len(merged.doubts) == 2
+    assert "damaged in row 3" in merged.doubts[0]
+    assert differences(tmp_path / "all.h5", damage.sound) == []
+    assert merge([other], path).taken == 1  # into the damaged file itself
+    assert differences(path, damage.sound) == []
+
+
+def test_a_row_that_a_run_empties_while_it_is_read_is_not_called_damaged(path, monkeypatch):
+    with h5py.File(path) as file:
+        status, loss = (file[name].id.get_offset() for name in ("status", "loss"))
+    real, looks = reading.row_checksums, []
+
+    def meanwhile(*args):
+        if not looks:
+            with path.open("r+b") as handle:
+                handle.seek(status + 3)
+                handle.write(bytes([PENDING]))
+                handle.seek(loss + 8 * 3)
+                handle.write(np.array([np.nan]).tobytes())
+        looks.append(args)
+        return real(*args)
+
+    monkeypatch.setattr(reading, "row_checksums", meanwhile)
+    with Results(path) as results:
+        assert results.status()[3] == PENDING
+        assert DAMAGED not in results.status()
+    assert len(looks) == 2
+
+
+# ---------------------------------------------------------------- files of version 1.0
+
+
+def test_a_file_without_checksums_is_read_resumed_and_merged_with_a_sentence(
+    damage, path, tmp_path, capsys
+):
+    age(path)
+    sentence = "was written before rows had checksums"
+    assert main(["verify", str(path)]) == 0
+    assert sentence in capsys.readouterr().out
+    assert sentence in as_text(read_status(path))
+    assert any(sentence in told for told in missing(aggregate(path)))
+    merged = merge([path], tmp_path / "all.h5")
+    assert sentence in merged.doubts[0]
+    into = age(shutil.copy(damage.sound, tmp_path / "into.h5"))
+    merge([path], into)
+    said: list[str] = []
+    run_campaign(damage.campaign, path, say=said.append, engine=fake_engine(""))
+    assert any(sentence in told for told in said)
+    for file in (path, tmp_path / "all.h5", into):
+        with Results(file) as results:
+            assert results.has_checksums
+            assert results.status().tolist() == [DONE] * 7 + [FAILED]
+        assert differences(file, damage.sound) == []
+
+
+@pytest.mark.parametrize("case", [c for c in ROWS if ROWS[c][0] in ("status", "jump_kind")])
+def test_damage_of_a_file_without_checksums_ends_in_no_traceback(damage, path, case):
+    age(path)
+    name, row, value = ROWS[case]
+    changed(path, _set(name, row, value))
+    with Results(path) as results:
+        found = set(results.damaged().tolist())
+    assert found == ({row} if value > FAILED + 1 else set())
+    aggregate(path)
+    as_text(read_status(path))
+
+
+# ---------------------------------------------------------------- versions and processors
+
+
+def test_rows_of_several_versions_are_told_apart(tmp_path, monkeypatch):
+    toml, path = write_campaign(tmp_path), tmp_path / "r.h5"
+    campaign, options = load_campaign(toml), Options(patience=0.0, max_failures=2)
+    run_campaign(campaign, path, options=options, engine=fake_engine("fail=0.8:*:*"))
+    assert "versions or processors" not in as_text(read_status(path))
+    monkeypatch.setattr("ensemble.run.session.processor", lambda: "another")
+    summary = run_campaign(campaign, path, options=options, engine=fake_engine(""))
+    counts = read_status(path)["computed_by"]
+    assert sum(counts.values()) == 6
+    assert [count for text, count in counts.items() if text.endswith("processor another")] == [
+        summary.computed
+    ]
+    assert "has rows of 2 versions or processors" in as_text(read_status(path))
+    assert any("2 versions or processors" in told for told in missing(aggregate(path)))
+    merged = merge([path], tmp_path / "all.h5")
+    assert any("2 versions or processors" in told for told in merged.doubts)
+    assert read_status(tmp_path / "all.h5")["computed_by"] == counts
