@@ -14,7 +14,6 @@ from ensemble.trace.options import prepared_of, trace_of, what_was_read
 from ensemble.trace.plan import Plan, clock, make_plan
 from ensemble.trace.pool import Pool
 from solver.material import HalfSpace
-from solver.registry import METHOD_NAMES
 
 _SECONDS_BETWEEN_LINES = 10.0
 _FIGURES = ("trace.png", "spectrum.png", "loop.png", "cut-off.png", "tables.png")
@@ -29,8 +28,6 @@ def execute(args: argparse.Namespace) -> int:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
     gammas = _numbers(args.work_of_adhesion, "--work-of-adhesion")
     depths = _numbers(args.max_penetration, "--max-penetration")
-    if args.method not in METHOD_NAMES:
-        raise InputError(f"method is {args.method!r}: it must be one of {', '.join(METHOD_NAMES)}")
     with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
         cycle = make_cycle(half_space, gammas, depths, args.load_steps, args.method, args.accuracy)

@@ -9,18 +9,15 @@ from __future__ import annotations
 import argparse
 import json
 
-_EXAMPLES = """\
-examples:
-  adhesis verify results.h5
-  adhesis verify results.h5 --json
-"""
 SOUND, SOME_DAMAGED = 0, 1
+EXAMPLES = (
+    "adhesis verify paper.h5",
+    "adhesis verify paper.h5 --json",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.epilog = _EXAMPLES
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("file", metavar="FILE.h5", help="the results file")
     parser.add_argument(
         "--json", action="store_true", help="counts, and every damaged row with its task, as JSON"

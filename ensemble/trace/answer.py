@@ -213,29 +213,32 @@ def make_cycle(
     method: MethodName,
     accuracy: float,
 ) -> Cycle:
-    """Contact and cycle, with the values of both tables."""
+    """Make contact and cycle, with the values of both tables.
+
+    Raises
+    ------
+    TypeError, ValueError
+        What the solver would refuse of them.
+    """
+    choice("method", method, METHOD_NAMES)
+    real("accuracy", accuracy, ACCURACY)
     gammas, depths = default_tables(
         _several("work_of_adhesion", work_of_adhesion), _several("max_penetration", max_penetration)
     )
+    for name, values in (("work_of_adhesion", gammas), ("max_penetration", depths)):
+        if not values:
+            raise ValueError(f"{name} is empty: it must hold one number at least")
+    for depth in depths:
+        check_cycle(depth, load_steps)
     return Cycle(half_space, gammas, depths, load_steps, method, accuracy)
 
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
-    """Refuse, before any work, what the solver would refuse (ValueError or TypeError)."""
+    """Refuse a prepared trace that the solver would refuse, before any work."""
     instance("prepared", prepared, Prepared, "prepare_trace(read_trace(path))")
-    choice("method", cycle.method, METHOD_NAMES)
-    real("accuracy", cycle.accuracy, ACCURACY)
-    for name, values in (
-        ("work_of_adhesion", cycle.works_of_adhesion),
-        ("max_penetration", cycle.max_penetrations),
-    ):
-        if not values:
-            raise ValueError(f"{name} is empty: it must hold one number at least")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
         Problem(profile, cycle.half_space, gamma)
-    for depth in cycle.max_penetrations:
-        check_cycle(depth, cycle.load_steps)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:

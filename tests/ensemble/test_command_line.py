@@ -106,7 +106,7 @@ BAD = {
     "loop": [
         ("--hurst 0.8 --decimal x", "--decimal: invalid choice"),
         *((f"--hurst 0.8 --{name} nan", f"{name} is nan") for name in ("young", "period")),
-        ("--heights none.npy --period 1e-3", "none.npy"),
+        ("--heights none.npy --period 1e-3", "with --heights the material has to be given"),
     ],
     "trace": [
         ("text", "required: --work-of-adhesion, --young, --poisson"),
@@ -116,8 +116,8 @@ BAD = {
     "validate": [("--method ''", "--method is ''"), ("--method magic", "--method is 'magic'")],
     "bench": [
         *((f"--budget {bad}", "--budget is") for bad in ("0", "-1", "nan", "inf")),
-        ("--to text", "--to is 'text'"),
-        ("--to text/below", "--to is 'text/below'"),
+        ("--to text", "--to is text: "),
+        ("--to text/below", "--to is text/below: "),
     ],
     "warm": [("--own 3", "unrecognized arguments: 3")],
     "doctor": [("--in none", "--in none"), ("--in text", "--in text"), ("--in ''", "--in is ''")],

