@@ -1,6 +1,6 @@
 """Count how often an error sentence reaches the terminal under mpirun: it must be once in each run.
 
-    python tools/fuzz/messages.py --runs 200 [--busy] [--case "unknown option"]
+    python tools/messages.py --runs 200 [--busy] [--case "unknown option"]
 
 Runs commands with bad input on three ranks and prints, for each, how many runs gave the sentence
 exactly once with exit code 2. ``--busy`` keeps every core busy meanwhile. Exit code 1 if a run
@@ -37,7 +37,7 @@ def run(folder: Path, words: tuple[str, ...], sentence: str) -> tuple[int, int]:
     done = subprocess.run(
         [str(launcher()), "-n", str(RANKS), sys.executable, "-m", "ensemble", *words],
         cwd=folder,
-        env=launch_environment(RANKS) | {"PYTHONPATH": str(Path(__file__).parents[2])},
+        env=launch_environment(RANKS) | {"PYTHONPATH": str(Path(__file__).parents[1])},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
