@@ -230,6 +230,15 @@ def test_both_packages_can_be_run():
 # ---------------------------------------------------------------------- interrupts
 
 
+@pytest.fixture
+def ctrl_c():
+    """Let SIGINT interrupt, also where the tests were started with it ignored, as by ``&``."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "run"])
 @pytest.mark.parametrize(
     ("number", "code", "word"),
