@@ -25,11 +25,9 @@ from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
 from ensemble.outputs import target_of
-from ensemble.results.checksum import row_checksums
 from ensemble.results.head import reserve_head, write_head
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
-    CHECKSUM,
     DAMAGED,
     DATASETS,
     FILE_TYPE,
@@ -171,7 +169,7 @@ def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) ->
     of_kept = old.column(KEPT)
     kept = np.searchsorted(file[KEPT][:], target[of_kept])
     for column in DATASETS:
-        if column in TASK_DATASETS or column is CHECKSUM:
+        if column in TASK_DATASETS:
             continue
         dataset = file[column.name]
         targets = kept if column.dims[0] == KEPT else target
@@ -183,11 +181,3 @@ def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) ->
             block, rows = block[chosen], targets[first : first + len(chosen)][chosen]
             for i, (start, stop) in stretches(rows):
                 dataset[start:stop] = block[i : i + stop - start]
-    # A further axis is a further dataset, which the checksums of the old file do not cover.
-    copied = np.sort(target[sound])
-    checksums = row_checksums(
-        lambda name, rows: file[name][rows],
-        *(datasets(campaign), sizes_of(scales(campaign, part)), file[KEPT][:], copied),
-    )
-    for i, (start, stop) in stretches(copied):
-        file[CHECKSUM.name][start:stop] = checksums[i : i + stop - start]
