@@ -235,6 +235,17 @@ def test_rounds_go_one_after_the_other_and_the_longest_first_within():
     assert [schedule.take() for _ in range(4)] == [0, 10, 4, 5]
 
 
+def test_times_of_an_earlier_run_count_as_often_as_they_were_measured():
+    """From them the time of a group of which nothing is known is estimated, by its prior."""
+    schedule = Schedule([0, 1], {0: "short", 1: "long"}, {"short": 1.0, "long": 3.0})
+    assert schedule.seconds_waiting is None
+    schedule.measured("short", 40.0, 4)
+    assert schedule.estimate("long") == 30.0
+    assert schedule.seconds_waiting == 40.0
+    schedule.measured("short", 10.0)
+    assert schedule.estimate("long") == 30.0
+
+
 def test_a_signal_to_one_worker_stops_all():
     channel, collected, reason, schedule = simulate(5, [10.0] * 50, signal_at=15.0)
     assert reason == "SIGUSR1 received"
