@@ -304,7 +304,8 @@ def test_every_cell_is_tried_before_anything_is_written(tmp_path, changes, sente
     """A value far down a list is refused at once, and not when its turn has come."""
     campaign = load_campaign(write_campaign(tmp_path, **changes))
     out = tmp_path / "r.h5"
-    with pytest.raises(InputError, match=re.escape(f"this campaign cannot be computed: {sentence}")):
+    refusal = re.escape(f"this campaign cannot be computed: {sentence}")
+    with pytest.raises(InputError, match=refusal):
         run_campaign(campaign, out, engine=replace(fake_engine(""), check=check_task))
     assert [file.name for file in tmp_path.iterdir()] == ["c.toml"]
 
