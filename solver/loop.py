@@ -197,7 +197,8 @@ def unload(
     step : callable
         Follows the path to a place on the axis and returns the state there.
     marks : sequence of float
-        Further places at which a step ends; those above ``turn`` are not passed.
+        Further places at which a step ends; those above ``turn`` are not passed. A load step within
+        rounding of one gives way to it.
 
     Raises
     ------
@@ -222,9 +223,11 @@ def unload(
             wanted = _LONG_STEP * max(unit, -end) / (axis(i + 1) - end)
             stride = max(1, min(2 * stride, int(wanted)))
         stops = []
-        while ahead and ahead[-1] > end:
+        while ahead and ahead[-1] > end - axis.near:
             stops.append(ahead.pop())
-        for drive in [*stops, end]:
+        if not stops or stops[-1] > end + axis.near:
+            stops.append(end)
+        for drive in stops:
             state = step(drive)
             if not state.patches:
                 break

@@ -27,17 +27,21 @@ class Axis:
         """Return the place of a load step; of the last one ``top`` itself, without rounding."""
         return self.top if index == self.load_steps else self.top * index / self.load_steps
 
+    @property
+    def near(self) -> float:
+        """Distance within which two places are one."""
+        return _NEAR * self.top / self.load_steps
+
     def above(self, drive: float) -> int:
         """Number of the first load step at or above ``drive``."""
         return math.ceil(drive * self.load_steps / self.top - _NEAR)
 
     def apart(self, places: Sequence[float], others: Sequence[float] = ()) -> list[float]:
         """Those of the places that are no load step, none of the others, and differ."""
-        near = _NEAR * self.top / self.load_steps
         found: list[float] = []
         for place in sorted(places):
             step = self(round(place * self.load_steps / self.top))
-            if all(abs(place - other) > near for other in (step, *others, *found[-1:])):
+            if all(abs(place - other) > self.near for other in (step, *others, *found[-1:])):
                 found.append(place)
         return found
 
@@ -48,9 +52,8 @@ class Axis:
         """
         low, high = min(start, end), max(start, end)
         kept = sorted({low, high, *(m for m in marks if low < m < high)})
-        near = _NEAR * self.top / self.load_steps
         grid = (self(k) for k in range(self.above(low), self.above(high)))
-        way = sorted([*kept, *(p for p in grid if min(abs(p - k) for k in kept) > near)])
+        way = sorted([*kept, *(p for p in grid if min(abs(p - k) for k in kept) > self.near)])
         return way if start <= end else way[::-1]
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.results.schema import CHECKSUM
+from ensemble.results.schema import CHECKSUM, ROW_DATASETS
 from ensemble.task.dataset import KEPT, Dataset, row_shape
 
 _BLOCK_BYTES = 16 * 2**20
@@ -26,20 +26,12 @@ Read = Callable[[str, slice], NDArray[Any]]
 """Returns some rows of a dataset, by its name."""
 
 
-def covered(datasets: Iterable[Dataset]) -> tuple[tuple[Dataset, ...], tuple[Dataset, ...]]:
-    """Return the datasets that a row's checksum covers, in its order.
-
-    Returns
-    -------
-    of_tasks, of_kept : tuples of Dataset
-        Those with a row for each task, by name, then those with a row for each task that keeps its
-        fields, by name.
-    """
-    ordered = sorted((d for d in datasets if d is not CHECKSUM), key=lambda d: d.name)
-    return (
-        tuple(d for d in ordered if d.dims[0] != KEPT),
-        tuple(d for d in ordered if d.dims[0] == KEPT),
-    )
+_ORDERED = sorted((d for d in ROW_DATASETS if d is not CHECKSUM), key=lambda d: d.name)
+# The datasets that the checksum of a row covers, in its order: what a run writes, not what the task
+# is. A row thus keeps its checksum when the campaign grows by an axis. The tasks never change, and
+# the checksum of the head covers them (ensemble.results.head).
+OF_TASKS = tuple(d for d in _ORDERED if d.dims[0] != KEPT)
+OF_KEPT = tuple(d for d in _ORDERED if d.dims[0] == KEPT)
 
 
 def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
@@ -59,7 +51,6 @@ def checksum(parts: Iterable[NDArray[Any]], start: int = 0) -> int:
 
 def row_checksums(
     read: Read,
-    datasets: Iterable[Dataset],
     sizes: Mapping[str, int],
     kept: NDArray[np.intp],
     rows: NDArray[np.intp],
@@ -69,8 +60,6 @@ def row_checksums(
     Parameters
     ----------
     read : callable
-    datasets : iterable of Dataset
-        All datasets of the file.
     sizes : mapping of int
         Lengths of the dimensions.
     kept : int array
@@ -78,22 +67,21 @@ def row_checksums(
     rows : int array
         Ascending.
     """
-    of_tasks, of_kept = covered(datasets)
     out = np.zeros(rows.size, np.uint32)
-    widths = [prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in of_tasks]
+    widths = [prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in OF_TASKS]
     step = max(1, _BLOCK_BYTES // sum(widths))
     done = 0
     while done < rows.size:
         first = int(rows[done])
         last = done + int(np.searchsorted(rows[done:], first + step))
-        block = _side_by_side(read, of_tasks, slice(first, int(rows[last - 1]) + 1), widths)
+        block = _side_by_side(read, OF_TASKS, slice(first, int(rows[last - 1]) + 1), widths)
         for place in range(done, last):
             row = int(rows[place])
             value = zlib.crc32(block[row - first].data)
             where = int(np.searchsorted(kept, row))
             if where < kept.size and kept[where] == row:
                 here = slice(where, where + 1)
-                value = checksum((read(d.name, here) for d in of_kept), value)
+                value = checksum((read(d.name, here) for d in OF_KEPT), value)
             out[place] = value
         done = last
     return out

@@ -317,7 +317,7 @@ class Results:
     def _checksums(self, rows: NDArray[np.intp]) -> NDArray[np.uint32]:
         """Compute the checksums of some rows (ascending) from what they hold."""
         kept = self.column(KEPT)
-        return row_checksums(self.column, self._datasets, self._sizes, kept, rows)
+        return row_checksums(self.column, self._sizes, kept, rows)
 
     def _origins(self, rows: NDArray[np.intp]) -> NDArray[np.bytes_]:
         """Take the versions that laid the file out for those that computed its rows."""

@@ -17,9 +17,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.file import parse_campaign
 from ensemble.errors import WriteError
-from ensemble.results.checksum import checksum, covered
+from ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
 from ensemble.results.schema import (
     CHECKSUM,
     DATASETS,
@@ -31,7 +30,6 @@ from ensemble.results.schema import (
     PENDING,
     STATUS,
     TASK_DATASETS,
-    datasets,
     encode_text,
 )
 from ensemble.task.dataset import KEPT
@@ -70,11 +68,6 @@ class Writer:
         self._origin = origin
         self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
         self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
-        campaign = parse_campaign(self._file.attrs["campaign"], str(self.path))
-        of_tasks, of_kept = covered(datasets(campaign))
-        self._order = [dataset.name for dataset in (*of_tasks, *of_kept)]
-        written = {d.name for d in (*_CONTENT, STATUS)}
-        self._tasks = {name: self._file[name][:] for name in self._order if name not in written}
 
     def __enter__(self) -> Self:
         return self
@@ -155,11 +148,8 @@ class Writer:
                         rows_of.block(values[name]) if given else rows_of.filled(dataset.fill)
                     )
                     rows_of.write(place, blocks[name])
-            parts = (
-                blocks[name] if name in blocks else self._tasks[name][row : row + 1]
-                for name in self._order
-                if name in blocks or name in self._tasks
-            )
+            covered = (d.name for d in (*OF_TASKS, *OF_KEPT))
+            parts = (blocks[name] for name in covered if name in blocks)
             rows_of = self._datasets[CHECKSUM.name]
             rows_of.write(row, rows_of.block(checksum(parts)))
             self.flush()

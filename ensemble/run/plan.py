@@ -154,7 +154,7 @@ def prepare(
         )
     if redo is not None:
         redo.check(tasks)
-    for task in {(t.hurst, t.others): t for t in reversed(tasks)}.values():
+    for task in {t.cell: t for t in reversed(tasks)}.values():
         check(campaign, task)
     _check_path(path)
     lock.acquire(size, patience)

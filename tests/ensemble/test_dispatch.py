@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import queue
 import random
 import signal
 import threading
@@ -13,7 +14,15 @@ import pytest
 from numba import njit
 
 from ensemble.run.attempt import GivenUp, Outcome, attempt
-from ensemble.run.dispatch import AHEAD, MOST_AHEAD, Limits, Master, Overdue, work_alone
+from ensemble.run.dispatch import (
+    AHEAD,
+    MOST_AHEAD,
+    Limits,
+    Master,
+    Overdue,
+    Worker,
+    work_alone,
+)
 from ensemble.run.schedule import Schedule
 from ensemble.run.units import Units
 from solver import compiled as module
@@ -226,6 +235,17 @@ def test_rounds_go_one_after_the_other_and_the_longest_first_within():
     assert [schedule.take() for _ in range(4)] == [0, 10, 4, 5]
 
 
+def test_times_of_an_earlier_run_count_as_often_as_they_were_measured():
+    """From them the time of a group of which nothing is known is estimated, by its prior."""
+    schedule = Schedule([0, 1], {0: "short", 1: "long"}, {"short": 1.0, "long": 3.0})
+    assert schedule.seconds_waiting is None
+    schedule.measured("short", 40.0, 4)
+    assert schedule.estimate("long") == 30.0
+    assert schedule.seconds_waiting == 40.0
+    schedule.measured("short", 10.0)
+    assert schedule.estimate("long") == 30.0
+
+
 def test_a_signal_to_one_worker_stops_all():
     channel, collected, reason, schedule = simulate(5, [10.0] * 50, signal_at=15.0)
     assert reason == "SIGUSR1 received"
@@ -269,6 +289,56 @@ def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
             halts=False,
             limits=lambda c: Limits(stop=lambda: "walltime" if c.now > 3 else None, grace=30.0),
         )
+
+
+class Mailboxes:
+    """A channel between a master and one worker in threads of one process."""
+
+    size = 2
+
+    def __init__(self, rank, boxes):
+        self.rank, self._boxes = rank, boxes
+
+    def send(self, to, message, *, urgent=False):
+        """Put a message into a box of its receiver."""
+        self._boxes[to, urgent].put((self.rank, message))
+
+    def poll(self, *, urgent=False):
+        """Take a message from the own box."""
+        try:
+            return self._boxes[self.rank, urgent].get_nowait()
+        except queue.Empty:
+            return None
+
+
+def test_a_stop_reaches_a_worker_in_the_middle_of_its_task():
+    """While it computes it looks for urgent messages alone; the task would never end by itself."""
+    boxes = {(r, urgent): queue.SimpleQueue() for r in (0, 1) for urgent in (False, True)}
+    under_way, ended, released = threading.Event(), [], threading.Event()
+
+    def compute(task, check):
+        under_way.set()
+        while not released.is_set():
+            check()
+            time.sleep(1e-3)
+
+    def work():
+        Worker(Mailboxes(1, boxes), compute, lambda outcome: outcome, Limits()).run()
+        ended.append(True)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    limits = Limits(stop=lambda: "told to" if under_way.is_set() else None, grace=10.0)
+    collected = []
+    schedule = Schedule([0], {0: 0}, {0: 1.0})
+    master = Master(Mailboxes(0, boxes), schedule, {0: 0}, collected.append, limits)
+    try:
+        assert master.run() == "told to"
+    finally:
+        released.set()
+        boxes[1, False].put((0, ("dismissed",)))
+        worker.join()
+    assert (collected, ended) == ([], [True])
 
 
 def test_tasks_that_would_not_end_in_time_stay_behind():

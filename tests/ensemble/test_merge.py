@@ -87,6 +87,21 @@ def test_a_merge_is_resumed_and_grown(tmp_path):
     assert merge([two], out).taken == 0
 
 
+def test_rows_stay_sound_when_a_number_of_the_campaign_becomes_an_axis(tmp_path):
+    """The file gains a dataset for the axis; what was computed is neither damaged nor lost."""
+    out = computed(tmp_path / "all.h5", skip=(2,))
+    part = computed(tmp_path / "part.h5")
+    grown = write_campaign(tmp_path, realisations="6", young="[1e6, 2e6]")
+    assert run(grown, out).computed == 25
+    with Results(out) as results:
+        assert results.status().tolist() == [DONE] * 48
+    created = tmp_path / "grown.h5"
+    create(created, load_campaign(grown))
+    assert merge([part], created).done == 24
+    with Results(created) as results:
+        assert np.bincount(results.status()).tolist() == [24, 24]
+
+
 def test_what_failed_in_one_part_gives_way_to_what_was_done_in_another(tmp_path):
     first = computed(tmp_path / "a.h5", fail=(3, 4), skip=(9,))
     second = computed(tmp_path / "b.h5", fail=(4, 9), skip=(5,))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -21,7 +23,8 @@ from ensemble.results.write import Writer
 from ensemble.run import session
 from ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from ensemble.run.plan import Plan
-from ensemble.run.session import Engine, Options
+from ensemble.run.session import Engine, Options, run_campaign
+from ensemble.task.compute import check_task
 from tests.support.campaign_support import (
     TESTS,
     adhesis,
@@ -32,7 +35,7 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
-from tests.support.fake_run import fake_result
+from tests.support.fake_run import fake_engine, fake_result
 
 
 def run(folder, *words, fake="", **changes):
@@ -286,6 +289,24 @@ def test_bad_campaigns_leave_nothing_behind(tmp_path):
     assert "speed is unknown" in refused(tmp_path, jumps="8\nspeed = 3")
     assert "nodes_per_wave is 4: it must be" in refused(tmp_path, nodes_per_wave="4")
     assert "cannot be computed" in refused(tmp_path, method='"sharp"')  # it has no nodes
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"work_of_adhesion": "[0.01, 1e25]"}, "work_of_adhesion is 1e+25 J/m²"),
+        ({"work_of_adhesion": "[1e-25, 0.01]"}, "work_of_adhesion is 1e-25 J/m²"),
+        ({"young": "[1e6, 1e15]"}, "work_of_adhesion is 0.01 J/m²"),
+    ],
+)
+def test_every_cell_is_tried_before_anything_is_written(tmp_path, changes, sentence):
+    """A value far down a list is refused at once, and not when its turn has come."""
+    campaign = load_campaign(write_campaign(tmp_path, **changes))
+    out = tmp_path / "r.h5"
+    refusal = re.escape(f"this campaign cannot be computed: {sentence}")
+    with pytest.raises(InputError, match=refusal):
+        run_campaign(campaign, out, engine=replace(fake_engine(""), check=check_task))
+    assert [file.name for file in tmp_path.iterdir()] == ["c.toml"]
 
 
 def test_bad_options(tmp_path):

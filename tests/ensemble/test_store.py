@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import re
 import subprocess
@@ -474,6 +475,10 @@ def test_a_lock_file_that_is_replaced_while_a_run_waits_is_not_taken_for_the_loc
 
 def test_who_holds_a_results_file_is_known_without_waiting_for_it(tmp_path):
     path = tmp_path / "r.h5"
+    assert holder(path) is None
+    # A killed run has left its text, which is longer than that of the next one.
+    card = {"host": 200 * "long", "pid": 1, "ranks": 4, "since": "2026-01-01"}
+    (tmp_path / "r.h5.lock").write_text(json.dumps(card))
     assert holder(path) is None
     process = holding(path)
     assert holder(path)["pid"] == process.pid

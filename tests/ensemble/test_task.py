@@ -7,6 +7,7 @@ import pytest
 
 from ensemble.campaign.file import parse_campaign
 from ensemble.campaign.tasks import Part
+from ensemble.run.attempt import TimeLimit
 from ensemble.task.compute import Runner, make_problem, run_task
 from ensemble.task.dataset import KEPT, row_shape, sizes_of
 from ensemble.task.doubt import doubtful
@@ -15,6 +16,7 @@ from solver.jumps import JUMP_KINDS, Jump
 from solver.loop import run_loop
 from solver.loop_result import LoopResult
 from solver.method import MethodReport, PathError
+from solver.record import Record
 from solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 
@@ -128,6 +130,28 @@ def test_loops_that_share_a_loading_branch_do_not_depend_on_what_else_is_compute
     assert bits(stopped(campaign, tasks[1])) == alone[1]
     other = campaign.sharing(campaign.tasks()[1])
     assert bits(stopped(campaign, other[2])) == bits(run_task(campaign, other[2]))
+
+
+@pytest.mark.parametrize("moment", [1, 2, 5])
+def test_a_loading_branch_that_was_interrupted_is_not_gone_on_with(monkeypatch, moment):
+    """A time limit may end it anywhere, as here between a state and the end of its step."""
+    campaign = parse_campaign(TURNS)
+    tasks = campaign.sharing(campaign.tasks()[0])
+    runner = Runner()
+    runner(campaign, tasks[0])
+    visit, seen = Record.visit, []
+
+    def interrupted(record, *state):
+        visit(record, *state)
+        seen.append(state)
+        if len(seen) == moment:
+            raise TimeLimit
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Record, "visit", interrupted)
+        with pytest.raises(TimeLimit):
+            runner(campaign, tasks[1])
+    assert bits(runner(campaign, tasks[2])) == bits(run_task(campaign, tasks[2]))
 
 
 def test_loops_that_share_a_loading_branch_are_those_of_campaigns_of_their_own():

@@ -119,6 +119,15 @@ def test_the_cut_off_is_proposed_given_or_refused() -> None:
         prepared(1e-9 * np.random.default_rng(0).standard_normal(N))
 
 
+def test_a_tip_radius_that_is_given_goes_before_that_of_the_file() -> None:
+    """So does a radius of 0, which is none: the file may name the radius of a new tip."""
+    trace = Trace(Path("t.txt"), Z, STEP, tip_radius=100e-6)
+    radii = (None, 200e-6, 100e-6, 50e-6, 0.0)
+    limits = [prepare_trace(trace, tip_radius=radius).limits["tip"] for radius in radii]
+    assert limits[1] > limits[2] > limits[3] > limits[4] == 0.0
+    assert limits[0] == limits[2]
+
+
 def test_long_waves_that_decide_alone_are_warned_of() -> None:
     found = prepared(Z + 4e-6 * np.sin(2 * np.pi * X / X[-1]), degree=1)
     assert any("waves longer than a third" in warning for warning in found.warnings)

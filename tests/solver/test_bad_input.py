@@ -1004,6 +1004,21 @@ def test_without_adhesion_there_is_no_residual_and_no_tension() -> None:
     assert path([0.5], method=ExactWave(none.problem)).audit_residual == 0
 
 
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda zero: Control(zero),
+        lambda zero: HalfSpace(1e6, zero),
+        lambda zero: Problem(WAVE, SOLID, zero),
+        lambda zero: real("value", zero),
+    ],
+)
+def test_a_zero_has_no_sign(make: Callable[[float], Any]) -> None:
+    """A stiffness of -0.0 is that of load control, and nothing prints "-0"."""
+    assert repr(make(-0.0)) == repr(make(0.0))
+    assert pickle.dumps(make(-0.0)) == pickle.dumps(make(0.0))
+
+
 def test_a_penetration_within_rounding_of_first_touch_is_0() -> None:
     h_max = WAVE.h_max
     for s in (h_max, np.nextafter(h_max, 1), np.nextafter(h_max, 0)):

@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import ContactState, HalfSpace, Path, Problem, run_loop, single_wave
+from adhesis import ContactState, Control, HalfSpace, Path, Problem, run_loop, single_wave
 from solver.jumps import Jump, classify
 from solver.loop import check_cycle
+from solver.loop_result import estimated_error
 from solver.method import Fields, Method, MethodReport, Opening, PathError
 from solver.profile import Profile
+from solver.record import Record
 from solver.references.exact_wave import ExactWave
 from solver.references.single_wave import SingleWave
 from tests.support.scenes import HALF_SPACE
@@ -186,6 +188,7 @@ def test_audit_catches_energy_drops_that_are_not_the_loss():
     problem = exact(0.2).problem
     result = run_loop(_Untrue(problem), max_penetration=0.8, load_steps=20)
     assert result.audit_residual == pytest.approx(-0.1, abs=1e-3)
+    assert result.loss_error > abs(result.loss - result.loss_from_drops)  # whichever is larger
 
 
 class _Upwards(ExactWave):
@@ -223,6 +226,24 @@ def test_a_negative_drop_counts_in_the_error_and_is_said():
     assert min(jump.energy_drop for jump in result.jumps) < 0
     assert result.loss_error == pytest.approx(0.1 * result.loss, rel=0.02)
     assert any("numerical error of the loss" in text for text in result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "kind", "error"),
+    [
+        (0.0, "pull-off", 0.0),
+        (0.0, "merging", 0.5),
+        (1e9, "pull-off", 0.5),
+        (np.inf, "pull-off", 0.5),
+    ],
+)
+def test_under_a_load_the_last_drop_may_be_negative_without_an_error(stiffness, kind, error):
+    """It is U there; any other drop below zero is an error of the energies."""
+    problem = replace(exact(0.2).problem, control=Control(stiffness))
+    drops = (("snap-in", 2.0), (kind, -0.5))
+    jumps = [Jump("unloading", 0.0, drop, name, 1, 0, 0.1, 0.0, 0.0) for name, drop in drops]
+    assert estimated_error(Record(jumps=jumps, error=0.0), 0.0, problem) == error
+    assert estimated_error(Record(jumps=jumps, error=0.25), -0.125, problem) == error + 0.375
 
 
 def test_a_drop_is_the_difference_of_the_energies_whatever_its_sign():

@@ -55,6 +55,17 @@ def test_loops_of_one_loading_branch_are_the_separate_loops():
     assert set(np.round(np.arange(9) * 0.1, 12)) <= set(np.round(on_axis, 12))
 
 
+def test_unloading_from_between_two_load_steps_ends_at_each_load_step_below():
+    wave = wave_of(0.2)
+    problem = Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave.work_of_adhesion)
+    low, _ = run_loops(ExactWave(problem), max_penetration=[0.55, 0.8], load_steps=8)
+    path = run_path(ExactWave(problem), [0.8, 0.3, 0.55], load_steps=8)
+    for result, chosen in ((low, low.branch == "unloading"), (path, path.leg == 3)):
+        on_axis = result.penetration[chosen & result.load_step]
+        way = [0.55, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0]
+        np.testing.assert_allclose(on_axis[: len(way)], way, atol=1e-12)
+
+
 def test_a_loop_has_the_same_bits_whichever_others_were_followed_before_it():
     profile = self_affine_profile(0.5, period=PERIOD, n0=3, ratio=16, seed=5, h_rms=1e-6)
 

@@ -64,6 +64,23 @@ def test_wider_spectrum_keeps_the_waves_it_had():
     assert not np.allclose(np.angle(other.coefficients[10:50]), phase[:40])
 
 
+@pytest.mark.parametrize("amplitudes", ["deterministic", "rayleigh"])
+def test_a_spectrum_that_begins_earlier_keeps_the_waves_it_had(amplitudes):
+    """Phase and Rayleigh amplitude of a wave depend on its number and the seed alone."""
+    late = spectral(0.8, c0=1e-14, amplitudes=amplitudes, **ROUGH)
+    earlier = {**ROUGH, "n0": 5, "ratio": 40}
+    early = spectral(0.8, c0=1e-14 * 2**2.6, amplitudes=amplitudes, **earlier)
+    np.testing.assert_allclose(early.coefficients[10:], late.coefficients[10:], rtol=1e-12)
+    assert early.coefficients[5:10].all()
+
+
+def test_a_rolloff_is_flat_and_keeps_the_longest_wave():
+    power = np.abs(spectral(0.8, c0=1e-14, rolloff=4.0, **ROUGH).coefficients) ** 2
+    np.testing.assert_allclose(power[10:41], 1e-14, rtol=1e-12)
+    m = np.arange(40, 201)
+    np.testing.assert_allclose(power[40:], 1e-14 * (m / 40.0) ** -2.6, rtol=1e-12)
+
+
 def test_finer_grid_is_the_same_function(rough):
     np.testing.assert_allclose(rough.heights(4096)[::8], rough.heights(512), atol=1e-20)
     x = np.arange(512) * rough.period / 512

@@ -12,7 +12,7 @@ from ensemble.campaign.tables import Campaign
 from ensemble.results.checksum import row_checksums
 from ensemble.results.head import HEAD, write_head
 from ensemble.results.layout import create
-from ensemble.results.schema import LATER_DATASETS, axis_datasets, datasets, kept_rows
+from ensemble.results.schema import LATER_DATASETS, axis_datasets, kept_rows
 from ensemble.task.dataset import KEPT
 from ensemble.task.fields import GAP_EDGES, field_plan
 from solver.jumps import JUMP_KINDS
@@ -175,11 +175,10 @@ def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
 def sign(path: Path) -> Path:
     """Give a results file and its rows the checksums of what they hold, as if all were written."""
     with h5py.File(path, "r+") as file:
-        plan = parse_campaign(file.attrs["campaign"])
         sizes = {name: data.size for name, data in file.items() if data.is_scale}
         file["checksum"][...] = row_checksums(
             lambda name, rows: file[name][rows],
-            *(datasets(plan), sizes, file[KEPT][:], np.arange(file["task"].size)),
+            *(sizes, file[KEPT][:], np.arange(file["task"].size)),
         )
     write_head(path)
     return path
