@@ -5,8 +5,8 @@ SHELL := /bin/bash
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
 ARGS :=
-# Processes that run tests; a module's tests stay together (tests/conftest.py).
-JOBS := 2
+# Processes that run tests, one of which mostly waits for ranks and jobs; a module's tests stay together.
+JOBS := 3
 CAMPAIGN := jobs/example.toml
 FOR := 600
 

@@ -25,6 +25,15 @@ _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd
 _STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
 
 
+def target_of(path: Path | str) -> Path:
+    """Return the file that a path leads to: that of a symbolic link, or the path itself.
+
+    Other paths stay as they were given, for messages.
+    """
+    path = Path(path)
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
 # ---------------------------------------------------------------------- before the work
 
 
@@ -118,7 +127,7 @@ def _refusing(option: str, path: Path) -> Iterator[None]:
 def _check_file(option: str, path: Path) -> None:
     if _descriptor(path) is not None:
         return
-    target = _target(path)
+    target = target_of(path)
     if target.is_dir():
         raise InputError(f"{option} is {path}: it is a directory, not a file to write")
     if not target.parent.is_dir():
@@ -211,7 +220,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         with os.fdopen(os.dup(descriptor), "wb") as file:
             yield file
         return
-    target = _target(path)
+    target = target_of(path)
     if _in_place(target):
         with target.open("wb") as file:
             yield file
@@ -252,11 +261,6 @@ def _umask() -> int:
     umask = os.umask(0)
     os.umask(umask)
     return umask
-
-
-def _target(path: Path) -> Path:
-    """The file that a path leads to through symbolic links."""
-    return Path(os.path.realpath(path))
 
 
 def _in_place(target: Path) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ensemble.errors import InputError
-from ensemble.trace.foreign import container
+from ensemble.trace.containers import container
 from ensemble.trace.read import holds_numbers, load_array
 from ensemble.trace.text import Table, read_column
 from ensemble.trace.units import METRES, length_text, parse_units, units_of_header

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ensemble.aggregate.average import Aggregate
-from ensemble.foreign import code_span, fence, markdown, printable
+from ensemble.escape import code_span, fence, markdown, printable
 from ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from ensemble.report import findings, paper
 from ensemble.report.axes import shown_cells

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import IO
 
 from ensemble.aggregate.average import Aggregate, aggregate
-from ensemble.foreign import printable
+from ensemble.escape import printable
 from ensemble.outputs import Writing, staged_folder
 
 

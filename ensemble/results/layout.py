@@ -24,7 +24,7 @@ import numpy as np
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part
 from ensemble.errors import InputError
-from ensemble.foreign import target
+from ensemble.outputs import target_of
 from ensemble.results.head import reserve_head, write_head
 from ensemble.results.read import Results, stretches
 from ensemble.results.schema import (
@@ -72,7 +72,7 @@ def create(
     InputError
         If the file cannot be written or the disk is too small.
     """
-    path = target(path)
+    path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
     needed = file_size(campaign, part)
     try:

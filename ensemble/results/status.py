@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ensemble.campaign.precision import relative_error
-from ensemble.foreign import one_line, printable
+from ensemble.escape import one_line, printable
 from ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows, them
 from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful

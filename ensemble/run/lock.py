@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from ensemble.errors import InputError, WriteError
-from ensemble.foreign import one_line, target
+from ensemble.escape import one_line
+from ensemble.outputs import target_of
 
 # Two bytes far beyond the text: the run as a whole, and the ranks that write.
 _RUN, _WRITERS = 1 << 30, (1 << 30) + 1
@@ -197,7 +198,7 @@ class RunLock:
 
 
 def _lock_of(results: Path) -> Path:
-    results = target(results)
+    results = target_of(results)
     return results.with_name(f"{results.name}.lock")
 
 

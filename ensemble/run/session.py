@@ -14,7 +14,7 @@ import h5py
 
 from ensemble.campaign.tables import Campaign
 from ensemble.campaign.tasks import WHOLE, Part, Task
-from ensemble.foreign import target
+from ensemble.outputs import target_of
 from ensemble.results.schema import origin_of
 from ensemble.results.write import Writer
 from ensemble.run.attempt import Compute, Outcome, StopCheck
@@ -184,7 +184,7 @@ def run_campaign(
         If workers did not stop in time when told to; the results file is sound.
     """
     options, engine = options or Options(), engine or Engine()
-    path = target(path)
+    path = target_of(path)
     if comm is not None and comm.size == 1:
         comm = None
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)

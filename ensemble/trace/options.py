@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from ensemble.errors import InputError
-from ensemble.foreign import printable
+from ensemble.escape import printable
 from ensemble.trace.prepare import Prepared, prepare_trace
 from ensemble.trace.read import Trace, read_trace
 from ensemble.trace.text import DELIMITERS

@@ -8,7 +8,7 @@ import re
 from importlib import metadata
 from pathlib import Path
 
-from ensemble.foreign import code_span, markdown, printable
+from ensemble.escape import code_span, markdown, printable
 from ensemble.trace.answer import _DOUBTS, COVERAGE, Answer, Quantity
 from ensemble.trace.figures import Drawn, draw_all
 from ensemble.trace.units import counted, length_text

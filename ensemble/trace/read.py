@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ensemble.errors import InputError, parameter, refused_as_input
-from ensemble.trace.foreign import beginning, container
+from ensemble.trace.containers import beginning, container
 from ensemble.trace.instrument import HINT, UnknownFormatError, available, read_scan
 from ensemble.trace.text import Table, read_table
 from ensemble.trace.units import (

@@ -19,7 +19,7 @@ from matplotlib.image import imread
 
 from ensemble.campaign.file import parse_campaign
 from ensemble.command import run
-from ensemble.command.main import COMMANDS, main, parser_of
+from ensemble.command.main import COMMANDS, INTERRUPTED, TERMINATED, main, parser_of
 from ensemble.run import launch
 
 ROOT = Path(__file__).parent.parent.parent
@@ -308,7 +308,8 @@ def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
         for page in PAGES
     }
     codes = {run.DONE, run.SOME_FAILED, run.BAD_INPUT, run.OUR_ERROR, run.WRITE_FAILED, run.RESUME}
-    assert tables.pop("README.md") == codes | {launch.KILLED}
+    signals = {launch.KILLED, INTERRUPTED, TERMINATED}
+    assert tables.pop("README.md") == codes | signals
     assert [name for name, told in tables.items() if run.RESUME in told] == []
 
 

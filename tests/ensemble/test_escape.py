@@ -14,7 +14,7 @@ from markdown_it import MarkdownIt
 from ensemble.campaign.file import parse_campaign
 from ensemble.command.main import main
 from ensemble.errors import InputError
-from ensemble.foreign import code_span, markdown, one_line, printable
+from ensemble.escape import code_span, markdown, one_line, printable
 from ensemble.report.html import html_page
 from ensemble.results.layout import create
 from ensemble.results.read import Results

@@ -1,10 +1,8 @@
-"""Show names and texts from files as plain text, and find the file that a link leads to."""
+"""Escape texts from files, so that terminals and pages show them as they are."""
 
 from __future__ import annotations
 
-import os
 import re
-from pathlib import Path
 
 
 def printable(text: str) -> str:
@@ -21,15 +19,6 @@ def printable(text: str) -> str:
 def one_line(text: str) -> str:
     """Return a text on one line, printable."""
     return printable(" ".join(text.split()))
-
-
-def target(path: Path | str) -> Path:
-    """Return the file that a path leads to: that of a symbolic link, or the path itself.
-
-    Other paths stay as they were given, for messages.
-    """
-    path = Path(path)
-    return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def markdown(text: str) -> str:
