@@ -94,8 +94,8 @@ class CampaignResults:
         self.plot = Plots(lambda: self.averages)
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{number} {name}" for name, number in self._counts.items())
-        return f"<CampaignResults {self.path}: {told}>"
+        counts = ", ".join(f"{number} {name}" for name, number in self._counts.items())
+        return f"<CampaignResults {self.path}: {counts}>"
 
     @cached_property
     def averages(self) -> Aggregate:

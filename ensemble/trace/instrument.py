@@ -52,7 +52,7 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
     UnknownFormatError
         If no reader knows the file, or it is damaged.
     InputError
-        If it tells no length or unit, it holds a map and no row is chosen, or the chosen channel
+        If it gives no length or unit, it holds a map and no row is chosen, or the chosen channel
         or row is not there.
     """
     io = _library()
@@ -80,7 +80,7 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
             ) from None
     if topography.unit is None or topography.physical_sizes is None:
         raise InputError(
-            f"{path} tells no unit of its lengths: export it as text and give {parameter('unit')}"
+            f"{path} states no unit of its lengths: export it as text and give {parameter('unit')}"
         )
     metres = METRES[unit_named(str(topography.unit))]
     name = getattr(type(reader), "_name", None) or reader.format()

@@ -145,7 +145,7 @@ def read_trace(
     for name, value in (("unit", unit), ("step", step), ("columns", columns)):
         if value is not None:
             raise InputError(
-                f"{parameter(name)} belongs to texts: an instrument's file tells its own lengths"
+                f"{parameter(name)} belongs to texts: an instrument's file states its own lengths"
             )
     if not available():
         # Say which of both is missing: the extra, or any sense in the file.
@@ -266,7 +266,7 @@ def _from_table(
         step = step_of_header(table.header, table.decimal)
         if step is None:
             raise InputError(
-                f"{path} has heights without positions, and its header tells no step: "
+                f"{path} has heights without positions, and its header states no step: "
                 f"give {parameter('step')}"
             )
         said.append(f"step {length_text(step, 6)} (header)")
@@ -300,7 +300,7 @@ def _units(
     if told[0] is not None or told[1] is not None:
         known = "positions" if told[0] else "heights"
         raise InputError(
-            f"the header of {path} tells the unit of the {known} alone: give {parameter('unit')} "
+            f"the header of {path} states the unit of the {known} alone: give {parameter('unit')} "
             "X,Z, as in mm,um"
         )
     if _sure_to_be_metres(columns, step):
@@ -312,7 +312,7 @@ def _units(
         else (f"heights from {np.nanmin(x):g} to {np.nanmax(x):g}")
     )
     raise InputError(
-        f"{path} tells no unit, and {size} need not be metres: give {parameter('unit')}, as in um"
+        f"{path} states no unit, and {size} need not be metres: give {parameter('unit')}, as in um"
     )
 
 

@@ -163,8 +163,8 @@ def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
 
 SPIKED = [*rows(" ", ".")[:60], "25.0 0.1", *rows(" ", ".")[60:]]
 REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
-    "no unit": (rows(" ", "."), {}, "tells no unit.*give unit, as in um"),
-    "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "tells no unit"),
+    "no unit": (rows(" ", "."), {}, "states no unit.*give unit, as in um"),
+    "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "states no unit"),
     "a unit of one column": (["x (mm),z", *rows(",", ".")], {}, "of the positions alone"),
     "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit says mm and the hea"),
     "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* no map and no channels"),
@@ -252,7 +252,7 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--plan"], "tells no unit"),
+        (["--plan"], "states no unit"),
         (["--plan", "--unit", "um", "--columns", "1"], "--columns"),
         (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
         (["--plan", "--unit", "um", "--tip-radius", "5"], "trusted from 50 µm on (what a tip of"),
