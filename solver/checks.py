@@ -163,6 +163,11 @@ def plain(number: float) -> str:
     return mantissa + (f"e{int(exponent)}" if e else "")
 
 
+def counted(number: int, name: str) -> str:
+    """Return a number of things: "1 jump", "2 jumps"."""
+    return f"{number} {name}{'' if number == 1 else 's'}"
+
+
 def shown(value: object) -> str:
     """Return a value as Python spells it, on one line and short enough for a sentence."""
     if isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and np.ma.is_masked(value):

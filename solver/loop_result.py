@@ -14,7 +14,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.checks import choice, reals
+from solver.checks import choice, counted, reals
 from solver.control import Control
 from solver.jumps import BRANCHES, Branch, Jump
 from solver.method import Method, MethodReport
@@ -29,11 +29,6 @@ STEEP = 0.3
 # Where the method was asked for no accuracy, an audit residual or an error of the loss beyond this
 # share of the loss is said.
 _LARGE = 0.02
-
-
-def counted(count: int, thing: str) -> str:
-    """Return "1 jump", "2 jumps"."""
-    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -20,10 +20,10 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.checks import finite_row, flag, function, instance
+from solver.checks import counted, finite_row, flag, function, instance
 from solver.jumps import Branch, Jump
 from solver.loop import HOW_METHOD, Progress, check_cycle, unload
-from solver.loop_result import counted, estimated_error
+from solver.loop_result import estimated_error
 from solver.method import ContactState, Method, MethodReport, PathError
 from solver.problem import Problem
 from solver.profile import Array

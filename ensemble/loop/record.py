@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ensemble.outputs import whole_file
-from ensemble.trace.units import counted
+from solver.checks import counted
 from solver.jumps import Jump
 from solver.loop_result import LoopResult
 from solver.method import BRANCHES, Branch, ContactState, Fields, Method

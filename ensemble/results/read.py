@@ -282,7 +282,7 @@ class Results:
         """Return a sentence for each reason not to take the rows for sound, whole, and alike."""
         out = [] if self.has_checksums else [f"{self.path} {NO_CHECKSUMS}"]
         if damage := self.damage():
-            out.append(f"{damage}; no number of {them(self.damaged())} is used")
+            out.append(f"{damage}; damaged rows are not used")
         if mixed := mixture(self.origins()):
             out.append(f"{self.path} {mixed}")
         return tuple(out)
@@ -342,11 +342,6 @@ def mixture(origins: Mapping[str, int]) -> str:
         f"has rows of {len(origins)} versions or processors, on which their last bits depend: "
         + "; ".join(counts)
     )
-
-
-def them(rows: Sequence[object] | NDArray[np.intp]) -> str:
-    """Return "it" for one row, else "them"."""
-    return "it" if len(rows) == 1 else "them"
 
 
 def named_rows(rows: Sequence[int]) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ensemble.campaign.precision import relative_error
 from ensemble.escape import one_line, printable
-from ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows, them
+from ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows
 from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from ensemble.task.doubt import doubtful
 
@@ -241,15 +241,20 @@ def _precision(group: dict[str, Any]) -> str:
     return f"  interval ± {now} of ± {100 * wanted:g} %{enough}"
 
 
+def _task(row: Mapping[str, Any]) -> str:
+    return (
+        f"row {row['row']}: H = {row['hurst']:g}, γ = {row['work_of_adhesion']:g} J/m², "
+        f"realisation {row['realisation']}, seed {row['seed']}"
+    )
+
+
 def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
     lines = [
         f"{len(doubts)} losses are doubtful: by their own account less accurate than asked for"
     ]
     for d in doubts[:_MOST_FAILURES_SHOWN]:
         lines.append(
-            f"  row {d['row']}: H = {d['hurst']:g}, γ = {d['work_of_adhesion']:g} J/m², "
-            f"realisation {d['realisation']}, seed {d['seed']}: audit residual "
-            f"{100 * d['audit_residual']:.2g} %, "
+            f"  {_task(d)}: audit residual {100 * d['audit_residual']:.2g} %, "
             f"estimated error {100 * d['loss_error'] / (abs(d['loss']) or 1):.2g} %"
         )
     if len(doubts) > _MOST_FAILURES_SHOWN:
@@ -260,12 +265,9 @@ def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
 def damage_lines(damaged: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the damaged rows as lines for people, and what is to be done."""
     rows = named_rows([d["row"] for d in damaged])
-    lines = [f"damaged: {rows}; no number of {them(damaged)} is used"]
+    lines = [f"damaged: {rows}; damaged rows are not used"]
     for d in damaged[:_MOST_FAILURES_SHOWN]:
-        lines.append(
-            f"  row {d['row']}: H = {d['hurst']:g}, γ = {d['work_of_adhesion']:g} J/m², "
-            f"realisation {d['realisation']}, seed {d['seed']}"
-        )
+        lines.append(f"  {_task(d)}")
     if len(damaged) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(damaged) - _MOST_FAILURES_SHOWN} more (--json lists all)")
     lines.append("again: adhesis run CAMPAIGN.toml computes damaged rows as if they were pending")
@@ -278,10 +280,7 @@ def _failure_lines(failures: list[dict[str, Any]]) -> list[str]:
         for error, count in Counter(f["error"] for f in failures).most_common(5)
     ]
     for f in failures[:_MOST_FAILURES_SHOWN]:
-        lines.append(
-            f"  row {f['row']}: H = {f['hurst']:g}, γ = {f['work_of_adhesion']:g} J/m², "
-            f"realisation {f['realisation']}, seed {f['seed']}, after {f['seconds']:.3g} s"
-        )
+        lines.append(f"  {_task(f)}, after {f['seconds']:.3g} s")
     if len(failures) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(failures) - _MOST_FAILURES_SHOWN} more (--json lists all)")
     lines.append("again: adhesis run CAMPAIGN.toml --redo failed")

@@ -171,8 +171,10 @@ def run_ranks(
         preexec_fn=end_with_parent,  # else ranks would go on, and keep the results file locked
     )
     with _passed_on(process), open(handle, encoding="utf-8") as stream:
-        code = process.wait()
-        os.unlink(handed_over)
+        try:
+            code = process.wait()
+        finally:
+            os.unlink(handed_over)
         own, _, sentence = stream.read().partition("\n")
     return int(own or code), sentence
 

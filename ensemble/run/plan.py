@@ -27,7 +27,7 @@ from ensemble.versions import versions
 
 Group = tuple[float, ...]
 _MOST_SHOWN = 10
-_THEY = ("they", "it")
+_AGAIN = "; this run computes damaged rows again"
 
 
 @dataclass(frozen=True)
@@ -190,12 +190,12 @@ def prepare(
         if difference.grown or not old.has_checksums:
             create(path, campaign, part=part, versions=versions(), grown_from=old)
             if old.damaged().size:
-                say(f"{old.damage()}; {_THEY[old.damaged().size == 1]} will be computed again")
+                say(f"{old.damage()}{_AGAIN}")
     with Results(path) as results:
         status = results.status()
         again = np.flatnonzero(status == DAMAGED).tolist()
         if again:
-            say(f"{results.damage()}; {_THEY[len(again) == 1]} will be computed again")
+            say(f"{results.damage()}{_AGAIN}")
         if redo is not None:
             states = zip(results.tasks(), status.tolist(), strict=True)
             chosen = [row for row, (task, state) in enumerate(states) if redo.takes(task, state)]

@@ -12,11 +12,11 @@ import numpy as np
 from ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
 from ensemble.trace.pool import Pool, Result, Watch
 from ensemble.trace.prepare import Prepared
-from ensemble.trace.units import counted
 from solver.checks import (
     ACCURACY,
     Bounds,
     choice,
+    counted,
     flag,
     function,
     instance,

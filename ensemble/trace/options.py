@@ -10,7 +10,8 @@ from ensemble.escape import printable
 from ensemble.trace.prepare import Prepared, prepare_trace
 from ensemble.trace.read import Trace, read_trace
 from ensemble.trace.text import DELIMITERS
-from ensemble.trace.units import counted, length_text, parse_length
+from ensemble.trace.units import length_text, parse_length
+from solver.checks import counted
 
 _NAMES = (
     *("unit", "step", "columns", "delimiter", "decimal", "row", "channel", "degree", "cut_off"),

@@ -9,8 +9,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ensemble.errors import InputError, parameter, refused_as_input
 from ensemble.trace.read import Trace
-from ensemble.trace.units import counted, length_text
-from solver.checks import LENGTH, Bounds, flag, instance, real, whole
+from ensemble.trace.units import length_text
+from solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
 from solver.profile import Array, Profile
 from solver.trace import (
     Continuation,

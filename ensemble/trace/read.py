@@ -15,13 +15,13 @@ from ensemble.trace.instrument import HINT, UnknownFormatError, available, read_
 from ensemble.trace.text import Table, read_table
 from ensemble.trace.units import (
     METRES,
-    counted,
     length_text,
     parse_units,
     step_of_header,
     units_of_header,
 )
 from solver import checks
+from solver.checks import counted
 from solver.profile import Array
 
 FEWEST_POINTS = 32

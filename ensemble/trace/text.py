@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ensemble.errors import InputError, parameter
-from ensemble.trace.units import counted
+from solver.checks import counted
 from solver.profile import Array
 
 MOST_BYTES = 200_000_000

@@ -119,11 +119,6 @@ def length_text(metres: float, digits: int = 3) -> str:
     return f"{metres / METRES['nm']:.{digits}g} nm"
 
 
-def counted(number: int, name: str) -> str:
-    """Return a number of things: "1 gap", "3 gaps"."""
-    return f"{number} {name}{'' if number == 1 else 's'}"
-
-
 def _units_in(text: str) -> list[str]:
     plain = text.replace("_", " ")
     if plain.strip().lower() in ("m", "in"):

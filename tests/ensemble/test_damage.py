@@ -229,7 +229,7 @@ def test_status_report_and_python_name_damaged_rows(path):
     changed(path, _set("loss", 3, 1.0))
     text = as_text(read_status(path))
     assert "8 tasks, 6 done, 0 pending, 1 failed, 1 damaged" in text
-    assert "damaged: row 3; no number of it is used" in text
+    assert "damaged: row 3; damaged rows are not used" in text
     sentences = missing(aggregate(path))
     assert any("r.h5 is damaged in row 3" in sentence for sentence in sentences)
     with pytest.warns(UserWarning, match="damaged in row 3"):
@@ -248,7 +248,7 @@ def test_a_run_says_that_it_computes_damaged_rows_again(damage, path):
         damage.campaign, path, options=Options(patience=0.0), say=said.append, engine=engine
     )
     assert summary.computed == 1
-    assert f"{path} is damaged in row 3; it will be computed again" in said
+    assert f"{path} is damaged in row 3; this run computes damaged rows again" in said
     assert differences(path, damage.sound) == []
 
 

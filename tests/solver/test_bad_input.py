@@ -48,9 +48,8 @@ from ensemble.errors import naming_options
 from ensemble.loop.record import loop_summary, path_summary
 from ensemble.trace.prepare import Prepared
 from ensemble.trace.read import Trace
-from solver.checks import Bounds, plain, real, shown, whole
+from solver.checks import Bounds, counted, plain, real, shown, whole
 from solver.loop import check_cycle
-from solver.loop_result import counted
 from solver.method import MethodReport
 from solver.references.exact_wave import ExactWave
 
