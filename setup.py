@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent
 
 def commit() -> str:
     """Return the commit of this checkout, or the one that a source distribution was made from."""
-    written = ROOT / "ensemble" / "commit.txt"
+    written = ROOT / "adhesis" / "ensemble" / "commit.txt"
     if not (ROOT / ".git").exists():
         return written.read_text().strip() if written.exists() else "unknown"
     done = subprocess.run(
@@ -25,8 +25,8 @@ def commit() -> str:
 
 
 def write_commit(folder: str) -> None:
-    """Write the commit where :func:`ensemble.versions.commit` looks for it."""
-    path = Path(folder, "ensemble", "commit.txt")
+    """Write the commit where :func:`adhesis.ensemble.versions.commit` looks for it."""
+    path = Path(folder, "adhesis", "ensemble", "commit.txt")
     path.unlink(missing_ok=True)  # it may be a link to the checkout's
     path.write_text(commit() + "\n")
 

@@ -2,27 +2,72 @@
 
 Everything that a user of the library needs is imported from here; other names may change without
 notice. Lengths in m, stresses in Pa (compression positive), energies per unit depth in J/m, losses
-per nominal area in J/m². Loads no MPI and no matplotlib. A star import takes everything but
-``open``, which would replace the built-in one.
+per nominal area in J/m². A star import takes everything but ``open``, which would replace the
+built-in one.
+
+A module is loaded when the first of its names is asked for: commands that answer from the command
+line alone, such as ``adhesis --help``, load neither numpy nor the solver.
 """
 
-from adhesis._open import open as open
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from adhesis._version import __version__ as __version__
-from ensemble.errors import InputError
-from ensemble.trace.answer import loss_of_trace
-from ensemble.trace.prepare import prepare_trace
-from ensemble.trace.read import read_trace
-from solver.control import Control
-from solver.jumps import Jump
-from solver.loop import run_loop
-from solver.loop_result import LoopResult
-from solver.material import HalfSpace
-from solver.method import ContactState, Fields, Method, Opening, Path, PathError
-from solver.path import MinorLoop, PathResult, run_path
-from solver.problem import Problem
-from solver.profile import Profile, profile_from_heights, self_affine_profile, single_wave
-from solver.registry import make_method
-from solver.turns import run_loops
+
+if TYPE_CHECKING:
+    from adhesis._open import open as open
+    from adhesis.ensemble.errors import InputError
+    from adhesis.ensemble.trace.answer import loss_of_trace
+    from adhesis.ensemble.trace.prepare import prepare_trace
+    from adhesis.ensemble.trace.read import read_trace
+    from adhesis.solver.control import Control
+    from adhesis.solver.jumps import Jump
+    from adhesis.solver.loop import run_loop
+    from adhesis.solver.loop_result import LoopResult
+    from adhesis.solver.material import HalfSpace
+    from adhesis.solver.method import ContactState, Fields, Method, Opening, Path, PathError
+    from adhesis.solver.path import MinorLoop, PathResult, run_path
+    from adhesis.solver.problem import Problem
+    from adhesis.solver.profile import (
+        Profile,
+        profile_from_heights,
+        self_affine_profile,
+        single_wave,
+    )
+    from adhesis.solver.registry import make_method
+    from adhesis.solver.turns import run_loops
+
+# The same list for the running program; a test compares the two.
+_MODULES = {
+    "ContactState": "solver.method",
+    "Control": "solver.control",
+    "Fields": "solver.method",
+    "HalfSpace": "solver.material",
+    "InputError": "ensemble.errors",
+    "Jump": "solver.jumps",
+    "LoopResult": "solver.loop_result",
+    "Method": "solver.method",
+    "MinorLoop": "solver.path",
+    "Opening": "solver.method",
+    "Path": "solver.method",
+    "PathError": "solver.method",
+    "PathResult": "solver.path",
+    "Problem": "solver.problem",
+    "Profile": "solver.profile",
+    "loss_of_trace": "ensemble.trace.answer",
+    "make_method": "solver.registry",
+    "open": "_open",
+    "prepare_trace": "ensemble.trace.prepare",
+    "profile_from_heights": "solver.profile",
+    "read_trace": "ensemble.trace.read",
+    "run_loop": "solver.loop",
+    "run_loops": "solver.turns",
+    "run_path": "solver.path",
+    "self_affine_profile": "solver.profile",
+    "single_wave": "solver.profile",
+}
 
 __all__ = [
     "ContactState",
@@ -51,3 +96,15 @@ __all__ = [
     "self_affine_profile",
     "single_wave",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value: object = getattr(import_module(f"adhesis.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_MODULES})

@@ -2,6 +2,6 @@
 
 import sys
 
-from ensemble.command.main import main
+from adhesis.ensemble.command.main import main
 
 sys.exit(main())

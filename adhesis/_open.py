@@ -6,10 +6,10 @@ import os
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from solver import checks
+from adhesis.solver import checks
 
 if TYPE_CHECKING:
-    from ensemble.report.opened import CampaignResults
+    from adhesis.ensemble.report.opened import CampaignResults
 
 
 def open(
@@ -45,6 +45,8 @@ def open(
         raise TypeError(f"beside is {str(beside)!r}: it must be a list of paths")
     others = [checks.path(f"beside[{place}]", other) for place, other in enumerate(beside)]
     path = checks.path("path", path)
-    from ensemble.report.opened import CampaignResults  # xarray and pandas take half a second
+    from adhesis.ensemble.report.opened import (
+        CampaignResults,  # xarray and pandas take half a second
+    )
 
     return CampaignResults(path, others)

@@ -15,12 +15,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from solver.loop import run_loop
-from solver.loop_result import LoopResult
-from solver.material import HalfSpace
-from solver.problem import Problem
-from solver.profile import self_affine_profile
-from solver.sharp.method import SharpMethod
+from adhesis.solver.loop import run_loop
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.sharp.method import SharpMethod
 
 PROFILES = ((0.8, 2, 16), (0.5, 3, 20))  # H, n0, q_max/q_min
 WORKS_OF_ADHESION = (0.01, 0.03, 0.1)

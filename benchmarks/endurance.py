@@ -29,19 +29,19 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.campaign.file import load_campaign
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
-from ensemble.results.read import Results
-from ensemble.results.schema import DONE, file_size
-from ensemble.results.write import Writer
-from ensemble.run.launch import ONE_THREAD, launch_environment, launcher
-from ensemble.run.ranks import world
-from ensemble.run.session import Engine, run_campaign
-from ensemble.task.compute import check_task, methods_of, run_task
-from ensemble.task.dataset import KEPT, row_shape, sizes_of
-from ensemble.task.fields import field_plan
-from ensemble.task.row import RESULT_DATASETS, Row, row_scales
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DONE, file_size
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.launch import ONE_THREAD, launch_environment, launcher
+from adhesis.ensemble.run.ranks import world
+from adhesis.ensemble.run.session import Engine, run_campaign
+from adhesis.ensemble.task.compute import check_task, methods_of, run_task
+from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
+from adhesis.ensemble.task.fields import field_plan
+from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -14,12 +14,12 @@ from time import process_time
 
 import numpy as np
 
-from solver.loop import run_loop
-from solver.material import HalfSpace
-from solver.problem import Problem
-from solver.profile import self_affine_profile
-from solver.sharp.method import SharpMethod
-from solver.warm import warm
+from adhesis.solver.loop import run_loop
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.warm import warm
 
 
 def main() -> None:

@@ -23,8 +23,8 @@ from time import process_time
 import numpy as np
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
-from solver.registry import MethodName, make_method
-from solver.sharp.method import SharpMethod
+from adhesis.solver.registry import MethodName, make_method
+from adhesis.solver.sharp.method import SharpMethod
 
 _COLUMNS = (
     "γ (J/m²)", "m to", "periods", "CPU s", "patches", "jumps", "solutions", "ms each", "W~",

@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from solver.memory import keep_freed
-from solver.profile import Array, self_affine_profile
-from solver.sharp.coordinate import map_gaps
-from solver.sharp.derivatives import derivatives
-from solver.sharp.far import solve_many
-from solver.sharp.field import solve_plain
-from solver.sharp.rules import RULES, choose_kinds
-from solver.sharp.solution import FIXED, Solution
-from solver.sharp.source import StressSource
-from solver.sharp.yielding import newton_many
+from adhesis.solver.memory import keep_freed
+from adhesis.solver.profile import Array, self_affine_profile
+from adhesis.solver.sharp.coordinate import map_gaps
+from adhesis.solver.sharp.derivatives import derivatives
+from adhesis.solver.sharp.far import solve_many
+from adhesis.solver.sharp.field import solve_plain
+from adhesis.solver.sharp.rules import RULES, choose_kinds
+from adhesis.solver.sharp.solution import FIXED, Solution
+from adhesis.solver.sharp.source import StressSource
+from adhesis.solver.sharp.yielding import newton_many
 
 _FEW = 100  # gaps up to which dense matrices are timed as often as the tree
 

@@ -25,7 +25,7 @@ from adhesis import (
     run_path,
     self_affine_profile,
 )
-from solver.method import PathError
+from adhesis.solver.method import PathError
 
 HURST, PERIOD, N0, RATIO, H_RMS = 0.8, 2e-3 * math.pi, 10, 100, 1e-6
 TURNS = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]

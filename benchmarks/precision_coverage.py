@@ -22,8 +22,8 @@ from scipy.special import stdtrit
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from ensemble.campaign.precision import enough, looks
-from ensemble.interval import interval
+from adhesis.ensemble.campaign.precision import enough, looks
+from adhesis.ensemble.interval import interval
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, tuple[int, int]], Array]

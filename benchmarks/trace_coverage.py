@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from ensemble.trace.answer import QUANTITIES, loss_of_trace
-from ensemble.trace.prepare import prepare_trace
-from ensemble.trace.read import read_trace
-from solver.loop import run_loop
-from solver.material import HalfSpace
-from solver.problem import Problem
-from solver.profile import Profile, self_affine_profile
-from solver.registry import make_method
+from adhesis.ensemble.trace.answer import QUANTITIES, loss_of_trace
+from adhesis.ensemble.trace.prepare import prepare_trace
+from adhesis.ensemble.trace.read import read_trace
+from adhesis.solver.loop import run_loop
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Profile, self_affine_profile
+from adhesis.solver.registry import make_method
 from tests.support import instrument_files
 
 Array = NDArray[np.float64]

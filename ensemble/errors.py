@@ -7,7 +7,7 @@ from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from ensemble.escape import printable
+from adhesis.ensemble.escape import printable
 
 
 class _Printable(Exception):

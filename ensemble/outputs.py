@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError
 
 # Other names of an open descriptor of this process; to rename a file over them would destroy them.
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")

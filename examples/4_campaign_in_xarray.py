@@ -37,7 +37,7 @@ load_steps = 16
 """
 folder = Path(tempfile.mkdtemp())
 (folder / "small.toml").write_text(campaign)
-adhesis = [sys.executable, "-m", "ensemble"]
+adhesis = [sys.executable, "-m", "adhesis"]
 done = subprocess.run([*adhesis, "run", "small.toml"], cwd=folder, capture_output=True, check=True)
 print(*(line for line in done.stderr.decode().splitlines() if "computed in" in line))
 

@@ -2,9 +2,9 @@
 
 numba's own cache knows the file of a function, not the files of the functions that it calls, nor
 the compiler's settings: after a change, callers would silently keep old code. And it wants to write
-where it reads. So code is kept by :mod:`solver.code_cache`, in a folder named after the sources of
-all modules with compiled functions, the versions of numba and LLVM, the settings that change code,
-and the processor. Where no folder can be used, each process compiles anew.
+where it reads. So code is kept by :mod:`adhesis.solver.code_cache`, in a folder named after the
+sources of all modules with compiled functions, the versions of numba and LLVM, the settings that
+change code, and the processor. Where no folder can be used, each process compiles anew.
 
 numba links the code of a function into all its callers and optimises it there once more. Here that
 is left to short functions; long ones are called under their symbol's name (:class:`_Kept`).
@@ -12,7 +12,7 @@ is left to short functions; long ones are called under their symbol's name (:cla
 Between a call from Python and its result no Python code runs, for a signal handler might raise in
 it, where neither numba nor LLVM expects an exception: it would become another one, be lost, or end
 the process. Hence results are boxed by C code alone (:func:`_box_array`), and functions are loaded
-and compiled in a thread of their own (:mod:`solver.uninterrupted`).
+and compiled in a thread of their own (:mod:`adhesis.solver.uninterrupted`).
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ from numba.core.serialize import dumps
 from numba.extending import overload
 from numba.np import arrayobj
 
-from solver.code_cache import CodeFiles, folder_name
-from solver.uninterrupted import uninterrupted
+from adhesis.solver.code_cache import CodeFiles, folder_name
+from adhesis.solver.uninterrupted import uninterrupted
 
 F = TypeVar("F", bound=Callable[..., Any])
 config: Any = _config  # its attributes are made at run time
@@ -107,7 +107,7 @@ def _box_named_tuple(typ: Any, val: Any, c: Any) -> Any:
 
     numba calls the class, which is a function in Python.
     """
-    if not typ.instance_class.__module__.startswith("solver."):
+    if not typ.instance_class.__module__.startswith("adhesis.solver."):
         return boxing.box_namedtuple(typ, val, c)
     values = boxing.box_tuple(typ, val, c)
     new, named = _constant(c, tuple.__new__), _constant(c, typ.instance_class)

@@ -26,8 +26,8 @@ import math
 from dataclasses import dataclass
 from typing import TypeVar
 
-from solver.checks import STIFFNESS, real
-from solver.profile import Array
+from adhesis.solver.checks import STIFFNESS, real
+from adhesis.solver.profile import Array
 
 Value = TypeVar("Value", float, Array)
 

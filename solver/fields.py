@@ -3,7 +3,8 @@
 Beside an edge of contact the gap opens like the square root of the distance r: by Griffith's
 K = sqrt(2E*γ'), γ' = γ sqrt(1 + h'²), t = (4K/E*) sqrt(r/(2π)) = 4 sqrt(γ' r/(πE*)). Nodes of a
 grid miss it, and with it most of what is narrow. A method hands out the opening of every gap from
-edge to edge (:class:`~solver.method.Opening`); here the shares of the period are taken from it.
+edge to edge (:class:`~adhesis.solver.method.Opening`); here the shares of the period are taken from
+it.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solver.method import Fields, Opening
-from solver.profile import Array
+from adhesis.solver.method import Fields, Opening
+from adhesis.solver.profile import Array
 
 # Nodes beside an edge between which the opening is refined, and the points put between two of them.
 _NEAR, _POINTS = 4, 16
@@ -86,7 +87,7 @@ def openings_between(
     Parameters
     ----------
     edges : array, shape (patches, 2)
-        As in :class:`~solver.method.ContactState`.
+        As in :class:`~adhesis.solver.method.ContactState`.
     fields : Fields
     coefficient : array, shape (patches, 2)
         t/sqrt(r) at each edge in sqrt(m).

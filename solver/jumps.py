@@ -22,8 +22,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.profile import Array
-from solver.state import ContactState
+from adhesis.solver.profile import Array
+from adhesis.solver.state import ContactState
 
 Indices = NDArray[np.int64]
 
@@ -50,7 +50,7 @@ class Jump:
         U before minus U after (the potential W, where the separation is not fixed), per unit
         nominal area, in J/m². Negative by no more than the energies' error, which then counts in
         the error of the loss; but for the loss of contact under a load, where it is U before
-        (:mod:`solver.control`).
+        (:mod:`adhesis.solver.control`).
     kind : JumpKind
     patches_before, patches_after : int
     contact_before, contact_after : float
@@ -129,7 +129,7 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     Parameters
     ----------
     before, after : array, shape (patches, 2)
-        Edges in m, as in :class:`~solver.state.ContactState`.
+        Edges in m, as in :class:`~adhesis.solver.state.ContactState`.
     period : float
         λ in m.
     """

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from time import process_time
 from typing import TypeVar
 
-from solver.checks import (
+from adhesis.solver.checks import (
     FAR_DISPLACEMENT,
     LOAD_STEPS,
     MAX_PENETRATION,
@@ -16,12 +16,12 @@ from solver.checks import (
     real,
     whole,
 )
-from solver.control import Control
-from solver.jumps import Branch
-from solver.loop_result import LoopResult, result_of
-from solver.method import ContactState, Method, PathError
-from solver.problem import Problem
-from solver.record import Axis, Record
+from adhesis.solver.control import Control
+from adhesis.solver.jumps import Branch
+from adhesis.solver.loop_result import LoopResult, result_of
+from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.problem import Problem
+from adhesis.solver.record import Axis, Record
 
 T = TypeVar("T")
 

@@ -14,14 +14,14 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.checks import choice, counted, reals
-from solver.control import Control
-from solver.jumps import BRANCHES, Branch, Jump
-from solver.method import Method, MethodReport
-from solver.problem import Problem
-from solver.profile import Array
-from solver.record import Record
-from solver.values import ByValue
+from adhesis.solver.checks import choice, counted, reals
+from adhesis.solver.control import Control
+from adhesis.solver.jumps import BRANCHES, Branch, Jump
+from adhesis.solver.method import Method, MethodReport
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array
+from adhesis.solver.record import Record
+from adhesis.solver.values import ByValue
 
 STEEP = 0.3
 """Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
@@ -66,7 +66,7 @@ class LoopResult(ByValue):
         In J/m, per period.
     jumps : tuple of Jump
     loss : float
-        ∮ p̄ dΔ in J/m² of nominal area, over all states (:func:`solver.record.integral`).
+        ∮ p̄ dΔ in J/m² of nominal area, over all states (:func:`adhesis.solver.record.integral`).
     loss_dimensionless : float
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
     loss_from_drops : float
@@ -356,7 +356,7 @@ def estimated_error(record: Record, audited: float, problem: Problem) -> float:
         Difference of the work and the sum of the drops, in J/m².
     problem : Problem
     """
-    # Under a load the last drop is U, and may be negative (solver.control).
+    # Under a load the last drop is U, and may be negative (adhesis.solver.control).
     counted = [j for j in record.jumps if not (problem.control.is_load and j.kind == "pull-off")]
     own = record.error
     if not np.isfinite(own):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.checks import LENGTH, POISSON, YOUNG, real
+from adhesis.solver.checks import LENGTH, POISSON, YOUNG, real
 
 
 @dataclass(frozen=True)

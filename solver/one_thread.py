@@ -13,7 +13,7 @@ from functools import cache, wraps
 from threading import RLock
 from typing import Any, Protocol, TypeVar
 
-from solver.uninterrupted import uninterrupted
+from adhesis.solver.uninterrupted import uninterrupted
 
 F = TypeVar("F", bound=Callable[..., Any])
 

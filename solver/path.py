@@ -7,8 +7,8 @@ was left (return-point memory) is not assumed: it is measured, and every part is
 
     -∫ Y dx = ΔW/λ + sum of the drops,
 
-with ΔW the change of the potential from its begin to its end (:mod:`solver.control`), 0 for a part
-that closes.
+with ΔW the change of the potential from its begin to its end (:mod:`adhesis.solver.control`), 0 for
+a part that closes.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.checks import counted, finite_row, flag, function, instance
-from solver.jumps import Branch, Jump
-from solver.loop import HOW_METHOD, Progress, check_cycle, unload
-from solver.loop_result import estimated_error
-from solver.method import ContactState, Method, MethodReport, PathError
-from solver.problem import Problem
-from solver.profile import Array
-from solver.record import Axis, Record
-from solver.values import ByValue
+from adhesis.solver.checks import counted, finite_row, flag, function, instance
+from adhesis.solver.jumps import Branch, Jump
+from adhesis.solver.loop import HOW_METHOD, Progress, check_cycle, unload
+from adhesis.solver.loop_result import estimated_error
+from adhesis.solver.method import ContactState, Method, MethodReport, PathError
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array
+from adhesis.solver.record import Axis, Record
+from adhesis.solver.values import ByValue
 
 _SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # states whose stress and contact differ by less (of what they went through) are one
@@ -104,7 +104,7 @@ class PathResult(ByValue):
         Δ/h_max, s in m, p̄ in Pa, A/A0.
     patches : int array
     elastic_energy, adhesion_energy, potential : array
-        In J/m, per period; the potential is W of :mod:`solver.control`.
+        In J/m, per period; the potential is W of :mod:`adhesis.solver.control`.
     jumps : tuple of Jump
     jump_leg : int array, shape (jumps,)
     minor_loops : tuple of MinorLoop
@@ -195,7 +195,7 @@ def check_path(
     ------
     ValueError
         Unless it starts with loading and turns at every point, and the largest turning point could
-        be that of a loop (:func:`solver.loop.check_cycle`).
+        be that of a loop (:func:`adhesis.solver.loop.check_cycle`).
     TypeError
         If one of them, or load_steps, is no number.
     """
@@ -235,14 +235,14 @@ def run_path(
     method : Method
     turning_points : sequence of float, shape (legs,)
         Ends of the legs, loading first: Δ/h_max, u_tot/h_max where a stiffness holds the
-        half-space, p̄ in Pa under a load (:mod:`solver.control`).
+        half-space, p̄ in Pa under a load (:mod:`adhesis.solver.control`).
     load_steps : int
         Equal steps up to the largest turning point; every leg has them.
     out : bool
         Whether the path goes on until contact is lost. Not after a last leg of unloading, which
         then simply goes on: its turning point is one no more.
     progress, on_state : callable, optional
-        As in :func:`solver.loop.run_loop`.
+        As in :func:`adhesis.solver.loop.run_loop`.
 
     Raises
     ------

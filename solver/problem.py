@@ -7,12 +7,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from solver.checks import RMS_SLOPE, WORK_OF_ADHESION, instance, plain, real
-from solver.control import Control
-from solver.material import HalfSpace
-from solver.profile import Array, Profile
-from solver.state import ContactState
-from solver.values import ByValue
+from adhesis.solver.checks import RMS_SLOPE, WORK_OF_ADHESION, instance, plain, real
+from adhesis.solver.control import Control
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.profile import Array, Profile
+from adhesis.solver.state import ContactState
+from adhesis.solver.values import ByValue
 
 # Rounding of a separation over h_max: a penetration that is smaller is 0.
 Value = TypeVar("Value", float, Array)
@@ -31,7 +31,7 @@ def check_slope(rms_slope: float) -> None:
     Raises
     ------
     ValueError
-        If the rms slope lies outside :data:`solver.checks.RMS_SLOPE`.
+        If the rms slope lies outside :data:`adhesis.solver.checks.RMS_SLOPE`.
     """
     if not RMS_SLOPE.holds(rms_slope):
         shown = f"{rms_slope:,.4g}" if 1 < rms_slope < 1e6 else plain(float(f"{rms_slope:.4g}"))
@@ -103,7 +103,7 @@ class Problem(ByValue):
         return self.profile.h_max * (1.0 - penetration)
 
     def prescribed(self, drive: float) -> float:
-        """What is prescribed (x of :mod:`solver.control`) where a path is at ``drive``.
+        """What is prescribed (x of :mod:`adhesis.solver.control`) where a path is at ``drive``.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class Problem(ByValue):
         return -drive if self.control.is_load else self.separation(drive)
 
     def prescribed_in(self, state: ContactState) -> float:
-        """What is prescribed (x of :mod:`solver.control`) in a state: in m, for a load in Pa."""
+        """Prescribed value x (:mod:`adhesis.solver.control`) of a state: in m, for a load in Pa."""
         return self.control.prescribed(state.separation, state.mean_stress)
 
     def full_contact(self, prescribed: float) -> str:

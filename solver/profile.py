@@ -18,7 +18,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.checks import (
+from adhesis.solver.checks import (
     COEFFICIENT,
     FINITE,
     HARMONIC,
@@ -39,7 +39,7 @@ from solver.checks import (
     row,
     whole,
 )
-from solver.values import ByValue
+from adhesis.solver.values import ByValue
 
 Array = NDArray[np.float64]
 Amplitudes = Literal["deterministic", "rayleigh"]

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.jumps import Branch, Jump
-from solver.method import ContactState, Path, PathError
-from solver.problem import Problem
-from solver.profile import Array
+from adhesis.solver.jumps import Branch, Jump
+from adhesis.solver.method import ContactState, Path, PathError
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array
 
 _NEAR = 1e-9  # load steps closer than this share of one are the same
 
@@ -117,7 +117,9 @@ class Record:
         )
 
     def work(self, problem: Problem) -> float:
-        """-∫ Y dx over the states, in J/m² (:mod:`solver.control`): the work of what moves it.
+        """Work of the driving device, -∫ Y dx over the states, in J/m².
+
+        x and Y are those of :mod:`adhesis.solver.control`.
 
         Raises
         ------
@@ -150,8 +152,8 @@ def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:
     Parameters
     ----------
     prescribed, conjugate, stiffness : array, shape (states,)
-        x, Y and dY/dx (:mod:`solver.control`; m, Pa and Pa/m, or Pa, m and m/Pa), in the order of
-        the path.
+        x, Y and dY/dx (:mod:`adhesis.solver.control`; m, Pa and Pa/m, or Pa, m and m/Pa), in the
+        order of the path.
     """
     bend = -np.diff(stiffness) * np.diff(prescribed) ** 2 / 12
     return float(np.trapezoid(conjugate, prescribed)) + float(np.nansum(bend))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Literal, get_args
 
-from solver.checks import ACCURACY, NODES, NODES_PER_WAVE, choice, instance, real, whole
-from solver.method import Method
-from solver.problem import Problem
-from solver.uninterrupted import uninterrupted
+from adhesis.solver.checks import ACCURACY, NODES, NODES_PER_WAVE, choice, instance, real, whole
+from adhesis.solver.method import Method
+from adhesis.solver.problem import Problem
+from adhesis.solver.uninterrupted import uninterrupted
 
 MethodName = Literal["grid", "sharp", "auto"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
@@ -59,13 +59,13 @@ def make_method(
     _load(name)
     method: Method
     if name == "grid":
-        from solver.grid.method import GridMethod
+        from adhesis.solver.grid.method import GridMethod
 
         method = GridMethod(
             problem, nodes_per_wave=nodes_per_wave, accuracy=accuracy, chosen=chosen
         )
     else:
-        from solver.sharp.method import SharpMethod
+        from adhesis.solver.sharp.method import SharpMethod
 
         method = SharpMethod(problem, accuracy=accuracy, chosen=chosen)
     return method
@@ -74,10 +74,10 @@ def make_method(
 @uninterrupted  # an import that is interrupted leaves modules that are never whole again
 def _load(name: Literal["grid", "sharp"]) -> None:
     """Import a method, and with it the compiler."""
-    from solver.told import tell_of_compiling
+    from adhesis.solver.told import tell_of_compiling
 
     tell_of_compiling()
-    import_module(f"solver.{name}.method")
+    import_module(f"adhesis.solver.{name}.method")
 
 
 def check_nodes(nodes_per_wave: int, waves: int) -> None:
@@ -86,7 +86,7 @@ def check_nodes(nodes_per_wave: int, waves: int) -> None:
     Raises
     ------
     ValueError
-        If the nodes of all waves are more than :data:`solver.checks.NODES` allows.
+        If the nodes of all waves are more than :data:`adhesis.solver.checks.NODES` allows.
     """
     if nodes_per_wave * waves > NODES.high:
         raise ValueError(

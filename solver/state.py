@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from solver.profile import Array
-from solver.values import ByValue
+from adhesis.solver.profile import Array
+from adhesis.solver.values import ByValue
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,7 +30,7 @@ class ContactState(ByValue):
         A/A0.
     stiffness : float
         dp̄/ds along the branch in Pa/m where the method knows it, else NaN; under another control
-        than a fixed separation dY/dx (:mod:`solver.control`).
+        than a fixed separation dY/dx (:mod:`adhesis.solver.control`).
     hold_energy : float
         What the control adds to U, in J/m per period; 0 at fixed separation.
     internal : object
@@ -63,5 +63,8 @@ class ContactState(ByValue):
 
     @property
     def potential(self) -> float:
-        """W of :mod:`solver.control` in J/m: what is minimal under the control; U if s is fixed."""
+        """Potential in J/m that is minimal under the control; U at fixed separation.
+
+        It is W of :mod:`adhesis.solver.control`.
+        """
         return self.energy + self.hold_energy

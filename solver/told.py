@@ -2,7 +2,7 @@
 
 The first use of a method, where nothing is compiled for this processor yet, tells of it by Python's
 logging, under the name ``adhesis``, which prints warnings to stderr unless it is told otherwise.
-:func:`solver.warm.warm` is told to tell in its caller's way.
+:func:`adhesis.solver.warm.warm` is told to tell in its caller's way.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 
-from solver.compiled import Compilation, processor, watch_compilation
+from adhesis.solver.compiled import Compilation, processor, watch_compilation
 
 _MOMENT = 1.0  # s that pass without a word
 _BETWEEN_LINES = 10.0  # s

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.polynomial import legendre
 
-from solver.profile import Array, Profile, profile_from_heights
+from adhesis.solver.profile import Array, Profile, profile_from_heights
 
 Continuation = Literal["taper", "blend", "mirror"]
 CONTINUATIONS: tuple[Continuation, ...] = get_args(Continuation)

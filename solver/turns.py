@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from time import process_time
 
-from solver.checks import function, instance, row
-from solver.jumps import Branch
-from solver.loop import HOW_METHOD, Progress, check_cycle, turning_of, unload_recorded
-from solver.loop_result import LoopResult, result_of
-from solver.method import ContactState, Method, PathError
-from solver.record import Axis, Record
+from adhesis.solver.checks import function, instance, row
+from adhesis.solver.jumps import Branch
+from adhesis.solver.loop import HOW_METHOD, Progress, check_cycle, turning_of, unload_recorded
+from adhesis.solver.loop_result import LoopResult, result_of
+from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.record import Axis, Record
 
 
 class LoadingBranch:
@@ -32,8 +32,8 @@ class LoadingBranch:
     Raises
     ------
     ValueError
-        If a cycle cannot be run (:func:`solver.loop.check_cycle`), or a turning point is given
-        twice, or none.
+        If a cycle cannot be run (:func:`adhesis.solver.loop.check_cycle`), or a turning point is
+        given twice, or none.
     TypeError
         If the method is no Method, or a value no number.
 
@@ -114,7 +114,7 @@ class LoadingBranch:
         marks : sequence of float
             Further places at which a step of the unloading branch ends.
         progress : callable, optional
-            See :data:`solver.loop.Progress`.
+            See :data:`adhesis.solver.loop.Progress`.
         on_state : callable, optional
             Called with every state of the loop, in order, those of the loading branch too.
 
@@ -129,7 +129,7 @@ class LoadingBranch:
         ValueError
             If that is none of its turning points, or one that it has passed.
         PathError
-            As in :func:`solver.loop.run_loop`.
+            As in :func:`adhesis.solver.loop.run_loop`.
         """
         self.to(turn, progress)
         if self._drives[self._passed - 1] != turn:
@@ -165,7 +165,7 @@ def run_loops(
     load_steps : int
         Equal steps up to the largest turning point; every unloading branch goes on with that step.
     progress : callable, optional
-        See :data:`solver.loop.Progress`.
+        See :data:`adhesis.solver.loop.Progress`.
 
     Returns
     -------
@@ -177,12 +177,12 @@ def run_loops(
     Raises
     ------
     ValueError
-        If a cycle cannot be run (:func:`solver.loop.check_cycle`), or a turning point is given
-        twice, or none.
+        If a cycle cannot be run (:func:`adhesis.solver.loop.check_cycle`), or a turning point is
+        given twice, or none.
     TypeError
         If the method is no Method, or a value no number.
     PathError
-        As in :func:`solver.loop.run_loop`.
+        As in :func:`adhesis.solver.loop.run_loop`.
 
     References
     ----------

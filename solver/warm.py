@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from solver.code_cache import installed_folder
-from solver.compiled import (
+from adhesis.solver.code_cache import installed_folder
+from adhesis.solver.compiled import (
     Compilation,
     code_files,
     kept_in_installation,
@@ -20,14 +20,14 @@ from solver.compiled import (
     settings,
     watch_compilation,
 )
-from solver.loop import run_loop
-from solver.material import HalfSpace
-from solver.method import Branch, ContactState
-from solver.problem import Problem
-from solver.profile import self_affine_profile
-from solver.registry import make_method
-from solver.sharp.method import SharpMethod
-from solver.told import hushed
+from adhesis.solver.loop import run_loop
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.method import Branch, ContactState
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.registry import make_method
+from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.told import hushed
 
 COMPILED_METHODS = ("sharp", "grid")
 

@@ -29,16 +29,16 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ensemble.aggregate.average import aggregate
-from ensemble.campaign.file import load_campaign
-from ensemble.command.main import main
-from ensemble.errors import InputError
-from ensemble.results.merge import merge
-from ensemble.results.read import Results
-from ensemble.results.schema import ROW_DATASETS
-from ensemble.results.status import read_status
-from ensemble.results.write import Writer
-from ensemble.run.session import Options, run_campaign
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import ROW_DATASETS
+from adhesis.ensemble.results.status import read_status
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import differences, write_campaign
 from tests.support.fake_run import fake_engine
 from tests.support.synthetic_results import age

@@ -23,7 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from ensemble.versions import commit, versions  # noqa: E402  # needs the path
+from adhesis.ensemble.versions import commit, versions  # noqa: E402  # needs the path
 
 BESIDE = tuple(sorted((ROOT / "jobs" / "beside").glob("*.toml")))
 KEPT = (".png", ".csv", ".md")  # PDF, NetCDF and HTML are made anew by whoever wants them
@@ -55,12 +55,12 @@ class Part:
 
 
 def _paper() -> tuple[str, ...]:
-    runs = [f"-m ensemble run {path} --out OUT/{path.stem}.h5" for path in BESIDE]
+    runs = [f"-m adhesis run {path} --out OUT/{path.stem}.h5" for path in BESIDE]
     beside = " ".join(f"OUT/{path.stem}.h5" for path in BESIDE)
     return (
-        "-m ensemble run jobs/paper.toml --out OUT/paper.h5",
+        "-m adhesis run jobs/paper.toml --out OUT/paper.h5",
         *runs,
-        f"-m ensemble report OUT/paper.h5 --to OUT/paper --beside {beside}",
+        f"-m adhesis report OUT/paper.h5 --to OUT/paper --beside {beside}",
     )
 
 
@@ -70,7 +70,7 @@ PARTS = {
     "measured": Part(
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),
-    "bench": Part(("-m ensemble bench --budget 240 --to OUT",), "benchmark.png", "figures"),
+    "bench": Part(("-m adhesis bench --budget 240 --to OUT",), "benchmark.png", "figures"),
     "study": Part(("-m tools.study figures --to OUT",), "*.png", "study"),
     "paper": Part(_paper(), "paper/*.*", "paper"),
 }
@@ -123,7 +123,7 @@ def make(name: str, ranks: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for command in part.commands:
             words = command.replace("OUT", folder).split()
-            if ranks > 1 and words[:3] == ["-m", "ensemble", "run"]:
+            if ranks > 1 and words[:3] == ["-m", "adhesis", "run"]:
                 words += ["--ranks", str(ranks)]
             print("python", *words, flush=True)
             subprocess.run([sys.executable, *words], cwd=ROOT, check=True)

@@ -17,9 +17,9 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
-from solver.method import ContactState, PathError
-from solver.profile import Amplitudes
-from solver.registry import MethodName
+from adhesis.solver.method import ContactState, PathError
+from adhesis.solver.profile import Amplitudes
+from adhesis.solver.registry import MethodName
 from tests.support.explicit_solution import explicit_openings
 
 TIGHT = 4  # every so many scenes are followed again, to 1e-5 or a hundred times as accurately

@@ -17,7 +17,7 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from ensemble.run.launch import cores, launch_environment, launcher
+from adhesis.ensemble.run.launch import cores, launch_environment, launcher
 
 RANKS = 3
 BAD_CAMPAIGN = "[profile]\nspeed = 3\n"
@@ -35,7 +35,7 @@ CASES = {
 def run(folder: Path, words: tuple[str, ...], sentence: str) -> tuple[int, int]:
     """Return how many lines hold the sentence, and the exit code."""
     done = subprocess.run(
-        [str(launcher()), "-n", str(RANKS), sys.executable, "-m", "ensemble", *words],
+        [str(launcher()), "-n", str(RANKS), sys.executable, "-m", "adhesis", *words],
         cwd=folder,
         env=launch_environment(RANKS) | {"PYTHONPATH": str(Path(__file__).parents[1])},
         stdin=subprocess.DEVNULL,

@@ -15,19 +15,20 @@ ROOT = Path(__file__).resolve().parent.parent
 def sources() -> set[str]:
     """Return what of the checkout belongs into a wheel."""
     found = {
-        str(path.relative_to(ROOT))
-        for package in ("adhesis", "solver", "ensemble")
-        for path in (ROOT / package).rglob("*")
+        str(Path("adhesis", path.relative_to(top)))
+        for top in (ROOT / "adhesis", ROOT)
+        for folder in ((top,) if top.name == "adhesis" else (ROOT / "solver", ROOT / "ensemble"))
+        for path in folder.rglob("*")
         if path.suffix in (".py", ".typed", ".mplstyle") and "__compiled__" not in path.parts
     }
-    return found | {"ensemble/commit.txt"}
+    return found | {"adhesis/ensemble/commit.txt"}
 
 
 def main(wheel: str, sdist: str, commit: str) -> None:
     """Compare; AssertionError with what is wrong."""
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
-        told = archive.read("ensemble/commit.txt").decode().strip()
+        told = archive.read("adhesis/ensemble/commit.txt").decode().strip()
         (metadata,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
         about = message_from_string(archive.read(metadata).decode())
     assert names == sources(), names ^ sources()

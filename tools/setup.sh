@@ -281,7 +281,7 @@ build_h5py() {
 compile_kernels() {
     PYTHONPATH=$root OPENBLAS_NUM_THREADS=1 "$venv/bin/python" -c '
 import sys
-from ensemble.command.main import main
+from adhesis.ensemble.command.main import main
 sys.exit(main(["warm"]))'
 }
 install_rest() {
@@ -342,10 +342,10 @@ finish_installation() {
     # Byte code of what commands import, also for users who may not write here.
     "$venv/bin/python" -c '
 from importlib import import_module
-from ensemble.command.main import COMMANDS
+from adhesis.ensemble.command.main import COMMANDS
 for name in COMMANDS:
-    import_module(f"ensemble.command.{name}")
-import ensemble.bench.compare, ensemble.bench.page, solver.validate.claims
+    import_module(f"adhesis.ensemble.command.{name}")
+import adhesis.ensemble.bench.compare, adhesis.ensemble.bench.page, adhesis.solver.validate.claims
 import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, rich.progress, xarray'
 }
 part adhesis "adhesis itself" finish_installation

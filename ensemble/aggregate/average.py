@@ -17,18 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.aggregate.cells import Cell, read_cells, stress_scale
-from ensemble.aggregate.companions import Companion, read_companion
-from ensemble.aggregate.curves import average_curves
-from ensemble.aggregate.fields import FieldStatistics, aggregate_fields
-from ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
-from ensemble.aggregate.statistics import Estimate, estimates
-from ensemble.campaign.axes import Axis
-from ensemble.campaign.tables import Campaign
-from ensemble.results.read import Results
-from ensemble.results.schema import FAILED
-from solver.method import BRANCHES
-from solver.profile import Array
+from adhesis.ensemble.aggregate.cells import Cell, read_cells, stress_scale
+from adhesis.ensemble.aggregate.companions import Companion, read_companion
+from adhesis.ensemble.aggregate.curves import average_curves
+from adhesis.ensemble.aggregate.fields import FieldStatistics, aggregate_fields
+from adhesis.ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
+from adhesis.ensemble.aggregate.statistics import Estimate, estimates
+from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import FAILED
+from adhesis.solver.method import BRANCHES
+from adhesis.solver.profile import Array
 
 _MOST_FAILURES = 20
 

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.aggregate.curves import Curve
-from ensemble.aggregate.statistics import Estimate, estimates
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
-from ensemble.errors import InputError
-from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
-from ensemble.task.fields import FieldPlan, field_plan
-from solver import problem
-from solver.material import HalfSpace
-from solver.profile import Array
+from adhesis.ensemble.aggregate.curves import Curve
+from adhesis.ensemble.aggregate.statistics import Estimate, estimates
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
+from adhesis.ensemble.task.fields import FieldPlan, field_plan
+from adhesis.solver import problem
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.profile import Array
 
 Rows = NDArray[np.intp]
 

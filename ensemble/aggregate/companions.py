@@ -13,13 +13,13 @@ from typing import Literal
 
 import numpy as np
 
-from ensemble.aggregate.cells import Cell, read_cells
-from ensemble.aggregate.statistics import Estimate, estimates
-from ensemble.campaign.axes import Axis
-from ensemble.campaign.compare import differing
-from ensemble.campaign.rules import shown
-from ensemble.campaign.tables import Campaign
-from ensemble.results.read import Results
+from adhesis.ensemble.aggregate.cells import Cell, read_cells
+from adhesis.ensemble.aggregate.statistics import Estimate, estimates
+from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.campaign.compare import differing
+from adhesis.ensemble.campaign.rules import shown
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.results.read import Results
 
 Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.results.blocks import column_blocks
-from ensemble.results.read import Results
-from solver.profile import Array
+from adhesis.ensemble.results.blocks import column_blocks
+from adhesis.ensemble.results.read import Results
+from adhesis.solver.profile import Array
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.results.blocks import row_blocks
-from ensemble.results.read import Results
-from ensemble.task.dataset import KEPT
-from ensemble.task.fields import FieldPlan
-from solver.profile import Array
+from adhesis.ensemble.results.blocks import row_blocks
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.fields import FieldPlan
+from adhesis.solver.profile import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.results.blocks import row_blocks
-from ensemble.results.read import Results
-from solver.jumps import JUMP_KINDS, SMALL_SCALE
-from solver.profile import Array
+from adhesis.ensemble.results.blocks import row_blocks
+from adhesis.ensemble.results.read import Results
+from adhesis.solver.jumps import JUMP_KINDS, SMALL_SCALE
+from adhesis.solver.profile import Array
 
 BINS_PER_DECADE = 2
 # Energy drops outside these bounds (J/m²) are counted in the outermost bin.

@@ -1,4 +1,4 @@
-"""Means over realisations and how well they are known (:mod:`ensemble.interval`)."""
+"""Means over realisations and how well they are known (:mod:`adhesis.ensemble.interval`)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ensemble.interval import interval
-from solver.profile import Array
+from adhesis.ensemble.interval import interval
+from adhesis.solver.profile import Array
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Estimate:
     sem : float
         Standard error of the mean, std/sqrt(n); n ≥ 2.
     low, high : float
-        Interval of the mean at :data:`ensemble.interval.CONFIDENCE`; n ≥ 2.
+        Interval of the mean at :data:`adhesis.ensemble.interval.CONFIDENCE`; n ≥ 2.
     """
 
     n: int

@@ -1,9 +1,9 @@
 """What accuracy costs: CPU time and memory of every method against its error in the loss.
 
-On every scene (:mod:`ensemble.bench.scenes`) each method runs the same loop at several
-resolutions, every run in a process of its own (:mod:`ensemble.bench.measure`). Errors are those of
-the loop integral, relative to the closed form or to a reference run of ``sharp`` that is tighter
-than every measured one.
+On every scene (:mod:`adhesis.ensemble.bench.scenes`) each method runs the same loop at several
+resolutions, every run in a process of its own (:mod:`adhesis.ensemble.bench.measure`). Errors are
+those of the loop integral, relative to the closed form or to a reference run of ``sharp`` that is
+tighter than every measured one.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ensemble.bench.measure import Measured, Measurement, Run, measure
-from ensemble.bench.scenes import FULL, GROWTH, QUICK, WARM_UP, Scene
-from ensemble.bench.tamaas import has_tamaas
+from adhesis.ensemble.bench.measure import Measured, Measurement, Run, measure
+from adhesis.ensemble.bench.scenes import FULL, GROWTH, QUICK, WARM_UP, Scene
+from adhesis.ensemble.bench.tamaas import has_tamaas
 
 __all__ = [
     "FULL",

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ensemble.bench.compare import Line
-from ensemble.report.figures.style import (
+from adhesis.ensemble.bench.compare import Line
+from adhesis.ensemble.report.figures.style import (
     LINES,
     MM,
     TWO_COLUMNS,

@@ -1,4 +1,4 @@
-"""One measured loop in a process of its own: ``python -m ensemble.bench.measure``.
+"""One measured loop in a process of its own: ``python -m adhesis.ensemble.bench.measure``.
 
 Peak memory belongs to a process, not to a call, and compiled code comes in at its first use. So
 every measured loop has a fresh process: it reads a :class:`Run` as JSON from its argument, runs a
@@ -17,13 +17,13 @@ from dataclasses import asdict, dataclass
 from time import process_time
 from typing import Literal
 
-from ensemble.bench.scenes import WARM_UP, Scene
-from ensemble.bench.tamaas import tamaas_loop
-from ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
-from solver.loop import run_loop
-from solver.loop_result import LoopResult
-from solver.registry import MethodName, make_method
-from solver.warm import warm, watch_compilation
+from adhesis.ensemble.bench.scenes import WARM_UP, Scene
+from adhesis.ensemble.bench.tamaas import tamaas_loop
+from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
+from adhesis.solver.loop import run_loop
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.registry import MethodName, make_method
+from adhesis.solver.warm import warm, watch_compilation
 
 Measured = Literal["grid", "sharp", "tamaas"]
 
@@ -115,7 +115,7 @@ def measure(run: Run) -> Measurement:
     # What the warm-up does not meet may be compiled once; the next process finds it in the cache.
     for _ in range(2):
         child = subprocess.run(
-            python("-m", "ensemble.bench.measure", json.dumps(asdict(run))),
+            python("-m", "adhesis.ensemble.bench.measure", json.dumps(asdict(run))),
             env=python_environment() | ONE_THREAD,
             capture_output=True,
             text=True,

@@ -10,10 +10,10 @@ from typing import Literal
 
 import numpy as np
 
-from solver.material import HalfSpace
-from solver.problem import Problem
-from solver.profile import Profile, self_affine_profile, single_wave
-from solver.references.single_wave import SingleWave
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Profile, self_affine_profile, single_wave
+from adhesis.solver.references.single_wave import SingleWave
 
 Shape = Literal["one wave", "two waves", "rough"]
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import Field, dataclass, fields
 from typing import Any
 
-from ensemble.campaign.rules import shown
-from ensemble.campaign.tables import TABLES, Campaign
-from ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.rules import shown
+from adhesis.ensemble.campaign.tables import TABLES, Campaign
+from adhesis.ensemble.campaign.tasks import Task
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from ensemble.campaign.rules import list_of, shown
-from ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
-from ensemble.errors import InputError
-from solver.checks import MOST_WAVES
-from solver.problem import check_slope
-from solver.profile import self_affine_profile
-from solver.registry import check_nodes
+from adhesis.ensemble.campaign.rules import list_of, shown
+from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
+from adhesis.ensemble.errors import InputError
+from adhesis.solver.checks import MOST_WAVES
+from adhesis.solver.problem import check_slope
+from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.registry import check_nodes
 
 # HDF5 keeps an attribute of at most 64 KiB, and the text is one.
 _LONGEST_TEXT = 60_000

@@ -2,8 +2,8 @@
 
 Realisations are looked at after the first ones and after every batch. A cell has enough when, at
 :data:`LOOKS_IN_A_ROW` looks in a row, the 95 % interval of the mean loss that the tables print
-(:mod:`ensemble.interval`) reaches no further from it than wanted, over at least :data:`LEAST`
-losses.
+(:mod:`adhesis.ensemble.interval`) reaches no further from it than wanted, over at least
+:data:`LEAST` losses.
 
 A rule that stops as soon as an interval looks narrow stops when the spread happens to look small,
 and its intervals cover the mean less often than they say (Anscombe 1953, J. R. Stat. Soc. B 15, 1;
@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.interval import interval
+from adhesis.ensemble.interval import interval
 
 LEAST = 32
 LOOKS_IN_A_ROW = 4

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ensemble.errors import InputError
-from solver import checks
-from solver.checks import Bounds
+from adhesis.ensemble.errors import InputError
+from adhesis.solver import checks
+from adhesis.solver.checks import Bounds
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The tables of a campaign: every key with its rule, its meaning and its default.
 
 Every key has one rule. What a campaign means is here; how its file is read is in
-:mod:`ensemble.campaign.file`.
+:mod:`adhesis.ensemble.campaign.file`.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.axes import Axis, Value, aligned, points
-from ensemble.campaign.rules import (
+from adhesis.ensemble.campaign.axes import Axis, Value, aligned, points
+from adhesis.ensemble.campaign.rules import (
     Rule,
     choice,
     list_of,
@@ -27,8 +27,8 @@ from ensemble.campaign.rules import (
     positive_number,
     whole_number,
 )
-from ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
-from solver.checks import (
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
+from adhesis.solver.checks import (
     ACCURACY,
     HARMONIC,
     HURST,
@@ -43,8 +43,8 @@ from solver.checks import (
     WORK_OF_ADHESION,
     YOUNG,
 )
-from solver.profile import NORMALISATIONS, Amplitudes, Array
-from solver.registry import METHOD_NAMES, MethodName
+from adhesis.solver.profile import NORMALISATIONS, Amplitudes, Array
+from adhesis.solver.registry import METHOD_NAMES, MethodName
 
 
 def _key(
@@ -245,7 +245,7 @@ TABLES: dict[Table, type] = {
 
 @dataclass(frozen=True)
 class Campaign:
-    """A checked campaign. Built by :mod:`ensemble.campaign.file`.
+    """A checked campaign. Built by :mod:`adhesis.ensemble.campaign.file`.
 
     Equal if they mean the same; ``text`` is the TOML as it was written. Where a key of the profile,
     material or cycle is a list, its table holds the smallest value, and :meth:`at` gives the

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError
 
 
 def task_seed(campaign_seed: int, realisation: int) -> int:

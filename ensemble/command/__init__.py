@@ -1,5 +1,5 @@
-"""The command line: one module a command, and :mod:`ensemble.command.main` that calls them.
+"""The command line: one module a command, and :mod:`adhesis.ensemble.command.main` that calls them.
 
-Import :func:`ensemble.command.main.main`; a command module offers ``add_arguments(parser)`` and
-``execute(args) -> int`` (the exit code), and its docstring's first line is its help.
+Import :func:`adhesis.ensemble.command.main.main`; a command module offers ``add_arguments(parser)``
+and ``execute(args) -> int`` (the exit code), and its docstring's first line is its help.
 """

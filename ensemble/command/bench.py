@@ -15,14 +15,14 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ensemble.errors import InputError
-from ensemble.outputs import Writing, check_output_folder, staged_folder
-from ensemble.ticker import tell, ticking
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
+from adhesis.ensemble.ticker import tell, ticking
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from ensemble.bench.compare import Line
+    from adhesis.ensemble.bench.compare import Line
 
 _DEFAULT = Path("out/benchmark")
 _WIDTH = 120
@@ -57,10 +57,16 @@ def execute(args: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from ensemble.bench.compare import FULL, QUICK, benchmark, exponents, growth, ratios
-    from ensemble.bench.page import GROWTH_COLUMNS, LINE_COLUMNS, growth_cells, line_cells, page
-    from ensemble.warm import warm_missing
-    from solver.warm import COMPILED_METHODS
+    from adhesis.ensemble.bench.compare import FULL, QUICK, benchmark, exponents, growth, ratios
+    from adhesis.ensemble.bench.page import (
+        GROWTH_COLUMNS,
+        LINE_COLUMNS,
+        growth_cells,
+        line_cells,
+        page,
+    )
+    from adhesis.ensemble.warm import warm_missing
+    from adhesis.solver.warm import COMPILED_METHODS
 
     if not (math.isfinite(args.budget) and args.budget > 0):
         raise InputError(f"--budget is {args.budget!r}: it must be positive, in seconds")
@@ -117,7 +123,7 @@ def _table(title: str, columns: tuple[str, ...], rows: list[list[str]]) -> Table
 
 
 def _write_csv(path: Path, lines: list[Line]) -> None:
-    from ensemble.bench.page import record
+    from adhesis.ensemble.bench.page import record
 
     records = [record(line) for line in lines]
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -127,8 +133,8 @@ def _write_csv(path: Path, lines: list[Line]) -> None:
 
 
 def _draw(lines: list[Line], stem: Path) -> None:
-    from ensemble.bench.figure import draw  # matplotlib only when everything is measured
-    from ensemble.report.figures.style import save
+    from adhesis.ensemble.bench.figure import draw  # matplotlib only when everything is measured
+    from adhesis.ensemble.report.figures.style import save
 
     save(draw(lines), stem)
 

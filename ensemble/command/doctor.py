@@ -7,8 +7,8 @@ import json
 import os
 from pathlib import Path
 
-from ensemble.doctor.examine import Diagnosis, examine
-from ensemble.errors import InputError
+from adhesis.ensemble.doctor.examine import Diagnosis, examine
+from adhesis.ensemble.errors import InputError
 
 EXAMPLES = (
     "adhesis doctor",

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.errors import InputError, refused_as_input
-from ensemble.loop.arguments import H_RMS, N0, PERIOD, RATIO
-from ensemble.loop.cycle import Cycle, cycle_of
-from ensemble.loop.heights import closure_warning, read_heights
-from ensemble.loop.record import (
+from adhesis.ensemble.errors import InputError, refused_as_input
+from adhesis.ensemble.loop.arguments import H_RMS, N0, PERIOD, RATIO
+from adhesis.ensemble.loop.cycle import Cycle, cycle_of
+from adhesis.ensemble.loop.heights import closure_warning, read_heights
+from adhesis.ensemble.loop.record import (
     FieldStates,
     loop_summary,
     loops_document,
@@ -24,25 +24,25 @@ from ensemble.loop.record import (
     write_json,
     write_npz,
 )
-from ensemble.outputs import Writing, check_outputs, whole_file
-from ensemble.ticker import tell
-from ensemble.trace.options import (
+from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+from adhesis.ensemble.ticker import tell
+from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
     prepared_of,
     trace_of,
     what_was_read,
 )
-from ensemble.warm import warm_missing
-from solver.loop import Progress, run_loop
-from solver.loop_result import LoopResult
-from solver.material import HalfSpace
-from solver.method import Branch, ContactState, Method, PathError
-from solver.path import PathResult, run_path
-from solver.problem import Problem
-from solver.profile import Profile, profile_from_heights, self_affine_profile
-from solver.registry import make_method
-from solver.turns import run_loops
+from adhesis.ensemble.warm import warm_missing
+from adhesis.solver.loop import Progress, run_loop
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.method import Branch, ContactState, Method, PathError
+from adhesis.solver.path import PathResult, run_path
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Profile, profile_from_heights, self_affine_profile
+from adhesis.solver.registry import make_method
+from adhesis.solver.turns import run_loops
 
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
 _SECONDS_BETWEEN_LINES = 5.0
@@ -284,7 +284,7 @@ def _document(
 
 
 def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
-    from ensemble.loop.figure import draw_loops
+    from adhesis.ensemble.loop.figure import draw_loops
 
     figure = draw_loops(results)
     with whole_file(path) as stream:

@@ -18,11 +18,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
-from ensemble.command.parser import Parser
-from ensemble.command.streams import OutputError, standard_streams, write_line
-from ensemble.errors import InputError, RankError, WriteError, naming_options
-from ensemble.run.launch import ONE_THREAD, hand_over
-from ensemble.run.ranks import launched
+from adhesis.ensemble.command.parser import Parser
+from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
+from adhesis.ensemble.errors import InputError, RankError, WriteError, naming_options
+from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
+from adhesis.ensemble.run.ranks import launched
 
 COMMANDS: dict[str, str] = {
     "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
@@ -42,7 +42,7 @@ EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
 )
 # Modules that declare options without loading the solver; those of other commands do so themselves.
-_OPTIONS = {"loop": "ensemble.loop.arguments", "trace": "ensemble.trace.arguments"}
+_OPTIONS = {"loop": "adhesis.ensemble.loop.arguments", "trace": "adhesis.ensemble.trace.arguments"}
 # What several processes of a launcher do with a command: the ranks of `run` share its work, and
 # these are independent of one another (of other profiles, on other nodes). Rank 0 alone runs the
 # rest.
@@ -85,7 +85,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
-    module = importlib.import_module(_OPTIONS.get(name, f"ensemble.command.{name}"))
+    module = importlib.import_module(_OPTIONS.get(name, f"adhesis.ensemble.command.{name}"))
     parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
     module.add_arguments(parser)
     return parser
@@ -117,7 +117,7 @@ def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | Non
 
 def _execute(name: str, words: Sequence[str]) -> int:
     if name == "--version":
-        from ensemble.versions import adhesis_version
+        from adhesis.ensemble.versions import adhesis_version
 
         print(f"adhesis {adhesis_version()}")
         return 0
@@ -134,7 +134,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
         return 0
     args.words = list(words)
     with naming_options():
-        code: int = importlib.import_module(f"ensemble.command.{name}").execute(args)
+        code: int = importlib.import_module(f"adhesis.ensemble.command.{name}").execute(args)
     return code
 
 

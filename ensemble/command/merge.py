@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError
 
 _WRITE_FAILED = 74
 EXAMPLES = (
@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Merge; returns 0."""
-    from ensemble.results.merge import merge
-    from ensemble.run.lock import RunLock
+    from adhesis.ensemble.results.merge import merge
+    from adhesis.ensemble.run.lock import RunLock
 
     out = Path(args.out)
     if not out.parent.is_dir():

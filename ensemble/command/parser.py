@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError
 
 _LONGEST = 80  # characters of a value that are shown
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ensemble.outputs import check_output_folder
-from ensemble.ticker import ticking
+from adhesis.ensemble.outputs import check_output_folder
+from adhesis.ensemble.ticker import ticking
 
 EXAMPLES = (
     "adhesis report paper.h5 --to report",
@@ -42,7 +42,7 @@ def execute(args: argparse.Namespace) -> int:
     inputs = {"the command": args.file}
     inputs |= {f"--beside (number {k})": path for k, path in enumerate(args.beside, 1)}
     check_output_folder("--to", args.to, _FILES, inputs)
-    from ensemble.report.write import write_report
+    from adhesis.ensemble.report.write import write_report
 
     with ticking("adhesis report: tables and figures"):
         write_report(args.file, args.to, beside=args.beside)

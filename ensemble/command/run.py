@@ -17,13 +17,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ensemble.command.streams import OutputError, write_line
-from ensemble.errors import InputError, WriteError
+from adhesis.ensemble.command.streams import OutputError, write_line
+from adhesis.ensemble.errors import InputError, WriteError
 
 if TYPE_CHECKING:
-    from ensemble.campaign.tables import Campaign
-    from ensemble.campaign.tasks import Task
-    from ensemble.run.session import Engine
+    from adhesis.ensemble.campaign.tables import Campaign
+    from adhesis.ensemble.campaign.tasks import Task
+    from adhesis.ensemble.run.session import Engine
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
 OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
@@ -98,8 +98,8 @@ def execute(
 
     Tests pass another engine than loops, and what starts a rank with it.
     """
-    from ensemble.run import launch
-    from ensemble.run.ranks import wait_for_all, world
+    from adhesis.ensemble.run import launch
+    from adhesis.ensemble.run.ranks import wait_for_all, world
 
     started = time.time()
     comm = None
@@ -136,8 +136,8 @@ def execute(
 
 def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int | None:
     """Start ranks and wait for them; None if this process is to compute alone."""
-    from ensemble.run import launch
-    from ensemble.run.ranks import launched
+    from adhesis.ensemble.run import launch
+    from adhesis.ensemble.run.ranks import launched
 
     ranks = int(_number("--ranks", args.ranks, whole=True))
     if ranks < 1:
@@ -174,7 +174,7 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
 
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
     """End every rank: the others know nothing of this one's error and would wait for ever."""
-    from ensemble.run.launch import hand_over
+    from adhesis.ensemble.run.launch import hand_over
 
     if not hand_over(code, sentence) and sentence:
         write_line(sentence)
@@ -183,14 +183,14 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
 
 
 def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
-    from ensemble.campaign.file import load_campaign
-    from ensemble.campaign.tasks import WHOLE, Part
-    from ensemble.run.dispatch import Overdue
-    from ensemble.run.interrupt import deadline, parse_duration
-    from ensemble.run.progress import duration
-    from ensemble.run.ranks import together
-    from ensemble.run.session import Options, run_campaign
-    from ensemble.task.doubt import bound
+    from adhesis.ensemble.campaign.file import load_campaign
+    from adhesis.ensemble.campaign.tasks import WHOLE, Part
+    from adhesis.ensemble.run.dispatch import Overdue
+    from adhesis.ensemble.run.interrupt import deadline, parse_duration
+    from adhesis.ensemble.run.progress import duration
+    from adhesis.ensemble.run.ranks import together
+    from adhesis.ensemble.run.session import Options, run_campaign
+    from adhesis.ensemble.task.doubt import bound
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
@@ -247,10 +247,10 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
 def _tell_price(
     campaign: Campaign, path: Path, args: argparse.Namespace, engine: Engine | None
 ) -> int:
-    from ensemble.campaign.tasks import WHOLE, Part
-    from ensemble.run.price import as_text, price
-    from ensemble.run.session import Engine
-    from ensemble.warm import warm_up  # brings the compiler in
+    from adhesis.ensemble.campaign.tasks import WHOLE, Part
+    from adhesis.ensemble.run.price import as_text, price
+    from adhesis.ensemble.run.session import Engine
+    from adhesis.ensemble.warm import warm_up  # brings the compiler in
 
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
@@ -278,7 +278,7 @@ def _tell_price(
 
 
 def _selection(args: argparse.Namespace) -> Any:
-    from ensemble.run.plan import Selection
+    from adhesis.ensemble.run.plan import Selection
 
     hurst = tuple(_number("--hurst", v) for v in args.hurst)
     gamma = tuple(_number("--work-of-adhesion", v) for v in args.work_of_adhesion)

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError
 
 EXAMPLES = (
     "adhesis status paper.h5",
@@ -31,8 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print the status; returns 0."""
-    from ensemble.results.status import as_text, read_status
-    from ensemble.run.lock import holder
+    from adhesis.ensemble.results.status import as_text, read_status
+    from adhesis.ensemble.run.lock import holder
 
     interval = _interval(args.interval)
     if args.watch:
@@ -61,8 +61,8 @@ def _interval(text: str) -> float:
 
 def _watch(path: Path | str, interval: float) -> int:
     """Show the status again and again: in place on a terminal, else one after the other."""
-    from ensemble.results.status import as_text, read_status
-    from ensemble.run.lock import holder
+    from adhesis.ensemble.results.status import as_text, read_status
+    from adhesis.ensemble.run.lock import holder
 
     live = _live() if sys.stdout.isatty() else None
     first: tuple[float, int] | None = None
@@ -91,8 +91,8 @@ def _watch(path: Path | str, interval: float) -> int:
 
 def _life(status: dict[str, Any]) -> str:
     """Return whether a run is at work, and how old the last row is, as a line of its own."""
-    from ensemble.run.lock import described
-    from ensemble.run.progress import duration
+    from adhesis.ensemble.run.lock import described
+    from adhesis.ensemble.run.progress import duration
 
     run, last = status["run"], status["last_row"]
     text = "no run is writing" if run is None else f"a run is writing ({described(run)})"
@@ -111,7 +111,7 @@ def _live() -> Any:
 
 def _pace(status: dict[str, Any], seconds: float, finished: int) -> str:
     """Return rate and time left, from what was finished since the watch began."""
-    from ensemble.run.progress import duration
+    from adhesis.ensemble.run.progress import duration
 
     if not finished or not status["pending"]:
         return ""

@@ -6,14 +6,14 @@ import argparse
 import sys
 import time
 
-from ensemble.errors import InputError, refused_as_input
-from ensemble.loop.record import write_json
-from ensemble.outputs import Writing, check_output_folder, staged_folder
-from ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
-from ensemble.trace.options import prepared_of, trace_of, what_was_read
-from ensemble.trace.plan import Plan, clock, make_plan
-from ensemble.trace.pool import Pool
-from solver.material import HalfSpace
+from adhesis.ensemble.errors import InputError, refused_as_input
+from adhesis.ensemble.loop.record import write_json
+from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
+from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
+from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
+from adhesis.ensemble.trace.plan import Plan, clock, make_plan
+from adhesis.ensemble.trace.pool import Pool
+from adhesis.solver.material import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
 _FIGURES = ("trace.png", "spectrum.png", "loop.png", "cut-off.png", "tables.png")
@@ -48,7 +48,7 @@ def execute(args: argparse.Namespace) -> int:
     except NoAnswer as error:
         print(f"adhesis trace: {error}", file=sys.stderr)
         return 1
-    from ensemble.trace.page import summary, write_page
+    from adhesis.ensemble.trace.page import summary, write_page
 
     writing = Writing()
     with writing.output("--to", args.to / "trace.json"):

@@ -10,13 +10,13 @@ from contextlib import nullcontext
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from ensemble.errors import InputError
-from ensemble.ticker import tell, ticking
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.ticker import tell, ticking
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from solver.validate.claims import Row
+    from adhesis.solver.validate.claims import Row
 
 _EXCEEDED = 1
 EXAMPLES = (
@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Run the references and print what came out."""
-    from ensemble.warm import warm_missing
-    from solver.validate.claims import METHODS, validate
+    from adhesis.ensemble.warm import warm_missing
+    from adhesis.solver.validate.claims import METHODS, validate
 
     names = [name for name in METHODS if not args.method or name in args.method]
     for name in args.method or ():

@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print what is damaged; returns 0, or 1 if rows are."""
-    from ensemble.results.read import NO_CHECKSUMS
-    from ensemble.results.status import damage_lines, read_status
+    from adhesis.ensemble.results.read import NO_CHECKSUMS
+    from adhesis.ensemble.results.status import damage_lines, read_status
 
     status = read_status(args.file)
     damaged = status["damaged"]

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ensemble.run.launch import (
+from adhesis.ensemble.run.launch import (
     cores,
     end_with_parent,
     launch_environment,
@@ -24,7 +24,7 @@ from ensemble.run.launch import (
     python,
     python_environment,
 )
-from ensemble.versions import installed, last_lines
+from adhesis.ensemble.versions import installed, last_lines
 
 _RANKS = 2
 _TIME_LIMIT = 60.0  # s; the first load of the libraries from a cold network disk is slow
@@ -137,7 +137,7 @@ class _Probe:
 
 def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
     with tempfile.TemporaryDirectory(prefix="adhesis-doctor-", dir=directory) as scratch:
-        command = [*launch, *python("-m", "ensemble.doctor.probe", scratch)]
+        command = [*launch, *python("-m", "adhesis.ensemble.doctor.probe", scratch)]
         if launch:
             command.append("together")
         failure = _failure_of(command, python_environment(launch_environment(_RANKS)))
@@ -205,7 +205,7 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
 def compiled_code() -> Check:
     """Whether the compiler loads, and where its code lies."""
     try:
-        from solver import warm
+        from adhesis.solver import warm
     except (ImportError, RuntimeError, OSError) as error:
         return Check("compiled code", False, f"does not load: {last_lines(str(error))}")
     told = warm.settings()

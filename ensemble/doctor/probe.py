@@ -1,6 +1,6 @@
 """What a process or a rank that `adhesis doctor` starts tries out and reports.
 
-Run as ``python -m ensemble.doctor.probe SCRATCH [together]``.
+Run as ``python -m adhesis.ensemble.doctor.probe SCRATCH [together]``.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ensemble.versions import installed, last_lines
+from adhesis.ensemble.versions import installed, last_lines
 
 
 def report(scratch: Path, together: bool) -> None:

@@ -6,12 +6,12 @@ import argparse
 import math
 from dataclasses import dataclass
 
-from ensemble.errors import InputError
-from solver.control import Control
-from solver.loop import check_cycle
-from solver.material import HalfSpace
-from solver.path import check_path
-from solver.problem import Problem
+from adhesis.ensemble.errors import InputError
+from adhesis.solver.control import Control
+from adhesis.solver.loop import check_cycle
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.path import check_path
+from adhesis.solver.problem import Problem
 
 _OUT = "out"
 _MAX_PENETRATION = 0.9

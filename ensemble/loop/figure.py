@@ -7,9 +7,16 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ensemble.report.figures.style import LINE_OF_BRANCH, LOOKS, MM, TWO_COLUMNS, new_figure, style
-from solver.loop_result import LoopResult
-from solver.path import PathResult
+from adhesis.ensemble.report.figures.style import (
+    LINE_OF_BRANCH,
+    LOOKS,
+    MM,
+    TWO_COLUMNS,
+    new_figure,
+    style,
+)
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.path import PathResult
 
 
 def draw_loops(results: Sequence[LoopResult] | PathResult) -> Figure:

@@ -1,6 +1,6 @@
 """What ``adhesis loop`` writes: the JSON of a loop, and the fields at chosen penetrations.
 
-How files are written is in :mod:`ensemble.outputs`.
+How files are written is in :mod:`adhesis.ensemble.outputs`.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.outputs import whole_file
-from solver.checks import counted
-from solver.jumps import Jump
-from solver.loop_result import LoopResult
-from solver.method import BRANCHES, Branch, ContactState, Fields, Method
-from solver.path import PathResult
-from solver.problem import Problem
+from adhesis.ensemble.outputs import whole_file
+from adhesis.solver.checks import counted
+from adhesis.solver.jumps import Jump
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
+from adhesis.solver.path import PathResult
+from adhesis.solver.problem import Problem
 
 _STATE_KEYS = ("branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy")
 _MORE_STATE_KEYS = ("separation", "elastic_energy", "adhesion_energy", "load_step")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell
-from ensemble.campaign.axes import Axis
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.campaign.axes import Axis
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.curves import QUANTILES
-from ensemble.report.tables.key import key
-from solver.method import BRANCHES
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.curves import QUANTILES
+from adhesis.ensemble.report.tables.key import key
+from adhesis.solver.method import BRANCHES
 
 # curve -> (unit, what it is)
 QUANTITIES = {

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell
-from ensemble.aggregate.fields import fitted_slope
-from ensemble.campaign.axes import Axis
-from ensemble.report import paper
-from ensemble.report.axes import cell_name, lines_along, place, together
-from ensemble.task.doubt import bound, doubtful
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.fields import fitted_slope
+from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.axes import cell_name, lines_along, place, together
+from adhesis.ensemble.task.doubt import bound, doubtful
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3

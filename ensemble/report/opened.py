@@ -17,14 +17,14 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from ensemble.aggregate.average import Aggregate, aggregate
-from ensemble.campaign.tables import Campaign
-from ensemble.report.curves import curves_dataset
-from ensemble.report.plots import Plots
-from ensemble.report.tables import losses, mechanisms
-from ensemble.report.tables.table import Table
-from ensemble.results.read import Results
-from ensemble.results.schema import (
+from adhesis.ensemble.aggregate.average import Aggregate, aggregate
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.report.curves import curves_dataset
+from adhesis.ensemble.report.plots import Plots
+from adhesis.ensemble.report.tables import losses, mechanisms
+from adhesis.ensemble.report.tables.table import Table
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import (
     CHECKSUM,
     DAMAGED,
     DATASETS,
@@ -36,8 +36,8 @@ from ensemble.results.schema import (
     TASK_DATASETS,
     scales,
 )
-from ensemble.task.dataset import KEPT, Dataset
-from solver.jumps import BRANCHES, JUMP_KINDS
+from adhesis.ensemble.task.dataset import KEPT, Dataset
+from adhesis.solver.jumps import BRANCHES, JUMP_KINDS
 
 # Dimensions of the file under the names that they have here.
 _RENAMED = {

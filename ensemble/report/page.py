@@ -6,16 +6,16 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.escape import code_span, fence, markdown, printable
-from ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
-from ensemble.report import findings, paper
-from ensemble.report.axes import shown_cells
-from ensemble.report.figures.catalogue import Illustration
-from ensemble.report.figures.style import left_out
-from ensemble.report.tables import losses as loss_tables
-from ensemble.report.tables import mechanisms as mechanism_tables
-from ensemble.report.tables.works import works
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.escape import code_span, fence, markdown, printable
+from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
+from adhesis.ensemble.report import findings, paper
+from adhesis.ensemble.report.axes import shown_cells
+from adhesis.ensemble.report.figures.catalogue import Illustration
+from adhesis.ensemble.report.figures.style import left_out
+from adhesis.ensemble.report.tables import losses as loss_tables
+from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
+from adhesis.ensemble.report.tables.works import works
 
 
 def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustration]]]) -> str:

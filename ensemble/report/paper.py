@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ensemble.aggregate.cells import Cell
-from ensemble.campaign.tables import Campaign
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.campaign.tables import Campaign
 
 REFERENCE = "G. Carbone, E. Pierro, G. Recchia, arXiv 1511.08891 (2015)"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.average import Aggregate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,9 +23,9 @@ class Plots:
         self._averages = averages
 
     def _draw(self, name: str) -> list[Axes]:
-        from ensemble.report.axes import common, place
-        from ensemble.report.figures import fields, loops, losses
-        from ensemble.report.figures.style import say_below, style
+        from adhesis.ensemble.report.axes import common, place
+        from adhesis.ensemble.report.figures import fields, loops, losses
+        from adhesis.ensemble.report.figures.style import say_below, style
 
         draw: Callable[[Aggregate], Figure] = next(
             getattr(room, name) for room in (loops, losses, fields) if hasattr(room, name)
@@ -45,8 +45,8 @@ class Plots:
         ValueError
             If the campaign has no such axis beside H and γ.
         """
-        from ensemble.report.figures.along import along, with_figure
-        from ensemble.report.figures.style import style
+        from adhesis.ensemble.report.figures.along import along, with_figure
+        from adhesis.ensemble.report.figures.style import style
 
         data = self._averages()
         axes = {axis.name: axis for axis in with_figure(data)}

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from ensemble.aggregate.average import Aggregate, aggregate
-from ensemble.escape import printable
-from ensemble.outputs import Writing, staged_folder
+from adhesis.ensemble.aggregate.average import Aggregate, aggregate
+from adhesis.ensemble.escape import printable
+from adhesis.ensemble.outputs import Writing, staged_folder
 
 
 def write_report(
@@ -50,9 +50,9 @@ def write_report(
 
 def _write_files(data: Aggregate, directory: Path) -> None:
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
-    from ensemble.report.axes import common, place
-    from ensemble.report.curves import write_curves
-    from ensemble.report.figures.catalogue import (
+    from adhesis.ensemble.report.axes import common, place
+    from adhesis.ensemble.report.curves import write_curves
+    from adhesis.ensemble.report.figures.catalogue import (
         HEIGHTS,
         LOOPS,
         LOSSES,
@@ -61,11 +61,11 @@ def _write_files(data: Aggregate, directory: Path) -> None:
         SHAPES,
         along_axes,
     )
-    from ensemble.report.figures.losses import of_penetration
-    from ensemble.report.figures.style import save, say_below, style
-    from ensemble.report.html import html_page
-    from ensemble.report.page import write_page
-    from ensemble.report.tables import losses, mechanisms, works
+    from adhesis.ensemble.report.figures.losses import of_penetration
+    from adhesis.ensemble.report.figures.style import save, say_below, style
+    from adhesis.ensemble.report.html import html_page
+    from adhesis.ensemble.report.page import write_page
+    from adhesis.ensemble.report.tables import losses, mechanisms, works
 
     losses.losses(data).write_csv(directory / "losses.csv")
     losses.paired(data).write_csv(directory / "growth.csv")
@@ -97,8 +97,8 @@ def _write_files(data: Aggregate, directory: Path) -> None:
 
 
 def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
-    from ensemble.report import findings
-    from ensemble.report.tables import losses, mechanisms
+    from adhesis.ensemble.report import findings
+    from adhesis.ensemble.report.tables import losses, mechanisms
 
     losses.losses(data).print(stream)
     print(file=stream)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.results.read import Results
+from adhesis.ensemble.results.read import Results
 
 # Numbers read at once (8 bytes each): large enough for the disk, small enough for any machine.
 READ_AT_ONCE = 2_000_000

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.results.schema import CHECKSUM, ROW_DATASETS
-from ensemble.task.dataset import KEPT, Dataset, row_shape
+from adhesis.ensemble.results.schema import CHECKSUM, ROW_DATASETS
+from adhesis.ensemble.task.dataset import KEPT, Dataset, row_shape
 
 _BLOCK_BYTES = 16 * 2**20
 
@@ -29,7 +29,7 @@ Read = Callable[[str, slice], NDArray[Any]]
 _ORDERED = sorted((d for d in ROW_DATASETS if d is not CHECKSUM), key=lambda d: d.name)
 # The datasets that the checksum of a row covers, in its order: what a run writes, not what the task
 # is. A row thus keeps its checksum when the campaign grows by an axis. The tasks never change, and
-# the checksum of the head covers them (ensemble.results.head).
+# the checksum of the head covers them (adhesis.ensemble.results.head).
 OF_TASKS = tuple(d for d in _ORDERED if d.dims[0] != KEPT)
 OF_KEPT = tuple(d for d in _ORDERED if d.dims[0] == KEPT)
 

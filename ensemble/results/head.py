@@ -17,7 +17,7 @@ from typing import BinaryIO
 import h5py
 import numpy as np
 
-from ensemble.results.schema import ROW_DATASETS
+from adhesis.ensemble.results.schema import ROW_DATASETS
 
 HEAD = "head"
 _MARK = b"adhesis head 1: "

@@ -21,13 +21,13 @@ from typing import Any
 import h5py
 import numpy as np
 
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import WHOLE, Part
-from ensemble.errors import InputError
-from ensemble.outputs import target_of
-from ensemble.results.head import reserve_head, write_head
-from ensemble.results.read import Results, stretches
-from ensemble.results.schema import (
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import WHOLE, Part
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.results.head import reserve_head, write_head
+from adhesis.ensemble.results.read import Results, stretches
+from adhesis.ensemble.results.schema import (
     DAMAGED,
     DATASETS,
     FILE_TYPE,
@@ -39,8 +39,8 @@ from ensemble.results.schema import (
     scales,
     shape_of,
 )
-from ensemble.results.write import reason
-from ensemble.task.dataset import KEPT, Dataset, sizes_of
+from adhesis.ensemble.results.write import reason
+from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
 
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
 

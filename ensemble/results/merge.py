@@ -16,12 +16,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.compare import compare
-from ensemble.campaign.tables import Campaign
-from ensemble.errors import InputError, WriteError
-from ensemble.results.layout import create
-from ensemble.results.read import Results
-from ensemble.results.schema import (
+from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import (
     DAMAGED,
     DATASETS,
     DONE,
@@ -32,9 +32,9 @@ from ensemble.results.schema import (
     kept_rows,
     same_rows,
 )
-from ensemble.results.write import reason
-from ensemble.task.dataset import KEPT, Dataset
-from ensemble.task.row import RESULT_DATASETS
+from adhesis.ensemble.results.write import reason
+from adhesis.ensemble.task.dataset import KEPT, Dataset
+from adhesis.ensemble.task.row import RESULT_DATASETS
 
 Rows = NDArray[np.intp]
 

@@ -12,12 +12,12 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.campaign.tasks import WHOLE, Part, Task
-from ensemble.errors import InputError
-from ensemble.results.checksum import row_checksums
-from ensemble.results.head import check_head
-from ensemble.results.schema import (
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.checksum import row_checksums
+from adhesis.ensemble.results.head import check_head
+from adhesis.ensemble.results.schema import (
     CHECKSUM,
     DAMAGED,
     DATASETS,
@@ -39,7 +39,7 @@ from ensemble.results.schema import (
     scales,
     shape_of,
 )
-from ensemble.task.dataset import KEPT, sizes_of
+from adhesis.ensemble.task.dataset import KEPT, sizes_of
 
 _MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
 _LONGEST_ATTRIBUTE = 2**16  # bytes of a root attribute, of a text those of a reference to it
@@ -250,7 +250,7 @@ class Results:
             return out
 
     def status(self) -> NDArray[np.uint8]:
-        """Return the status of every task: PENDING, DONE, … (ensemble.results.schema).
+        """Return the status of every task: PENDING, DONE, … (adhesis.ensemble.results.schema).
 
         DAMAGED is that of a row which does not have its checksum, or whose status is none. All rows
         with a result are read for it, once.

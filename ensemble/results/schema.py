@@ -1,7 +1,7 @@
 """The shape of a results file: one table that lays it out, reads it and documents it.
 
-What a loop leaves behind is told in :mod:`ensemble.task.row`; here what the task is and how it
-went are added to it. ``docs/results-file.md`` describes the same datasets for people; a test
+What a loop leaves behind is told in :mod:`adhesis.ensemble.task.row`; here what the task is and how
+it went are added to it. ``docs/results-file.md`` describes the same datasets for people; a test
 compares the two.
 """
 
@@ -13,11 +13,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import WHOLE, Part
-from ensemble.errors import InputError
-from ensemble.task.dataset import COUNT, FLOAT, KEPT, Dataset, Scale, flags, row_shape, sizes_of
-from ensemble.task.row import RESULT_DATASETS, row_scales
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import WHOLE, Part
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.task.dataset import (
+    COUNT,
+    FLOAT,
+    KEPT,
+    Dataset,
+    Scale,
+    flags,
+    row_shape,
+    sizes_of,
+)
+from adhesis.ensemble.task.row import RESULT_DATASETS, row_scales
 
 FILE_TYPE = "adhesis-results"
 FILE_VERSION = (1, 1)

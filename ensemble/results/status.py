@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.precision import relative_error
-from ensemble.escape import one_line, printable
-from ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows
-from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from ensemble.task.doubt import doubtful
+from adhesis.ensemble.campaign.precision import relative_error
+from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows
+from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
+from adhesis.ensemble.task.doubt import doubtful
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
@@ -42,8 +42,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         value of each of the ``axes``) with
         its counts, its mean time and its mean loss with standard error (J/m², and W~);
         ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
-        checks say that it is wrong (:mod:`ensemble.task.doubt`), the worst first; ``last_row``,
-        when the file was last written to (as ``time.time()`` counts), None before the first row.
+        checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the worst first;
+        ``last_row``, when the file was last written to (as ``time.time()`` counts), None before the
+        first row.
 
     Raises
     ------

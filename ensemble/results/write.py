@@ -17,9 +17,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.errors import WriteError
-from ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
-from ensemble.results.schema import (
+from adhesis.ensemble.errors import WriteError
+from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
+from adhesis.ensemble.results.schema import (
     CHECKSUM,
     DATASETS,
     DONE,
@@ -32,8 +32,8 @@ from ensemble.results.schema import (
     TASK_DATASETS,
     encode_text,
 )
-from ensemble.task.dataset import KEPT
-from ensemble.task.row import RESULT_DATASETS, Row
+from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.row import RESULT_DATASETS, Row
 
 _KEPT_NAMES = frozenset(d.name for d in DATASETS if d.dims[0] == KEPT)
 _NAMES = frozenset(d.name for d in RESULT_DATASETS)
@@ -62,7 +62,8 @@ class Writer:
     ) -> None:
         self.path = Path(path)
         self._serial = comm is None
-        # HDF5's own lock would refuse readers; two writers are refused by ensemble.run.lock.
+        # HDF5's own lock would refuse readers; two writers are refused by
+        # adhesis.ensemble.run.lock.
         options = {"locking": False} if comm is None else {"driver": "mpio", "comm": comm}
         self._file = h5py.File(self.path, "r+", **options)
         self._origin = origin

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
-from ensemble.run.interrupt import raised_by_handler
+from adhesis.ensemble.run.interrupt import raised_by_handler
 
 StopCheck = Callable[[], None]
 """Called by a task now and then; raises what ends the task."""

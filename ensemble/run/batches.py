@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ensemble.campaign.precision import enough, looks
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.precision import enough, looks
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import Task
 
 
 @dataclass

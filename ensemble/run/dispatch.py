@@ -23,9 +23,9 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from ensemble.run.attempt import Compute, GivenUp, Outcome, attempt
-from ensemble.run.schedule import Schedule
-from ensemble.run.units import Units
+from adhesis.ensemble.run.attempt import Compute, GivenUp, Outcome, attempt
+from adhesis.ensemble.run.schedule import Schedule
+from adhesis.ensemble.run.units import Units
 
 Deliver = Callable[[Outcome], Outcome]
 Collect = Callable[[Outcome], None]

@@ -11,7 +11,7 @@ from traceback import walk_tb
 from types import FrameType
 from typing import Any, Self
 
-from ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError
 
 # Before the walltime ends, what is in flight is given up and the file closed: this long before (s),
 # but at most this share of the walltime.

@@ -22,7 +22,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from ensemble.run.interrupt import stop_signals
+from adhesis import _version
+from adhesis.ensemble.run.interrupt import stop_signals
 
 # What a launcher tells its ranks. A program that passes it on to a launcher of its own is taken
 # for one of those ranks, and both wait for each other or end without a word.
@@ -55,7 +56,7 @@ def python_environment(environ: Mapping[str, str] = os.environ) -> dict[str, str
 
     PYTHONPATH keeps its entries but the empty ones, which stand for the working directory.
     """
-    here = str(Path(__file__).resolve().parent.parent.parent)
+    here = str(Path(_version.__file__).resolve().parent.parent)
     entries = [entry for entry in environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
     # as an entry of PYTHONPATH, packages of the interpreter's own would come before its library
     if here not in (sysconfig.get_path("purelib"), sysconfig.get_path("platlib")):
@@ -159,7 +160,7 @@ def run_ranks(
         What a rank runs instead of adhesis, before the words.
     """
     # An error that a rank does not handle must end the others, too: mpi4py sees to it.
-    program = program or python("-m", "mpi4py", "-m", "ensemble")
+    program = program or python("-m", "mpi4py", "-m", "adhesis")
     handle, handed_over = tempfile.mkstemp(prefix="adhesis-")
     started = {STARTED: handed_over}
     env = python_environment(launch_environment(ranks)) | ONE_THREAD | started

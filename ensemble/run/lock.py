@@ -24,9 +24,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
 
-from ensemble.errors import InputError, WriteError
-from ensemble.escape import one_line
-from ensemble.outputs import target_of
+from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.escape import one_line
+from adhesis.ensemble.outputs import target_of
 
 # Two bytes far beyond the text: the run as a whole, and the ranks that write.
 _RUN, _WRITERS = 1 << 30, (1 << 30) + 1

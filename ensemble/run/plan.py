@@ -12,18 +12,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.compare import compare
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import WHOLE, Part, Task
-from ensemble.errors import InputError
-from ensemble.results.layout import create
-from ensemble.results.read import NO_CHECKSUMS, Results
-from ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
-from ensemble.results.write import Writer
-from ensemble.run.batches import Batches
-from ensemble.run.lock import RunLock
-from ensemble.task.compute import check_task
-from ensemble.versions import versions
+from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.read import NO_CHECKSUMS, Results
+from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.batches import Batches
+from adhesis.ensemble.run.lock import RunLock
+from adhesis.ensemble.task.compute import check_task
+from adhesis.ensemble.versions import versions
 
 Group = tuple[float, ...]
 _MOST_SHOWN = 10

@@ -12,17 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ensemble.campaign.compare import compare
-from ensemble.campaign.precision import fewest, looks
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import WHOLE, Part, Task
-from ensemble.errors import InputError
-from ensemble.results.read import Results
-from ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
-from ensemble.run.plan import group_of, prior
-from ensemble.run.progress import duration
-from ensemble.task.compute import Runner
-from ensemble.task.row import Row
+from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.precision import fewest, looks
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
+from adhesis.ensemble.run.plan import group_of, prior
+from adhesis.ensemble.run.progress import duration
+from adhesis.ensemble.task.compute import Runner
+from adhesis.ensemble.task.row import Row
 
 # Loops are tried out for so long (s), one realisation of every cell after the other.
 PILOT_SECONDS = 60.0

@@ -1,7 +1,7 @@
 """What this project asks of MPI: messages, an honest count of ranks, no rank left waiting.
 
 The only module of a run that imports mpi4py, and only inside its functions: one process runs where
-there is no MPI (:mod:`ensemble.doctor.probe`, in processes of its own, tries MPI out).
+there is no MPI (:mod:`adhesis.ensemble.doctor.probe`, in processes of its own, tries MPI out).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from ensemble.errors import InputError, RankError
+from adhesis.ensemble.errors import InputError, RankError
 
 T = TypeVar("T")
 
@@ -140,7 +140,7 @@ def one_a_node_first(comm: Any, function: Callable[[bool], T]) -> T:
 
 
 class MpiChannel:
-    """:class:`ensemble.run.dispatch.Channel` over MPI.
+    """:class:`adhesis.ensemble.run.dispatch.Channel` over MPI.
 
     Plain probes and receives of pickled bytes: matched probes, mpi4py's default, fail on some
     networks. One thread a rank, so that nobody else can take a message that was probed.

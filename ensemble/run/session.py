@@ -12,25 +12,25 @@ from typing import Any, Protocol, Self
 
 import h5py
 
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import WHOLE, Part, Task
-from ensemble.outputs import target_of
-from ensemble.results.schema import origin_of
-from ensemble.results.write import Writer
-from ensemble.run.attempt import Compute, Outcome, StopCheck
-from ensemble.run.dispatch import Limits, Master, Worker, work_alone
-from ensemble.run.interrupt import GRACE, Deadline, StopSignals
-from ensemble.run.lock import RunLock
-from ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
-from ensemble.run.progress import Counts, ProgressLine
-from ensemble.run.ranks import MpiChannel, one_a_node_first, together
-from ensemble.run.schedule import Schedule
-from ensemble.run.units import Units
-from ensemble.task.compute import Runner, check_task, methods_of
-from ensemble.task.doubt import doubtful
-from ensemble.task.row import Row
-from ensemble.versions import processor, versions
-from solver.loop import Progress
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.results.schema import origin_of
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.attempt import Compute, Outcome, StopCheck
+from adhesis.ensemble.run.dispatch import Limits, Master, Worker, work_alone
+from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
+from adhesis.ensemble.run.lock import RunLock
+from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
+from adhesis.ensemble.run.progress import Counts, ProgressLine
+from adhesis.ensemble.run.ranks import MpiChannel, one_a_node_first, together
+from adhesis.ensemble.run.schedule import Schedule
+from adhesis.ensemble.run.units import Units
+from adhesis.ensemble.task.compute import Runner, check_task, methods_of
+from adhesis.ensemble.task.doubt import doubtful
+from adhesis.ensemble.task.row import Row
+from adhesis.ensemble.versions import processor, versions
+from adhesis.solver.loop import Progress
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Told:
         In J/m².
     audit_residual : float
     doubtful : bool
-        See :mod:`ensemble.task.doubt`.
+        See :mod:`adhesis.ensemble.task.doubt`.
     """
 
     loss: float
@@ -53,7 +53,7 @@ class Told:
 
 
 class RowWriter(Protocol):
-    """Where rows go; :class:`ensemble.results.write.Writer`."""
+    """Where rows go; :class:`adhesis.ensemble.results.write.Writer`."""
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
         """Write the row of a task that was computed."""
@@ -131,7 +131,7 @@ class Summary:
     ----------
     doubtful : int
         Losses, of those computed now, whose own checks say that they are wrong
-        (:mod:`ensemble.task.doubt`).
+        (:mod:`adhesis.ensemble.task.doubt`).
     stopped : str or None
         Why it stopped before the last task.
     """
@@ -180,7 +180,7 @@ def run_campaign(
     InputError
         On every rank, before any work, if the campaign cannot be computed or the file is foreign,
         damaged, of another campaign, in use or not writable.
-    ensemble.run.dispatch.Overdue
+    adhesis.ensemble.run.dispatch.Overdue
         If workers did not stop in time when told to; the results file is sound.
     """
     options, engine = options or Options(), engine or Engine()
@@ -240,7 +240,7 @@ def _warm_up(comm: Any, methods: Collection[str], say: Callable[[str], None]) ->
     """Compile on one rank of each node, and load that on the others, before the first task."""
     if not methods:
         return
-    from ensemble.warm import warm_up  # brings the compiler in
+    from adhesis.ensemble.warm import warm_up  # brings the compiler in
 
     def prepare_rank(first: bool) -> bool:
         heard = first and (comm is None or comm.rank == 0)

@@ -6,20 +6,20 @@ import time
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
-from ensemble.errors import InputError
-from ensemble.task.dataset import sizes_of
-from ensemble.task.fields import FieldPlan, FieldRecorder, field_plan
-from ensemble.task.row import Row, row_of, row_scales
-from solver.control import Control
-from solver.loop import Progress, run_loop
-from solver.material import HalfSpace
-from solver.method import Branch, Method
-from solver.problem import Problem
-from solver.profile import Array, self_affine_profile
-from solver.registry import make_method
-from solver.turns import LoadingBranch
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.task.dataset import sizes_of
+from adhesis.ensemble.task.fields import FieldPlan, FieldRecorder, field_plan
+from adhesis.ensemble.task.row import Row, row_of, row_scales
+from adhesis.solver.control import Control
+from adhesis.solver.loop import Progress, run_loop
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.method import Branch, Method
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array, self_affine_profile
+from adhesis.solver.registry import make_method
+from adhesis.solver.turns import LoadingBranch
 
 
 def make_problem(campaign: Campaign, task: Task) -> Problem:
@@ -107,8 +107,8 @@ class Runner:
     """Computes tasks one after the other, each with the bits of :func:`run_task`.
 
     The tasks of a campaign with several turning points share a loading branch
-    (:meth:`ensemble.campaign.tables.Campaign.branch_of`): it is kept from one task to the next, as
-    long as the turning points ascend.
+    (:meth:`adhesis.ensemble.campaign.tables.Campaign.branch_of`): it is kept from one task to the
+    next, as long as the turning points ascend.
     """
 
     def __init__(self) -> None:

@@ -34,7 +34,7 @@ class Dataset:
     attributes : mapping
         Further attributes.
     value : callable, optional
-        How its row is taken from a loop (:mod:`ensemble.task.row`); None where it is not.
+        How its row is taken from a loop (:mod:`adhesis.ensemble.task.row`); None where it is not.
     """
 
     name: str

@@ -20,12 +20,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
-from ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
-from solver.fields import gap_shares, spectral_density
-from solver.method import BRANCHES, Branch, ContactState, Method
-from solver.profile import Array
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
+from adhesis.solver.fields import gap_shares, spectral_density
+from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
+from adhesis.solver.profile import Array
 
 # Nodes per shortest wave: spectra then reach four times the highest wave number of the profile.
 NODES_PER_WAVE = 8

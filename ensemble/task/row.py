@@ -1,7 +1,7 @@
 """The row of a task: every number that a loop leaves behind, with how it is taken from the loop.
 
 One table, from which the results file is laid out, written, read and documented
-(:mod:`ensemble.results.schema`).
+(:mod:`adhesis.ensemble.results.schema`).
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.campaign.tables import Campaign
-from ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
-from ensemble.task.fields import FIELD_DATASETS, field_plan, field_scales
-from solver.jumps import BRANCHES, JUMP_KINDS, Jump
-from solver.loop_result import LoopResult
-from solver.method import Branch
-from solver.profile import Array
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
+from adhesis.ensemble.task.fields import FIELD_DATASETS, field_plan, field_scales
+from adhesis.solver.jumps import BRANCHES, JUMP_KINDS, Jump
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.method import Branch
+from adhesis.solver.profile import Array
 
 Row = dict[str, Any]
 """Values of one task by dataset; those of kept fields only where the task keeps them."""
@@ -246,8 +246,8 @@ def row_of(
         where their axis ends; of more jumps than the catalogue holds those with the largest drops
         are kept, in the order of the path.
     axes : mapping of arrays, optional
-        Penetrations (:meth:`solver.loop_result.LoopResult.at`) of the curves of each branch, where
-        these are not the loop's load steps.
+        Penetrations (:meth:`adhesis.solver.loop_result.LoopResult.at`) of the curves of each
+        branch, where these are not the loop's load steps.
     """
     row: Row = {d.name: d.value(loop) for d in (*NUMBERS, JUMP_COUNT) if d.value is not None}
     for branch, curves in CURVES.items():

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
-from ensemble.trace.pool import Pool, Result, Watch
-from ensemble.trace.prepare import Prepared
-from solver.checks import (
+from adhesis.ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
+from adhesis.ensemble.trace.pool import Pool, Result, Watch
+from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.solver.checks import (
     ACCURACY,
     Bounds,
     choice,
@@ -25,11 +25,11 @@ from solver.checks import (
     row,
     whole,
 )
-from solver.loop import check_cycle
-from solver.material import HalfSpace
-from solver.problem import Problem
-from solver.registry import METHOD_NAMES, MethodName
-from solver.values import ByValue
+from adhesis.solver.loop import check_cycle
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.problem import Problem
+from adhesis.solver.registry import METHOD_NAMES, MethodName
+from adhesis.solver.values import ByValue
 
 QUANTITIES = {
     "loss": "J/m²",
@@ -92,7 +92,8 @@ class Answer(ByValue):
     ----------
     loss, pull_off_stress, contact_fraction : Quantity
     results : dict
-        Numbers of each loop by name (:func:`ensemble.trace.worker.run`); a text if it failed.
+        Numbers of each loop by name (:func:`adhesis.ensemble.trace.worker.run`); a text if it
+        failed.
     warnings : tuple of str
     seconds : float
         Wall time.
@@ -179,7 +180,7 @@ def loss_of_trace(
     processes : int, optional
         Side by side; without it one for each core, 0 for none beside this one.
     watch : callable, optional
-        Called with the :class:`~ensemble.trace.pool.Pool` about once a second.
+        Called with the :class:`~adhesis.ensemble.trace.pool.Pool` about once a second.
 
     Raises
     ------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError
 
 # By their first bytes; what stands behind FILE in the message.
 _COMPRESSED = {

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ensemble.report.figures.style import (
+from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     ONE_COLUMN,
     TWO_COLUMNS,
@@ -19,9 +19,9 @@ from ensemble.report.figures.style import (
     plain_decades,
     style,
 )
-from ensemble.trace.answer import Answer
-from solver.profile import Array
-from solver.trace import trace_spectrum
+from adhesis.ensemble.trace.answer import Answer
+from adhesis.solver.profile import Array
+from adhesis.solver.trace import trace_spectrum
 
 _GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
 _MOST_SHOWN = 4000  # points of a curve; of more, the lowest and highest of each stretch

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.errors import InputError, parameter
-from ensemble.trace.units import METRES, unit_named
-from solver.profile import Array
+from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.trace.units import METRES, unit_named
+from adhesis.solver.profile import Array
 
 HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
 

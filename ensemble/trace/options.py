@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ensemble.errors import InputError
-from ensemble.escape import printable
-from ensemble.trace.prepare import Prepared, prepare_trace
-from ensemble.trace.read import Trace, read_trace
-from ensemble.trace.text import DELIMITERS
-from ensemble.trace.units import length_text, parse_length
-from solver.checks import counted
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.escape import printable
+from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
+from adhesis.ensemble.trace.read import Trace, read_trace
+from adhesis.ensemble.trace.text import DELIMITERS
+from adhesis.ensemble.trace.units import length_text, parse_length
+from adhesis.solver.checks import counted
 
 _NAMES = (
     *("unit", "step", "columns", "delimiter", "decimal", "row", "channel", "degree", "cut_off"),

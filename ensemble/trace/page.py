@@ -8,11 +8,11 @@ import re
 from importlib import metadata
 from pathlib import Path
 
-from ensemble.escape import code_span, markdown, printable
-from ensemble.trace.answer import _DOUBTS, COVERAGE, Answer, Quantity
-from ensemble.trace.figures import Drawn, draw_all
-from ensemble.trace.units import length_text
-from solver.checks import counted
+from adhesis.ensemble.escape import code_span, markdown, printable
+from adhesis.ensemble.trace.answer import _DOUBTS, COVERAGE, Answer, Quantity
+from adhesis.ensemble.trace.figures import Drawn, draw_all
+from adhesis.ensemble.trace.units import length_text
+from adhesis.solver.checks import counted
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em;

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.errors import parameter
-from ensemble.run.launch import cores
-from ensemble.trace.prepare import Prepared
-from ensemble.trace.units import length_text
-from ensemble.trace.worker import Job
-from solver.material import HalfSpace
-from solver.profile import Profile
-from solver.registry import MethodName
+from adhesis.ensemble.errors import parameter
+from adhesis.ensemble.run.launch import cores
+from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.ensemble.trace.units import length_text
+from adhesis.ensemble.trace.worker import Job
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.profile import Profile
+from adhesis.solver.registry import MethodName
 
 # Loops beyond this many waves are compared at a coarser cut-off when a doubt is measured.
 _MOST_WAVES_OF_VARIANTS = 8000

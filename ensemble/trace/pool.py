@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ensemble.run.interrupt import raised_by_handler
-from ensemble.run.launch import ONE_THREAD, python, python_environment
-from ensemble.trace.worker import FAILURES, Job, failure, run
+from adhesis.ensemble.run.interrupt import raised_by_handler
+from adhesis.ensemble.run.launch import ONE_THREAD, python, python_environment
+from adhesis.ensemble.trace.worker import FAILURES, Job, failure, run
 
 Result = dict[str, Any]
 Watch = Callable[["Pool"], None]
@@ -93,7 +93,7 @@ class Pool:
     def _start(self) -> None:
         worker = len(self._workers)
         process = subprocess.Popen(
-            python("-m", "ensemble.trace.worker"),
+            python("-m", "adhesis.ensemble.trace.worker"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=python_environment() | ONE_THREAD,

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ensemble.errors import InputError, parameter, refused_as_input
-from ensemble.trace.read import Trace
-from ensemble.trace.units import length_text
-from solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
-from solver.profile import Array, Profile
-from solver.trace import (
+from adhesis.ensemble.errors import InputError, parameter, refused_as_input
+from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.units import length_text
+from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
+from adhesis.solver.profile import Array, Profile
+from adhesis.solver.trace import (
     Continuation,
     TraceSpectrum,
     band_limited,
@@ -22,7 +22,7 @@ from solver.trace import (
     trace_spectrum,
     trusted_wavelength,
 )
-from solver.values import ByValue
+from adhesis.solver.values import ByValue
 
 MOST_DEGREE = 6
 _DEGREE = Bounds(0, MOST_DEGREE, whole=True)
@@ -143,7 +143,7 @@ def prepare_trace(
         stands out.
     cut_off : float, optional
         Shortest wavelength kept, in m; without it the longest of the limits that step, noise and
-        tip set (:func:`solver.trace.trusted_wavelength`).
+        tip set (:func:`adhesis.solver.trace.trusted_wavelength`).
     tip_radius : float, optional
         In m; without it that of the file, if it tells one.
     longest_gap : float, optional

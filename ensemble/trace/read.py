@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.errors import InputError, parameter, refused_as_input
-from ensemble.trace.containers import beginning, container
-from ensemble.trace.instrument import HINT, UnknownFormatError, available, read_scan
-from ensemble.trace.text import Table, read_table
-from ensemble.trace.units import (
+from adhesis.ensemble.errors import InputError, parameter, refused_as_input
+from adhesis.ensemble.trace.containers import beginning, container
+from adhesis.ensemble.trace.instrument import HINT, UnknownFormatError, available, read_scan
+from adhesis.ensemble.trace.text import Table, read_table
+from adhesis.ensemble.trace.units import (
     METRES,
     length_text,
     parse_units,
     step_of_header,
     units_of_header,
 )
-from solver import checks
-from solver.checks import counted
-from solver.profile import Array
+from adhesis.solver import checks
+from adhesis.solver.checks import counted
+from adhesis.solver.profile import Array
 
 FEWEST_POINTS = 32
 _COLUMN = checks.Bounds(1, 1_000_000, whole=True)

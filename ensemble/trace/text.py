@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ensemble.errors import InputError, parameter
-from solver.checks import counted
-from solver.profile import Array
+from adhesis.ensemble.errors import InputError, parameter
+from adhesis.solver.checks import counted
+from adhesis.solver.profile import Array
 
 MOST_BYTES = 200_000_000
 _ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with

@@ -1,7 +1,7 @@
 """One process that runs loops for a parent: jobs in on stdin, messages out on stdout, pickled.
 
-Started as ``python -m ensemble.trace.worker``: it neither forks nor imports the caller's script, so
-it serves a notebook as well as the command line.
+Started as ``python -m adhesis.ensemble.trace.worker``: it neither forks nor imports the caller's
+script, so it serves a notebook as well as the command line.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.run.launch import end_with_parent
+from adhesis.ensemble.run.launch import end_with_parent
 
 if TYPE_CHECKING:
-    from solver.registry import MethodName
+    from adhesis.solver.registry import MethodName
 
 _SECONDS_BETWEEN_REPORTS = 1.0
 
@@ -73,12 +73,12 @@ def main() -> None:
 
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop; returns its numbers, and its states as lists."""
-    from solver.loop import run_loop
-    from solver.material import HalfSpace
-    from solver.method import Branch, ContactState
-    from solver.problem import Problem
-    from solver.profile import Profile
-    from solver.registry import make_method
+    from adhesis.solver.loop import run_loop
+    from adhesis.solver.material import HalfSpace
+    from adhesis.solver.method import Branch, ContactState
+    from adhesis.solver.problem import Problem
+    from adhesis.solver.profile import Profile
+    from adhesis.solver.registry import make_method
 
     last = time.monotonic()
 

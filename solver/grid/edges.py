@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grid.contact import Contact, Mask
-from solver.grid.lattice import Lattice
-from solver.profile import Array
+from adhesis.solver.grid.contact import Contact, Mask
+from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.profile import Array
 
 Indices = NDArray[np.intp]
 

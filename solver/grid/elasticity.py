@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.grid.fourier import RealFourier, symbol
-from solver.profile import Array
+from adhesis.solver.grid.fourier import RealFourier, symbol
+from adhesis.solver.profile import Array
 
 
 class ElasticGrid:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled, compiled_finite_sums
-from solver.profile import Array
+from adhesis.solver.compiled import compiled, compiled_finite_sums
+from adhesis.solver.profile import Array
 
 
 @compiled_finite_sums

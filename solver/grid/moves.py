@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.grid.contact import Contact
-from solver.grid.edges import Edges
-from solver.grid.lattice import Lattice
-from solver.grid.pairs import pairs
+from adhesis.solver.grid.contact import Contact
+from adhesis.solver.grid.edges import Edges
+from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.pairs import pairs
 
 # Moves whose energies differ by less than this share of the largest are equally urgent: mirror
 # images must move together, and rounding must not choose between them.

@@ -17,10 +17,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver.grid.contact import Contact, ContactSolver
-from solver.grid.edges import Edges, Indices, survey
-from solver.grid.lattice import Lattice
-from solver.grid.moves import (
+from adhesis.solver.grid.contact import Contact, ContactSolver
+from adhesis.solver.grid.edges import Edges, Indices, survey
+from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.moves import (
     Key,
     Memory,
     Move,
@@ -30,8 +30,8 @@ from solver.grid.moves import (
     least_release,
     pair_moves,
 )
-from solver.method import PathError
-from solver.profile import EQUAL_CRESTS
+from adhesis.solver.method import PathError
+from adhesis.solver.profile import EQUAL_CRESTS
 
 _MAX_SWEEPS = 1_000_000
 _MAX_ACTIVE_SETS = 1000

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.grid.contact import Contact
-from solver.grid.edges import Indices, patch_ranges
-from solver.grid.lattice import Lattice
-from solver.method import ContactState
+from adhesis.solver.grid.contact import Contact
+from adhesis.solver.grid.edges import Indices, patch_ranges
+from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.method import ContactState
 
 EDGE_OFFSET = 0.190
 """An edge lies this many dx inside the outer face of its contact node (numerical calibration of the

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.profile import Array
+from adhesis.solver.profile import Array
 
 _EDGE = 1e-4  # share of what is left within which of its ends no aim is taken
 

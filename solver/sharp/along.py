@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.coordinate import ALPHA, LEFT
-from solver.sharp.derivatives import derivatives
-from solver.sharp.equations import mapped, periodic
-from solver.sharp.linear import solve_column
-from solver.sharp.rules import Kinds, Rules
-from solver.sharp.solution import Solution, edge_openings
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import ALPHA, LEFT
+from adhesis.solver.sharp.derivatives import derivatives
+from adhesis.solver.sharp.equations import mapped, periodic
+from adhesis.solver.sharp.linear import solve_column
+from adhesis.solver.sharp.rules import Kinds, Rules
+from adhesis.solver.sharp.solution import Solution, edge_openings
 
 _PLACES = 16  # at which a force is looked at on its way
 _ERROR = 1 / 24  # of a cubic, in its twist: of a wave over almost half its length
@@ -45,7 +45,7 @@ def first_fall(departing: float, departing_rate: float, arriving: float, rate: f
 
 @compiled
 def _singular_load(of: Solution, e: int, rules: Rules) -> tuple[Array, float]:
-    """Column ``e`` of :func:`solver.sharp.derivatives._singular_loads`, and its area."""
+    """Column ``e`` of :func:`adhesis.solver.sharp.derivatives._singular_loads`, and its area."""
     k = e // 2
     side = e % 2
     kind = of.kinds[k]

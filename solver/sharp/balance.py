@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.coordinate import LEFT, RIGHT, RIGHT_PATCH, map_gaps
-from solver.sharp.derivatives import derivatives
-from solver.sharp.rules import Kinds, Rules
-from solver.sharp.solution import Hold, Solution
-from solver.sharp.source import Panels, measure_at
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import LEFT, RIGHT, RIGHT_PATCH, map_gaps
+from adhesis.solver.sharp.derivatives import derivatives
+from adhesis.solver.sharp.rules import Kinds, Rules
+from adhesis.solver.sharp.solution import Hold, Solution
+from adhesis.solver.sharp.source import Panels, measure_at
 
 
 class Law(NamedTuple):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.opening import SHAPE_NODES, fine_nodes_of, opened, sum_modes
-from solver.sharp.rules import Kinds, Rules
-from solver.sharp.sine import circle
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.opening import SHAPE_NODES, fine_nodes_of, opened, sum_modes
+from adhesis.solver.sharp.rules import Kinds, Rules
+from adhesis.solver.sharp.sine import circle
 
 # A minimum below this (of what its curvature makes over a node's distance, or of what the parabola
 # through the nodes may be wrong by) is found from the whole series, by parabolas that get narrower

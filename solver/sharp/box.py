@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.linear import factor_rows, solve_column
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.linear import factor_rows, solve_column
 
 _SWEEPS = 200
 

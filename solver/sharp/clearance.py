@@ -1,11 +1,11 @@
 """How much of a gap's clearance can have been used up since it was looked at.
 
-The fine opening of a gap (:mod:`solver.sharp.opening`) costs as much as many fields, and most gaps
-are far from touching. Inside a gap the surface is free: between two states with nearly the same
-edges its opening changes smoothly, so the nodes of the field tell by how much it has closed. Only
-beside an edge that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)), for which that a
-fourth of the shortest wave away is taken. A gap is looked at again when a good part of its
-clearance can be gone, or where nothing of this can be said.
+The fine opening of a gap (:mod:`adhesis.solver.sharp.opening`) costs as much as many fields, and
+most gaps are far from touching. Inside a gap the surface is free: between two states with nearly
+the same edges its opening changes smoothly, so the nodes of the field tell by how much it has
+closed. Only beside an edge that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)), for
+which that a fourth of the shortest wave away is taken. A gap is looked at again when a good part of
+its clearance can be gone, or where nothing of this can be said.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.field import GapField
-from solver.sharp.rules import RULES, Kinds, Rules
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.rules import RULES, Kinds, Rules
 
 _NEAR = 0.3  # edges that moved by less than this, in λ_min, leave a gap comparable
 _SAFETY = 1.5  # on what the nodes tell

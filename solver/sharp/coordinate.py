@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled, compiled_for_both
-from solver.profile import Array
+from adhesis.solver.compiled import compiled, compiled_for_both
+from adhesis.solver.profile import Array
 
 # Columns of the table of gaps.
 LEFT, RIGHT, LEFT_PATCH, RIGHT_PATCH, ALPHA = 0, 1, 2, 3, 4

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.profile import Array
-from solver.sharp.gaps import outward
-from solver.sharp.point import Point
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.gaps import outward
+from adhesis.solver.sharp.point import Point
 
 _FAR = 4.0  # a course is not believed beyond so many times the way between its points
 _FAR_CUBIC = 5.0  # nor is a fold by the cubic beyond so many times the way of the edge that leads

@@ -1,4 +1,4 @@
-"""Derivatives of the field of :mod:`solver.sharp.field` with respect to the edges.
+"""Derivatives of the field of :mod:`adhesis.solver.sharp.field` with respect to the edges.
 
 The derivative with respect to an edge is the homogeneous solution with an opening ∝ 1/sqrt(r) there
 (Bueckner's and Rice's weight function); the diagonal follows from translation invariance: moving
@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled, compiled_for_both, compiled_sums
-from solver.profile import Array
-from solver.sharp.coordinate import ALPHA, LEFT
-from solver.sharp.equations import mapped, periodic
-from solver.sharp.linear import solve_factored, wide
-from solver.sharp.outside import Outside, reach
-from solver.sharp.rules import Kinds, Rules
-from solver.sharp.solution import Solution, edge_openings
+from adhesis.solver.compiled import compiled, compiled_for_both, compiled_sums
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import ALPHA, LEFT
+from adhesis.solver.sharp.equations import mapped, periodic
+from adhesis.solver.sharp.linear import solve_factored, wide
+from adhesis.solver.sharp.outside import Outside, reach
+from adhesis.solver.sharp.rules import Kinds, Rules
+from adhesis.solver.sharp.solution import Solution, edge_openings
 
 
 @compiled_for_both
@@ -87,7 +87,7 @@ def derivatives(of: Solution, rules: Rules) -> tuple[Array, Array]:
 def _singular_loads(of: Solution, rules: Rules) -> tuple[Array, Array]:
     """Right-hand sides of the regular part of the solution singular at each edge, and its area.
 
-    There are more columns than edges, for :mod:`solver.sharp.linear`; those are zero.
+    There are more columns than edges, for :mod:`adhesis.solver.sharp.linear`; those are zero.
 
     The opening sqrt((1∓η)/(1±η)) of the own gap has the density 1/(1±η) at the nodes and, as the
     rule is exact for polynomials only, a further weight π/(M+1) at the edge itself.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.along import first_fall, forces_on
-from solver.sharp.balance import (
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.along import first_fall, forces_on
+from adhesis.solver.sharp.balance import (
     Law,
     at_least,
     imbalance,
@@ -16,14 +16,14 @@ from solver.sharp.balance import (
     symmetric,
     tangent_of,
 )
-from solver.sharp.box import off_saddle, running_step
-from solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
-from solver.sharp.field import solve, solve_again
-from solver.sharp.kinetics import flow_step, hessian, leaving_step
-from solver.sharp.linear import is_definite
-from solver.sharp.rules import Kinds, Rules, choose_kinds
-from solver.sharp.solution import Solution
-from solver.sharp.source import Panels
+from adhesis.solver.sharp.box import off_saddle, running_step
+from adhesis.solver.sharp.coordinate import LEFT, LEFT_PATCH, RIGHT, map_gaps
+from adhesis.solver.sharp.field import solve, solve_again
+from adhesis.solver.sharp.kinetics import flow_step, hessian, leaving_step
+from adhesis.solver.sharp.linear import is_definite
+from adhesis.solver.sharp.rules import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.solution import Solution
+from adhesis.solver.sharp.source import Panels
 
 # Further running steps with one tangent: of an edge that runs alone only the size of its step
 # depends on it, of several the direction, too.

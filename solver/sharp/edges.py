@@ -16,24 +16,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.method import PathError
-from solver.profile import Array
-from solver.sharp.balance import Law, imbalance, narrowest
-from solver.sharp.coordinate import map_gaps
-from solver.sharp.counters import Counters
-from solver.sharp.descent import LOST, MET, NARROW, RESTING, descend
-from solver.sharp.equilibrium import equilibrium
-from solver.sharp.far import solve_many_plain
-from solver.sharp.field import GapField
-from solver.sharp.gaps import outward, widths, without_small
-from solver.sharp.many import equilibrium_many
-from solver.sharp.nearby import Start
-from solver.sharp.point import Point
-from solver.sharp.rules import RULES, choose_kinds
-from solver.sharp.solution import FIXED, Hold, Solution
-from solver.sharp.source import StressSource
-from solver.sharp.window import About, descend_many, known_about
-from solver.sharp.yielding import between_edges
+from adhesis.solver.method import PathError
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.balance import Law, imbalance, narrowest
+from adhesis.solver.sharp.coordinate import map_gaps
+from adhesis.solver.sharp.counters import Counters
+from adhesis.solver.sharp.descent import LOST, MET, NARROW, RESTING, descend
+from adhesis.solver.sharp.equilibrium import equilibrium
+from adhesis.solver.sharp.far import solve_many_plain
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.gaps import outward, widths, without_small
+from adhesis.solver.sharp.many import equilibrium_many
+from adhesis.solver.sharp.nearby import Start
+from adhesis.solver.sharp.point import Point
+from adhesis.solver.sharp.rules import RULES, choose_kinds
+from adhesis.solver.sharp.solution import FIXED, Hold, Solution
+from adhesis.solver.sharp.source import StressSource
+from adhesis.solver.sharp.window import About, descend_many, known_about
+from adhesis.solver.sharp.yielding import between_edges
 
 MANY = 30  # from so many gaps on, windows and the tree of gaps replace dense matrices
 CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min

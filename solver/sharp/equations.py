@@ -1,4 +1,4 @@
-"""Equation (1) of :mod:`solver.sharp.field`: nodes, matrix and loads of given gaps.
+"""Equation (1) of :mod:`adhesis.solver.sharp.field`: nodes, matrix and loads of given gaps.
 
 A gap's own part, its diagonal block and its loads, depends on its row of the table of gaps alone
 (:func:`one_gap`); the blocks between gaps are the half-space kernel at their nodes.
@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled, compiled_sums
-from solver.profile import Array
-from solver.sharp.coordinate import ALPHA, LEFT, RIGHT, theta_at
-from solver.sharp.moments import gap_moments
-from solver.sharp.rules import Kinds, Rules
-from solver.sharp.solution import Solution
-from solver.sharp.source import Panels
+from adhesis.solver.compiled import compiled, compiled_sums
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import ALPHA, LEFT, RIGHT, theta_at
+from adhesis.solver.sharp.moments import gap_moments
+from adhesis.solver.sharp.rules import Kinds, Rules
+from adhesis.solver.sharp.solution import Solution
+from adhesis.solver.sharp.source import Panels
 
 # Below these arguments the own gap's kernels are taken as series.
 _PERIODIC_SERIES = 0.2

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.balance import (
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.balance import (
     Law,
     at_least,
     imbalance,
@@ -17,12 +17,12 @@ from solver.sharp.balance import (
     symmetric,
     tangent_of,
 )
-from solver.sharp.coordinate import map_gaps
-from solver.sharp.field import solve
-from solver.sharp.linear import is_definite
-from solver.sharp.rules import Kinds, Rules, choose_kinds
-from solver.sharp.solution import PlainSolution, Solution, edge_openings, plain
-from solver.sharp.source import Panels
+from adhesis.solver.sharp.coordinate import map_gaps
+from adhesis.solver.sharp.field import solve
+from adhesis.solver.sharp.linear import is_definite
+from adhesis.solver.sharp.rules import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.solution import PlainSolution, Solution, edge_openings, plain
+from adhesis.solver.sharp.source import Panels
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
 _SHARE = 0.01  # of what an equilibrium may move with the error of the field: so little is nothing

@@ -1,7 +1,7 @@
-"""The field of many gaps: equation (1) of :mod:`solver.sharp.field` on a tree of gaps.
+"""The field of many gaps: equation (1) of :mod:`adhesis.solver.sharp.field` on a tree of gaps.
 
 The same equation as the dense solver's, with the same nodes; the interaction of the gaps is that of
-:mod:`solver.sharp.tree`. The work grows as the number of gaps.
+:mod:`adhesis.solver.sharp.tree`. The work grows as the number of gaps.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.coordinate import in_order, map_gaps
-from solver.sharp.equations import one_gap
-from solver.sharp.linear import factor_rows, solve_factored
-from solver.sharp.rules import Kinds, Rules
-from solver.sharp.solution import (
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import in_order, map_gaps
+from adhesis.solver.sharp.equations import one_gap
+from adhesis.solver.sharp.linear import factor_rows, solve_factored
+from adhesis.solver.sharp.rules import Kinds, Rules
+from adhesis.solver.sharp.solution import (
     Hold,
     PlainSolution,
     Solution,
@@ -24,8 +24,8 @@ from solver.sharp.solution import (
     openings_at,
     plain,
 )
-from solver.sharp.source import Panels
-from solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
+from adhesis.solver.sharp.source import Panels
+from adhesis.solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
 
 
 @compiled
@@ -147,7 +147,9 @@ def solve_many(
     rules: Rules,
     panels: Panels,
 ) -> tuple[Solution, Gaps]:
-    """As :func:`solver.sharp.field.solve`, for many gaps; ``matrix`` and ``factor`` are empty.
+    """Solve the field of many gaps; ``matrix`` and ``factor`` are empty.
+
+    Otherwise as :func:`adhesis.solver.sharp.field.solve`.
 
     Of S' there is the load alone, no solution.
 

@@ -5,7 +5,7 @@ opening) and |D| the operator with symbol |m|,
 
     S = S_full + p + |D| T,      S = 0 in the gaps,  T = 0 on the contact,  mean(T) = q0 s,
 
-p = 2p̄/E* the mean stress. In the coordinate η of each gap (:mod:`solver.sharp.coordinate`)
+p = 2p̄/E* the mean stress. In the coordinate η of each gap (:mod:`adhesis.solver.sharp.coordinate`)
 T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part of |D| is diagonal
 in the Chebyshev polynomials U_n(η), and what remains is smooth. So a few values of f per gap carry
 it all, at the M second-kind Gauss-Chebyshev nodes of each gap:
@@ -25,8 +25,8 @@ At an edge T ≈ C sqrt(r), r the distance from the edge in θ, and
     C = sqrt(2 dη/dθ) [f(±1) - (s^± - Σ_{n<M} (±1)^n s_n)],      K = (E*/4) C sqrt(2π/q0) / q0^0,
     G = K²/(2E*) = π E* C² / (16 q0).
 
-(1) is assembled in :mod:`solver.sharp.equations`; its derivatives with respect to the edges are in
-:mod:`solver.sharp.derivatives`.
+(1) is assembled in :mod:`adhesis.solver.sharp.equations`; its derivatives with respect to the edges
+are in :mod:`adhesis.solver.sharp.derivatives`.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.coordinate import in_order, map_gaps
-from solver.sharp.derivatives import derivatives, felt_from_outside
-from solver.sharp.equations import Parts, assemble, assemble_again, first_nodes
-from solver.sharp.linear import cholesky, solve_column, solve_factored
-from solver.sharp.outside import add_outside, moving_load, reach
-from solver.sharp.rules import RULES, Kinds, Rules, choose_kinds
-from solver.sharp.solution import (
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import in_order, map_gaps
+from adhesis.solver.sharp.derivatives import derivatives, felt_from_outside
+from adhesis.solver.sharp.equations import Parts, assemble, assemble_again, first_nodes
+from adhesis.solver.sharp.linear import cholesky, solve_column, solve_factored
+from adhesis.solver.sharp.outside import add_outside, moving_load, reach
+from adhesis.solver.sharp.rules import RULES, Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.solution import (
     FIXED,
     Hold,
     PlainSolution,
@@ -54,7 +54,7 @@ from solver.sharp.solution import (
     plain,
     without_field,
 )
-from solver.sharp.source import Panels, StressSource
+from adhesis.solver.sharp.source import Panels, StressSource
 
 
 class GapField:

@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.jumps import Branch
-from solver.method import ContactState
-from solver.sharp.clearance import NOT_SEEN
-from solver.sharp.course import Course
-from solver.sharp.edges import CORRECTED, EdgeMechanics
-from solver.sharp.gaps import without_small
-from solver.sharp.jump import Jumps
-from solver.sharp.local import Astray, advance, confirmed, led_by
-from solver.sharp.point import Before, Point
-from solver.sharp.states import Memory, States, Trace
-from solver.sharp.touch import Located, Nucleation
-from solver.sharp.walk import Walk
+from adhesis.solver.jumps import Branch
+from adhesis.solver.method import ContactState
+from adhesis.solver.sharp.clearance import NOT_SEEN
+from adhesis.solver.sharp.course import Course
+from adhesis.solver.sharp.edges import CORRECTED, EdgeMechanics
+from adhesis.solver.sharp.gaps import without_small
+from adhesis.solver.sharp.jump import Jumps
+from adhesis.solver.sharp.local import Astray, advance, confirmed, led_by
+from adhesis.solver.sharp.point import Before, Point
+from adhesis.solver.sharp.states import Memory, States, Trace
+from adhesis.solver.sharp.touch import Located, Nucleation
+from adhesis.solver.sharp.walk import Walk
 
 _BEGUN = 0.05  # longest first step of an edge after a jump, in λ_min: there its course is straight
 _PREDICTED = 0.15  # longest predicted motion of an edge in one continuation step, in λ_min
@@ -329,9 +329,9 @@ class Follower:
     def _closed_early(self, before: ContactState, point: Point, way: float) -> float:
         """Work in J/m² that a loop under a load misses at most, as it is closed short of the fold.
 
-        It is closed at the separation of the last state (:mod:`solver.control`), a ``way`` in d or
-        less before the fold. There s goes like a square root of the distance from the fold, which
-        therefore lies 2 ds/dd times that distance further on.
+        It is closed at the separation of the last state (:mod:`adhesis.solver.control`), a ``way``
+        in d or less before the fold. There s goes like a square root of the distance from the fold,
+        which therefore lies 2 ds/dd times that distance further on.
         """
         return abs(before.mean_stress) * 2 * abs(point.slope) * way / self.states.q0
 

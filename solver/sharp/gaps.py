@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.profile import Array
+from adhesis.solver.profile import Array
 
 
 def widths(gaps: Array) -> tuple[Array, Array]:

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.jumps import Branch
-from solver.method import ContactState
-from solver.profile import Array
-from solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, NoState, Track
-from solver.sharp.gaps import outward
-from solver.sharp.nearby import Start
-from solver.sharp.point import Point
-from solver.sharp.states import States, Trace
-from solver.sharp.touch import Nucleation, Touch
+from adhesis.solver.jumps import Branch
+from adhesis.solver.method import ContactState
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, NoState, Track
+from adhesis.solver.sharp.gaps import outward
+from adhesis.solver.sharp.nearby import Start
+from adhesis.solver.sharp.point import Point
+from adhesis.solver.sharp.states import States, Trace
+from adhesis.solver.sharp.touch import Nucleation, Touch
 
 _MOST_TOUCHES = 10_000  # nucleations in one jump; more is a bug
 _RAN = 0.05  # an edge that went further than this, in λ_min, ran

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled, compiled_sums
-from solver.profile import Array
+from adhesis.solver.compiled import compiled, compiled_sums
+from adhesis.solver.profile import Array
 
 _CLOSE = 0.97  # a step is long enough at this share of the limit
 _AIM = 0.99  # the share that is aimed at

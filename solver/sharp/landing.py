@@ -1,7 +1,7 @@
 """The field of many gaps after a last, small correction of their edges; compiled.
 
-Newton's step of all edges (:mod:`solver.sharp.yielding`) tells what every gap will feel of the
-others to first order. With it each gap is solved by itself between its new edges: what the step
+Newton's step of all edges (:mod:`adhesis.solver.sharp.yielding`) tells what every gap will feel of
+the others to first order. With it each gap is solved by itself between its new edges: what the step
 leaves behind in the field is of second order in it, as it is in the edges, and no further solution
 of all gaps together is needed.
 """
@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.coordinate import (
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import (
     ALPHA,
     LEFT,
     LEFT_PATCH,
@@ -21,11 +21,11 @@ from solver.sharp.coordinate import (
     map_gaps,
     one_minus_plus,
 )
-from solver.sharp.far import Gaps, by_gaps, gap_blocks, invert_gaps
-from solver.sharp.rules import Rules
-from solver.sharp.solution import Hold, Solution, edge_openings
-from solver.sharp.source import Panels
-from solver.sharp.yielding import Change
+from adhesis.solver.sharp.far import Gaps, by_gaps, gap_blocks, invert_gaps
+from adhesis.solver.sharp.rules import Rules
+from adhesis.solver.sharp.solution import Hold, Solution, edge_openings
+from adhesis.solver.sharp.source import Panels
+from adhesis.solver.sharp.yielding import Change
 
 
 @compiled

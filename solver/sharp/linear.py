@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled, compiled_sums
-from solver.profile import Array
+from adhesis.solver.compiled import compiled, compiled_sums
+from adhesis.solver.profile import Array
 
 WIDE = 8  # rows that are taken away at once; multiples of it as many columns are the fastest
 

@@ -1,12 +1,12 @@
 """A stretch of a branch on which few edges move: a window follows, the rest responds linearly.
 
 Towards a fold the edges around one place move ever faster while all others hardly do. They are
-followed in a window (:mod:`solver.sharp.outside`), at the cost of a field of a few gaps, as long as
-the others stay near the state about which they are linear. A point found so is confirmed, that is
-solved with all gaps, before a state, a touch or a jump is told from it: an edge elsewhere may have
-passed a fold of its own, which no linear response shows. Then there is no such equilibrium, and the
-way from the last confirmed point on is gone once more: in a window around the edge that was lost
-and, if that leads astray, too, with all gaps.
+followed in a window (:mod:`adhesis.solver.sharp.outside`), at the cost of a field of a few gaps, as
+long as the others stay near the state about which they are linear. A point found so is confirmed,
+that is solved with all gaps, before a state, a touch or a jump is told from it: an edge elsewhere
+may have passed a fold of its own, which no linear response shows. Then there is no such
+equilibrium, and the way from the last confirmed point on is gone once more: in a window around the
+edge that was lost and, if that leads astray, too, with all gaps.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.profile import Array
-from solver.sharp.course import Course
-from solver.sharp.edges import CORRECTED, EdgeMechanics
-from solver.sharp.equilibrium import equilibrium
-from solver.sharp.field import GapField
-from solver.sharp.gaps import outward
-from solver.sharp.nearby import Window
-from solver.sharp.point import Point
-from solver.sharp.rules import RULES
-from solver.sharp.solution import Solution
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.course import Course
+from adhesis.solver.sharp.edges import CORRECTED, EdgeMechanics
+from adhesis.solver.sharp.equilibrium import equilibrium
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.gaps import outward
+from adhesis.solver.sharp.nearby import Window
+from adhesis.solver.sharp.point import Point
+from adhesis.solver.sharp.rules import RULES
+from adhesis.solver.sharp.solution import Solution
 
 _HALF_WIDTH = 3  # gaps of a window on each side of the edge that leads
 _MOVING = 0.15  # motion of an edge, in λ_min, that ends a stretch as a fold does
@@ -93,7 +93,8 @@ class Stretch:
     def _bent(self, at: float) -> Array:
         """What the motion of the edges outside is more than straight, by their past.
 
-        As :class:`solver.sharp.course.Course` has it: towards a fold like a root, else a parabola.
+        As :class:`adhesis.solver.sharp.course.Course` has it: towards a fold like a root, else a
+        parabola.
         """
         start = self.start
         out = np.zeros(start.rate.shape)

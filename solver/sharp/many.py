@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
-from solver.sharp.coordinate import map_gaps
-from solver.sharp.far import solve_many
-from solver.sharp.landing import landed
-from solver.sharp.rules import Kinds, Rules, choose_kinds
-from solver.sharp.source import Panels
-from solver.sharp.window import About, at_rest
-from solver.sharp.yielding import newton_step, yielding_gaps
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
+from adhesis.solver.sharp.coordinate import map_gaps
+from adhesis.solver.sharp.far import solve_many
+from adhesis.solver.sharp.landing import landed
+from adhesis.solver.sharp.rules import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.source import Panels
+from adhesis.solver.sharp.window import About, at_rest
+from adhesis.solver.sharp.yielding import newton_step, yielding_gaps
 
 _NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
 _SHRINKS = 0.7  # share of the last correction to which the next one has to come down
@@ -30,7 +30,9 @@ def equilibrium_many(
     rules: Rules,
     panels: Panels,
 ) -> tuple[bool, Array, About, Array, float, int]:
-    """As :func:`solver.sharp.equilibrium.equilibrium`, in work that grows as the number of gaps.
+    """Find the equilibrium in work that grows as the number of gaps.
+
+    Otherwise as :func:`adhesis.solver.sharp.equilibrium.equilibrium`.
 
     With the solution comes what windows are opened with. Where the edges are not stable on the
     way, or the corrections hardly shrink, the iteration is not gone on with: of some 1,300 that

@@ -1,13 +1,15 @@
 """Moments of the full-contact stress over a gap.
 
-In the coordinate η of a gap (:mod:`solver.sharp.coordinate`; its ends are η = ∓1) its field needs
+In the coordinate η of a gap (:mod:`adhesis.solver.sharp.coordinate`; its ends are η = ∓1) its field
+needs
 
     s_n  = (2/π) ∫ S U_n(η) sqrt(1 - η²) dθ,        n = 0 … M-1   (second-kind Chebyshev moments)
     s^±  = (1/π) ∫ S sqrt((1 ± η)/(1 ∓ η)) dθ = Σ_n (±1)^n s_n    (what drives each end)
 
-A gap is tiled with panels (:mod:`solver.sharp.source`) no longer than their distance from its ends;
-the cost of a moment grows with log(gap/λ_min), not with the number of wave numbers. The two end
-pieces, with their square-root weight, are integrated with S interpolated on the finest panels.
+A gap is tiled with panels (:mod:`adhesis.solver.sharp.source`) no longer than their distance from
+its ends; the cost of a moment grows with log(gap/λ_min), not with the number of wave numbers. The
+two end pieces, with their square-root weight, are integrated with S interpolated on the finest
+panels.
 """
 
 from __future__ import annotations
@@ -15,9 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compiled import compiled, compiled_sums
-from solver.profile import Array
-from solver.sharp.coordinate import (
+from adhesis.solver.compiled import compiled, compiled_sums
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import (
     ALPHA,
     LEFT,
     LEFT_PATCH,
@@ -26,7 +28,7 @@ from solver.sharp.coordinate import (
     one_minus_plus,
     theta_at,
 )
-from solver.sharp.source import Panels, value_at
+from adhesis.solver.sharp.source import Panels, value_at
 
 _SHORT_GAP = 4  # gaps shorter than so many finest panels are integrated directly
 _PHASE = 3.0  # radians of the highest Chebyshev mode that one panel may span
@@ -335,7 +337,7 @@ def gap_moments(gap: Array, panels: Panels, s: Array, ends: Array) -> None:
     """Moments of (S, S') over a gap: fills ``s``, shape (modes, 2), and ``ends``, (2, 2).
 
     With ``s`` of shape (modes, 1) those of S alone. ``gap`` is a row of
-    :func:`solver.sharp.coordinate.map_gaps`.
+    :func:`adhesis.solver.sharp.coordinate.map_gaps`.
     """
     nodes, count = _nodes_of(gap, s.shape[0], panels, s.shape[1])
     _add_up(nodes, count, s, ends)

@@ -2,8 +2,8 @@
 
 Where a jump begins all gaps have just been solved, and only a few edges run: at a fold, where a
 seed was put, where a gap closed. So the descent begins in a window there, the other gaps responding
-linearly about the known state (:mod:`solver.sharp.window`), and goes on through closing gaps and
-vanishing patches inside it. Where it comes to rest all gaps are solved once more.
+linearly about the known state (:mod:`adhesis.solver.sharp.window`), and goes on through closing
+gaps and vanishing patches inside it. Where it comes to rest all gaps are solved once more.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.profile import Array
-from solver.sharp.balance import Law
-from solver.sharp.counters import Counters
-from solver.sharp.descent import LOST, NARROW, descend, limits
-from solver.sharp.gaps import without_small
-from solver.sharp.rules import RULES
-from solver.sharp.source import Panels
-from solver.sharp.window import About, following, open_window
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.balance import Law
+from adhesis.solver.sharp.counters import Counters
+from adhesis.solver.sharp.descent import LOST, NARROW, descend, limits
+from adhesis.solver.sharp.gaps import without_small
+from adhesis.solver.sharp.rules import RULES
+from adhesis.solver.sharp.source import Panels
+from adhesis.solver.sharp.window import About, following, open_window
 
 _BESIDE = 4  # gaps of a window on each side of what has changed
 _WIDEST = 24  # changes further apart are not those of one window

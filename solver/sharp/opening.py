@@ -1,9 +1,9 @@
 """Energy of a gap field, and the opening of its gaps at fine nodes: all modes, by sine transforms.
 
 A gap's opening is T = Σ_n b_n sin((n+1)t), cos t = η. Below the M modes of (1) in
-:mod:`solver.sharp.field` b_n come from f; above them the straight crack gives b_n = -s_n/(n+1),
-with s_n the Chebyshev moments of S_full over the gap. With p = 2p̄/E* the elastic energy of one
-period is
+:mod:`adhesis.solver.sharp.field` b_n come from f; above them the straight crack gives b_n =
+-s_n/(n+1), with s_n the Chebyshev moments of S_full over the gap. With p = 2p̄/E* the elastic
+energy of one period is
 
     U = (E*/(2 q0²)) · ½ [∫ S_full h~ dθ + ∫_gaps S_full T dθ - 2π q0 s p],      h~ = q0 h,
 
@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.coordinate import (
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import (
     ALPHA,
     LEFT,
     LEFT_PATCH,
@@ -27,10 +27,10 @@ from solver.sharp.coordinate import (
     one_minus_plus,
     theta_at,
 )
-from solver.sharp.field import GapField
-from solver.sharp.rules import RULES, Kinds, Rules
-from solver.sharp.sine import circle, sine_sums
-from solver.sharp.source import interpolate
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.rules import RULES, Kinds, Rules
+from adhesis.solver.sharp.sine import circle, sine_sums
+from adhesis.solver.sharp.source import interpolate
 
 ENERGY_NODES = 3.0  # sine nodes per shortest wave: two resolve it, the rest is margin
 SHAPE_NODES = 6.0  # nodes per shortest wave that bracket every local minimum of the opening

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.method import Fields, Opening
-from solver.problem import Problem
-from solver.profile import Array
-from solver.sharp.field import GapField
-from solver.sharp.opening import fine_opening, finer_opening, sum_modes
+from adhesis.solver.compiled import compiled
+from adhesis.solver.method import Fields, Opening
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.opening import fine_opening, finer_opening, sum_modes
 
 _FIELD_NODES = 6.0  # sine nodes per shortest wave
 _FINER = 8  # points of an opening, between which it is taken as linear, for each of these nodes

@@ -1,14 +1,15 @@
 """What a window of gaps feels of all other gaps: a linear response about a known state.
 
 Gaps outside a window act on it through the charges q of their run at its nodes ξ
-(:mod:`solver.sharp.tree`),
+(:mod:`adhesis.solver.sharp.tree`),
 
     q = q0 - p q1 - R g,      g = -Kᵀ w f   (the potentials of the window's gaps at ξ),
 
-so equation (1) of :mod:`solver.sharp.field` holds for the window with the matrix less w K R Kᵀ w,
-S~ less w K q0, X plus w K q1, and a mean opening to which the outside adds m0 - p m1 + q1ᵀ Kᵀ w f.
-With edges held outside this is exact; where they follow by their tangent it is so to second order
-of their motion. For the window the outside is one more gap, the last one, whose ends do not move.
+so equation (1) of :mod:`adhesis.solver.sharp.field` holds for the window with the matrix less w K R
+Kᵀ w, S~ less w K q0, X plus w K q1, and a mean opening to which the outside adds m0 - p m1 + q1ᵀ Kᵀ
+w f. With edges held outside this is exact; where they follow by their tangent it is so to second
+order of their motion. For the window the outside is one more gap, the last one, whose ends do not
+move.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
 
 
 class Outside(NamedTuple):

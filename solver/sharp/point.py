@@ -7,10 +7,10 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from solver.profile import Array
-from solver.sharp.field import GapField
-from solver.sharp.gaps import outward
-from solver.sharp.window import About
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.gaps import outward
+from adhesis.solver.sharp.window import About
 
 _SHORT = 0.3  # share of the way to an earlier point below which a nearer one tells less of a branch
 _CHANGED = 0.3  # share by which the rate of an edge may change in a jump that does not concern it

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compiled import compiled_for_both
-from solver.profile import Array
-from solver.sharp.coordinate import convergence
+from adhesis.solver.compiled import compiled_for_both
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import convergence
 
 Kinds = NDArray[np.int64]
 """One whole number a gap: its kind of rule, or its first node."""

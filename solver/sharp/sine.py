@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
 
 _ANEW = 64  # rotations before a cosine is computed anew
 

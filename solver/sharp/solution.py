@@ -1,4 +1,4 @@
-"""What is prescribed, and the solution for given gaps of (1) in :mod:`solver.sharp.field`."""
+"""Prescribed quantity, and solution of (1) in :mod:`adhesis.solver.sharp.field` for given gaps."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.rules import Kinds, Rules
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.rules import Kinds, Rules
 
 
 class Hold(NamedTuple):
-    """What is prescribed, d = share·q0 s - give·p (:mod:`solver.control` in the units used here).
+    """Prescribed quantity d = share·q0 s - give·p.
+
+    It is x of :mod:`adhesis.solver.control` in the units used here.
 
     (1, 0) is a fixed separation, (1, E* q0/(2k)) a stiffness k, (0, 1) a load.
     """
@@ -31,7 +33,7 @@ class Solution(NamedTuple):
     Attributes
     ----------
     table : array
-        Of :func:`solver.sharp.coordinate.map_gaps`.
+        Of :func:`adhesis.solver.sharp.coordinate.map_gaps`.
     kinds, offset : int array
         Kind and first node of each gap.
     theta, weight : array, shape (N,)
@@ -39,7 +41,7 @@ class Solution(NamedTuple):
     slope : array, shape (L, 2)
         dη/dθ at the gap ends.
     matrix, factor : array, shape (N, N)
-        B + G and its factor (:func:`solver.sharp.linear.cholesky`).
+        B + G and its factor (:func:`adhesis.solver.sharp.linear.cholesky`).
     rhs, solved : array, shape (N, 2 or 3)
         Loads S~, X and, if asked for, S~', and (B + G)⁻¹ of them.
     beyond : array, shape (L, 2, 1 or 2)
@@ -55,9 +57,9 @@ class Solution(NamedTuple):
     opening : array, shape (2L,)
         C at each gap end.
     felt_load, felt_area, felt_shift : array, array, float
-        Of the derivatives, what comes from outside a window (:mod:`solver.sharp.outside`): loads,
-        shape (N, 2L), and areas, shape (2L,), of the singular openings, both empty without an
-        outside, and the mean opening when all edges move together.
+        Of the derivatives, what comes from outside a window (:mod:`adhesis.solver.sharp.outside`):
+        loads, shape (N, 2L), and areas, shape (2L,), of the singular openings, both empty without
+        an outside, and the mean opening when all edges move together.
     """
 
     table: Array

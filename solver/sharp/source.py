@@ -4,7 +4,7 @@ Method ``sharp`` sees the rough profile only through the full-contact stress S(�
 θ = q0 x. It is smooth on the scale of a shortest wave only, while what it is integrated with is
 smooth away from the ends of a gap. So S is compressed once, on a binary tree of panels: on each
 panel ∫ S f ≈ Σ_i ω_i f(x_i) at the p Gauss-Legendre nodes, exact when f is a polynomial of degree
-below p. Its moments over a gap: :mod:`solver.sharp.moments`.
+below p. Its moments over a gap: :mod:`adhesis.solver.sharp.moments`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
-from solver.compiled import compiled, compiled_for_both
-from solver.profile import Array, Profile
-from solver.sharp.outside import NOTHING, Outside
+from adhesis.solver.compiled import compiled, compiled_for_both
+from adhesis.solver.profile import Array, Profile
+from adhesis.solver.sharp.outside import NOTHING, Outside
 
 # Nodes p of a panel, by the tolerance they serve. The finest panel is at most half a shortest wave
 # long: interpolation there leaves (π/2)^p/(p! 2^(p-1)) of the shortest wave's amplitude. A panel as

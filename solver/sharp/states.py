@@ -6,17 +6,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.jumps import Branch, Jump
-from solver.method import ContactState
-from solver.problem import Problem
-from solver.profile import Array
-from solver.sharp.clearance import NOT_SEEN, Seen
-from solver.sharp.counters import Counters
-from solver.sharp.field import GapField
-from solver.sharp.opening import work_of_gaps
-from solver.sharp.point import Point
-from solver.sharp.solution import Hold
-from solver.sharp.source import StressSource
+from adhesis.solver.jumps import Branch, Jump
+from adhesis.solver.method import ContactState
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.clearance import NOT_SEEN, Seen
+from adhesis.solver.sharp.counters import Counters
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.opening import work_of_gaps
+from adhesis.solver.sharp.point import Point
+from adhesis.solver.sharp.solution import Hold
+from adhesis.solver.sharp.source import StressSource
 
 
 @dataclass

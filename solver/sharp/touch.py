@@ -14,17 +14,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.problem import Problem
-from solver.profile import EQUAL_CRESTS, Array
-from solver.sharp.aim import Closing
-from solver.sharp.bottom import bottoms_of
-from solver.sharp.clearance import Clearances
-from solver.sharp.edges import CORRECTED, EdgeMechanics, NoState
-from solver.sharp.field import GapField
-from solver.sharp.gaps import with_patches
-from solver.sharp.point import Point
-from solver.sharp.rules import RULES, Kinds
+from adhesis.solver.compiled import compiled
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import EQUAL_CRESTS, Array
+from adhesis.solver.sharp.aim import Closing
+from adhesis.solver.sharp.bottom import bottoms_of
+from adhesis.solver.sharp.clearance import Clearances
+from adhesis.solver.sharp.edges import CORRECTED, EdgeMechanics, NoState
+from adhesis.solver.sharp.field import GapField
+from adhesis.solver.sharp.gaps import with_patches
+from adhesis.solver.sharp.point import Point
+from adhesis.solver.sharp.rules import RULES, Kinds
 
 _OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
 _MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
@@ -137,7 +137,7 @@ class Nucleation:
     def least(self, field: GapField) -> tuple[float, Minima]:
         """Least clearance of a field, and the minima of the gaps that may be used up.
 
-        Only those are looked at; see :mod:`solver.sharp.clearance`.
+        Only those are looked at; see :mod:`adhesis.solver.sharp.clearance`.
         """
         left, place = self.clearances.left(field)
         fresh = np.flatnonzero(place < 0)

@@ -1,7 +1,7 @@
 """Many gaps: their interaction on a binary tree of neighbours, solved directly.
 
-In its own coordinate η (:mod:`solver.sharp.coordinate`) a gap acts on the others through charges
-q_i = w_i f_i at its nodes and feels the potentials g_i = (dθ/dη) g(θ_i) there,
+In its own coordinate η (:mod:`adhesis.solver.sharp.coordinate`) a gap acts on the others through
+charges q_i = w_i f_i at its nodes and feels the potentials g_i = (dθ/dη) g(θ_i) there,
 
     g_i = -Σ_j K_ij q_j,      K_ij = (dθ/dη)_i (dθ/dη)_j / (4π sin²((θ_i - θ_j)/2)).
 
@@ -26,9 +26,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compiled import compiled, compiled_sums
-from solver.profile import Array
-from solver.sharp.coordinate import (
+from adhesis.solver.compiled import compiled, compiled_sums
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import (
     ALPHA,
     LEFT,
     LEFT_PATCH,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.method import ContactState
-from solver.sharp.local import LocalPoint, confirmed
-from solver.sharp.point import Point
+from adhesis.solver.method import ContactState
+from adhesis.solver.sharp.local import LocalPoint, confirmed
+from adhesis.solver.sharp.point import Point
 
 
 @dataclass

@@ -1,11 +1,11 @@
 """Descent of many gaps in windows: where edges run, the rest responding linearly; compiled.
 
 In a jump a few edges run at a time. The gaps around them are a window whose edges descend as those
-of few gaps do (:mod:`solver.sharp.descent`); all other gaps are what the window feels of them
-(:mod:`solver.sharp.outside`), their edges following by their tangent. After some steps, or when the
-window has come to rest, the others are put where their tangent leads, everything is solved anew,
-and the next window is chosen: around the edge that is furthest from its balance or, once all are
-near it, that Newton's step moves most.
+of few gaps do (:mod:`adhesis.solver.sharp.descent`); all other gaps are what the window feels of
+them (:mod:`adhesis.solver.sharp.outside`), their edges following by their tangent. After some
+steps, or when the window has come to rest, the others are put where their tangent leads, everything
+is solved anew, and the next window is chosen: around the edge that is furthest from its balance or,
+once all are near it, that Newton's step moves most.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
-from solver.sharp.coordinate import LEFT, RIGHT, map_gaps
-from solver.sharp.descent import LOST, NARROW, RESTING, UNFINISHED, descend, limits
-from solver.sharp.far import Gaps, solve_many
-from solver.sharp.field import solve
-from solver.sharp.outside import Outside, reach
-from solver.sharp.rules import Kinds, Rules, choose_kinds
-from solver.sharp.solution import Solution
-from solver.sharp.source import Panels, measure_at, with_outside
-from solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
-from solver.sharp.yielding import Yielding, newton_step, yielding_gaps
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.balance import Law, at_least, imbalance, moved_gaps, narrowest
+from adhesis.solver.sharp.coordinate import LEFT, RIGHT, map_gaps
+from adhesis.solver.sharp.descent import LOST, NARROW, RESTING, UNFINISHED, descend, limits
+from adhesis.solver.sharp.far import Gaps, solve_many
+from adhesis.solver.sharp.field import solve
+from adhesis.solver.sharp.outside import Outside, reach
+from adhesis.solver.sharp.rules import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.solution import Solution
+from adhesis.solver.sharp.source import Panels, measure_at, with_outside
+from adhesis.solver.sharp.tree import Response, Tree, collect, distribute, plant, respond
+from adhesis.solver.sharp.yielding import Yielding, newton_step, yielding_gaps
 
 _HALF_WIDTH = 4  # gaps of a window on each side of the edge that leads
 _WIDEST = 48
@@ -69,7 +69,7 @@ def descend_many(
     rules: Rules,
     panels: Panels,
 ) -> tuple[Array, int, int, int, Kinds]:
-    """As :func:`solver.sharp.descent.descend`, for many gaps."""
+    """As :func:`adhesis.solver.sharp.descent.descend`, for many gaps."""
     fields = 0
     tangents = 0
     count = gaps.shape[0]
@@ -158,7 +158,7 @@ class About(NamedTuple):
     ----------
     of : Solution
     w, blocks, inverse : array
-        As in :class:`solver.sharp.far.Gaps`.
+        As in :class:`adhesis.solver.sharp.far.Gaps`.
     edges : Yielding
         How its edges follow.
     """

@@ -2,10 +2,10 @@
 
 An edge follows its own opening: C_e = C_c at each. So a gap whose edges may move responds to the
 potentials of the others like one with held edges, only more compliantly; with the motions n of its
-two edges eliminated, its charges are again q = q° - R g, and the tree (:mod:`solver.sharp.tree`)
-solves for all gaps and all edges together. The singular opening that a moving edge leaves is that
-of :mod:`solver.sharp.field`: regular part, charges and, from translation invariance, the edge's own
-term.
+two edges eliminated, its charges are again q = q° - R g, and the tree
+(:mod:`adhesis.solver.sharp.tree`) solves for all gaps and all edges together. The singular opening
+that a moving edge leaves is that of :mod:`adhesis.solver.sharp.field`: regular part, charges and,
+from translation invariance, the edge's own term.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.compiled import compiled
-from solver.profile import Array
-from solver.sharp.coordinate import ALPHA, LEFT
-from solver.sharp.equations import mapped, periodic
-from solver.sharp.far import Gaps, by_gaps, solve_many, spread
-from solver.sharp.rules import Kinds, Rules
-from solver.sharp.solution import Hold, Solution, edge_openings
-from solver.sharp.source import Panels
-from solver.sharp.tree import collect, distribute, respond
+from adhesis.solver.compiled import compiled
+from adhesis.solver.profile import Array
+from adhesis.solver.sharp.coordinate import ALPHA, LEFT
+from adhesis.solver.sharp.equations import mapped, periodic
+from adhesis.solver.sharp.far import Gaps, by_gaps, solve_many, spread
+from adhesis.solver.sharp.rules import Kinds, Rules
+from adhesis.solver.sharp.solution import Hold, Solution, edge_openings
+from adhesis.solver.sharp.source import Panels
+from adhesis.solver.sharp.tree import collect, distribute, respond
 
 
 class Yielding(NamedTuple):

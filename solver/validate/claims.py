@@ -1,6 +1,7 @@
 """The methods against the closed forms: :func:`validate` gives rows of (claim, error, bound).
 
-What is claimed, and why the bounds are what they are (:mod:`solver.validate.judge` for the rest):
+What is claimed, and why the bounds are what they are (:mod:`adhesis.solver.validate.judge` for the
+rest):
 
 *   losses: the promise of the method (grid: 0.5 % at no more than 4096 nodes; sharp: 1e-8);
 *   energies along the branch: the adhesion energy 2γe of the resolution e at both edges;
@@ -23,16 +24,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.control import Control
-from solver.loop import run_loop
-from solver.method import ContactState
-from solver.problem import Problem
-from solver.profile import Array, Profile, self_affine_profile
-from solver.references.full_contact import full_contact_energy, full_contact_stress
-from solver.references.parabola import parabola_load, parabola_pull_off
-from solver.references.periodic_punch import pull_off_stress
-from solver.registry import MethodName, make_method
-from solver.validate.judge import (
+from adhesis.solver.control import Control
+from adhesis.solver.loop import run_loop
+from adhesis.solver.method import ContactState
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array, Profile, self_affine_profile
+from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
+from adhesis.solver.references.parabola import parabola_load, parabola_pull_off
+from adhesis.solver.references.periodic_punch import pull_off_stress
+from adhesis.solver.registry import MethodName, make_method
+from adhesis.solver.validate.judge import (
     ALPHAS,
     AMPLITUDE,
     GRIDS,

@@ -7,7 +7,7 @@ is off by e at the same s. Where a stress is compared at a *given* width, that w
 and Griffith's balance holds within e.
 
 The waves are so shallow (A q0 = 6e-6) that the flat and the arc measure of the adhesive area
-(:mod:`solver.references.single_wave`) agree to 3e-11.
+(:mod:`adhesis.solver.references.single_wave`) agree to 3e-11.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.loop import run_loop
-from solver.loop_result import LoopResult
-from solver.material import HalfSpace
-from solver.method import Method
-from solver.problem import Problem
-from solver.profile import Array, single_wave
-from solver.references.single_wave import SingleWave
-from solver.registry import MethodName, make_method
+from adhesis.solver.loop import run_loop
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.method import Method
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import Array, single_wave
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.registry import MethodName, make_method
 
 ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 STIFFNESSES = (10.0, 1.0, 0.1, 0.0)  # of what holds the wave, in p*/A; 0 is a load

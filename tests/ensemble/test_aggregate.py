@@ -10,17 +10,17 @@ import h5py
 import numpy as np
 import pytest
 
-from ensemble.aggregate.average import aggregate
-from ensemble.aggregate.curves import QUANTILES
-from ensemble.aggregate.fields import fitted_slope
-from ensemble.aggregate.jumps import BIN_EDGES
-from ensemble.aggregate.statistics import estimates
-from ensemble.campaign.file import parse_campaign
-from ensemble.errors import InputError
-from ensemble.interval import interval, interval_method, untransformed
-from ensemble.results.layout import create
-from ensemble.task.fields import field_plan
-from solver.jumps import JUMP_KINDS
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.curves import QUANTILES
+from adhesis.ensemble.aggregate.fields import fitted_slope
+from adhesis.ensemble.aggregate.jumps import BIN_EDGES
+from adhesis.ensemble.aggregate.statistics import estimates
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.interval import interval, interval_method, untransformed
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.task.fields import field_plan
+from adhesis.solver.jumps import JUMP_KINDS
 from tests.support.synthetic_results import campaign, rows, sign, write
 
 E_STAR, Q0 = 1e6 / 0.75, 1000.0
@@ -100,8 +100,8 @@ def test_curves_are_the_means_of_the_raw_rows(file, hurst, gamma):
 
 def test_blocks_of_any_size_give_the_same_numbers(file, monkeypatch):
     whole = aggregate(file)
-    monkeypatch.setattr("ensemble.results.blocks.HELD_AT_ONCE", 60)  # three columns of 19 rows
-    monkeypatch.setattr("ensemble.results.blocks.READ_AT_ONCE", 100)
+    monkeypatch.setattr("adhesis.ensemble.results.blocks.HELD_AT_ONCE", 60)  # 3 columns, 19 rows
+    monkeypatch.setattr("adhesis.ensemble.results.blocks.READ_AT_ONCE", 100)
     pieces = aggregate(file)
     for one, two in zip(whole.cells, pieces.cells, strict=True):
         for name, curve in one.curves.items():
@@ -257,8 +257,8 @@ def test_foreign_empty_and_missing_files_are_refused_in_one_sentence(tmp_path):
 
 MEMORY = """
 import resource, sys
-from ensemble.results import blocks
-from ensemble.aggregate.average import aggregate
+from adhesis.ensemble.results import blocks
+from adhesis.ensemble.aggregate.average import aggregate
 blocks.HELD_AT_ONCE //= 20
 blocks.READ_AT_ONCE //= 20
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -9,14 +9,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import ensemble.bench.compare as benchmarking
-import ensemble.bench.tamaas as peer
-from ensemble.bench.compare import Line, Reference, benchmark, exponents, growth, ratios
-from ensemble.bench.figure import draw
-from ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
-from ensemble.bench.page import page, record
-from ensemble.bench.scenes import FULL, GROWTH, ONE_WAVE, PAPER, QUICK, SMALL_ROUGH, TWO_WAVES
-from ensemble.command.main import main
+import adhesis.ensemble.bench.compare as benchmarking
+import adhesis.ensemble.bench.tamaas as peer
+from adhesis.ensemble.bench.compare import Line, Reference, benchmark, exponents, growth, ratios
+from adhesis.ensemble.bench.figure import draw
+from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
+from adhesis.ensemble.bench.page import page, record
+from adhesis.ensemble.bench.scenes import (
+    FULL,
+    GROWTH,
+    ONE_WAVE,
+    PAPER,
+    QUICK,
+    SMALL_ROUGH,
+    TWO_WAVES,
+)
+from adhesis.ensemble.command.main import main
 
 REFERENCE = Reference(1.0, "made up")
 

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ensemble.campaign.compare import compare
-from ensemble.campaign.file import load_campaign, parse_campaign
-from ensemble.campaign.tables import TABLES
-from ensemble.errors import InputError
-from ensemble.task.compute import make_problem
-from ensemble.task.fields import field_plan
+from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.tables import TABLES
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.task.compute import make_problem
+from adhesis.ensemble.task.fields import field_plan
 from tests.support.campaign_support import ROOT, campaign_text
 
 

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from ensemble.campaign.file import load_campaign
-from ensemble.command import main as command_line
-from ensemble.command.main import COMMANDS, main, parser_of
-from ensemble.command.parser import Parser
-from ensemble.errors import RankError
-from ensemble.results.layout import create
-from ensemble.run import launch
-from solver.registry import METHOD_NAMES
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.command import main as command_line
+from adhesis.ensemble.command.main import COMMANDS, main, parser_of
+from adhesis.ensemble.command.parser import Parser
+from adhesis.ensemble.errors import RankError
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.run import launch
+from adhesis.solver.registry import METHOD_NAMES
 from tests.support.campaign_support import environment, write_campaign
 
 CONTACT = ("--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5")
@@ -205,7 +205,7 @@ def test_help_of_the_methods_names_them_all(capsys):
 
 def test_help_and_wrong_options_load_neither_solver_nor_numpy_nor_mpi():
     code = (
-        "import sys\nfrom ensemble.command.main import COMMANDS, main\n"
+        "import sys\nfrom adhesis.ensemble.command.main import COMMANDS, main\n"
         "assert main([]) == 0 and main(['speed']) == 2\n"
         "for name in COMMANDS:\n"
         "    assert main([name, '--help']) == 0 and main([name, '--speed']) == 2\n"
@@ -220,11 +220,10 @@ def test_help_and_wrong_options_load_neither_solver_nor_numpy_nor_mpi():
     assert loaded & heavy == set()
 
 
-def test_both_packages_can_be_run():
-    for package in ("adhesis", "ensemble"):
-        done = process("--version", package=package)
-        assert (done.returncode, done.stderr) == (0, "")
-        assert done.stdout.startswith("adhesis 0.")
+def test_the_package_can_be_run():
+    done = process("--version")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("adhesis 0.")
 
 
 # ---------------------------------------------------------------------- interrupts
@@ -245,7 +244,7 @@ def ctrl_c():
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
 )
 def test_signals_end_a_command_in_one_line(name, number, code, word, capsys, monkeypatch):
-    module = importlib.import_module(f"ensemble.command.{name}")
+    module = importlib.import_module(f"adhesis.ensemble.command.{name}")
     monkeypatch.setattr(module, "execute", lambda args: signal.raise_signal(number))
     assert main([name, *required(name)]) == code
     assert capsys.readouterr().err == f"adhesis {name}: {word}\n"
@@ -256,7 +255,7 @@ def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
     def interrupt(seconds):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("ensemble.command.status.time.sleep", interrupt)
+    monkeypatch.setattr("adhesis.ensemble.command.status.time.sleep", interrupt)
     assert main(["status", "r.h5", "--watch"]) == 130
     assert capsys.readouterr().err == "adhesis status: interrupted\n"
 
@@ -265,7 +264,7 @@ def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatc
     def fail(args):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("ensemble.command.status.execute", fail)
+    monkeypatch.setattr("adhesis.ensemble.command.status.execute", fail)
     assert main(["status", "r.h5"]) == 70
     assert "ZeroDivisionError" in capsys.readouterr().err
 
@@ -273,7 +272,7 @@ def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatc
 # ---------------------------------------------------------------------- streams
 
 
-def process(*words, package="ensemble", before="", **options) -> subprocess.CompletedProcess[str]:
+def process(*words, package="adhesis", before="", **options) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, by a shell where something stands before it."""
     command = [sys.executable, "-m", package, *words]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
@@ -346,7 +345,7 @@ def test_an_error_of_one_rank_is_reported_when_rank_0_had_its_time(rank_one, cap
     def fail(args):
         raise RankError("no mpi4py here")
 
-    monkeypatch.setattr("ensemble.command.run.execute", fail)
+    monkeypatch.setattr("adhesis.ensemble.command.run.execute", fail)
     assert main(["run", "c.toml"]) == 2
     assert len(rank_one) == 2
     assert capsys.readouterr().err == "adhesis run: no mpi4py here\n"

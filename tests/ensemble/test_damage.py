@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 import adhesis
-import ensemble.results.read as reading
-from ensemble.aggregate.average import aggregate
-from ensemble.campaign.file import load_campaign
-from ensemble.command.main import main
-from ensemble.errors import InputError
-from ensemble.report.findings import missing
-from ensemble.results.head import write_head
-from ensemble.results.merge import merge
-from ensemble.results.read import Results
-from ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING
-from ensemble.results.status import as_text, read_status
-from ensemble.run.session import Options, run_campaign
+import adhesis.ensemble.results.read as reading
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.report.findings import missing
+from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING
+from adhesis.ensemble.results.status import as_text, read_status
+from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import differences, write_campaign
 from tests.support.fake_run import fake_engine
 from tests.support.synthetic_results import age
@@ -332,7 +332,7 @@ def test_rows_of_several_versions_are_told_apart(tmp_path, monkeypatch):
     campaign, options = load_campaign(toml), Options(patience=0.0, max_failures=2)
     run_campaign(campaign, path, options=options, engine=fake_engine("fail=0.8:*:*"))
     assert "versions or processors" not in as_text(read_status(path))
-    monkeypatch.setattr("ensemble.run.session.processor", lambda: "another")
+    monkeypatch.setattr("adhesis.ensemble.run.session.processor", lambda: "another")
     summary = run_campaign(campaign, path, options=options, engine=fake_engine(""))
     counts = read_status(path)["computed_by"]
     assert sum(counts.values()) == 6

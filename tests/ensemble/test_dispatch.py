@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from ensemble.run.attempt import GivenUp, Outcome, attempt
-from ensemble.run.dispatch import (
+from adhesis.ensemble.run.attempt import GivenUp, Outcome, attempt
+from adhesis.ensemble.run.dispatch import (
     AHEAD,
     MOST_AHEAD,
     Limits,
@@ -23,9 +23,9 @@ from ensemble.run.dispatch import (
     Worker,
     work_alone,
 )
-from ensemble.run.schedule import Schedule
-from ensemble.run.units import Units
-from solver import compiled as module
+from adhesis.ensemble.run.schedule import Schedule
+from adhesis.ensemble.run.units import Units
+from adhesis.solver import compiled as module
 from tools.interrupted import Interrupt
 
 

@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from ensemble import versions
-from ensemble.doctor import examine as doctor
-from ensemble.run import launch
-from solver import code_cache, warm
-from solver.code_cache import CodeFiles
+from adhesis.ensemble import versions
+from adhesis.ensemble.doctor import examine as doctor
+from adhesis.ensemble.run import launch
+from adhesis.solver import code_cache, warm
+from adhesis.solver.code_cache import CodeFiles
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from ensemble.command.main import main; sys.exit(main())"
+    code = "import sys; from adhesis.ensemble.command.main import main; sys.exit(main())"
     return subprocess.run(
         [sys.executable, "-c", code, "doctor", *options],
         env=launch.launch_environment(2) | env,
@@ -101,7 +101,7 @@ def test_unwritable_folder_is_one_sentence() -> None:
 
 def test_versions_are_texts_and_do_not_start_mpi() -> None:
     code = (
-        "import json, sys; from ensemble.versions import installed; v = installed(); "
+        "import json, sys; from adhesis.ensemble.versions import installed; v = installed(); "
         "print(json.dumps([v, 'mpi4py.MPI' in sys.modules]))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

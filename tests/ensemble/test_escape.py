@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from markdown_it import MarkdownIt
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.command.main import main
-from ensemble.errors import InputError
-from ensemble.escape import code_span, markdown, one_line, printable
-from ensemble.report.html import html_page
-from ensemble.results.layout import create
-from ensemble.results.read import Results
-from ensemble.results.write import Writer
-from ensemble.run.lock import RunLock, holder
-from ensemble.run.session import run_campaign
-from ensemble.trace.page import _inline
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.escape import code_span, markdown, one_line, printable
+from adhesis.ensemble.report.html import html_page
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.lock import RunLock, holder
+from adhesis.ensemble.run.session import run_campaign
+from adhesis.ensemble.trace.page import _inline
 from tests.support.campaign_support import adhesis, campaign_text, write_campaign
 from tests.support.fake_run import fake_engine
 
@@ -79,7 +79,7 @@ def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeyp
         monkeypatch.setattr("socket.gethostname", lambda: "node\x1b[2J")
         lock.acquire(1, 0.0)
         code = (
-            "import sys; from ensemble.run.lock import described, holder; "
+            "import sys; from adhesis.ensemble.run.lock import described, holder; "
             "print(described(holder(sys.argv[1])))"
         )
         told = subprocess.run(

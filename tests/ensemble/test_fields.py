@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.errors import InputError
-from ensemble.results.layout import create
-from ensemble.results.read import Results
-from ensemble.results.schema import DATASETS
-from ensemble.results.write import Writer
-from ensemble.task.compute import make_problem, run_task
-from ensemble.task.dataset import KEPT
-from ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan
-from solver.loop import run_loop
-from solver.registry import make_method
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DATASETS
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.task.compute import make_problem, run_task
+from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan
+from adhesis.solver.loop import run_loop
+from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.fake_run import fake_result
 

@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ensemble.command.loop as loop_command
-from ensemble.campaign.file import load_campaign
-from ensemble.command.main import main
-from ensemble.errors import InputError
-from ensemble.loop.heights import closure_warning, read_heights
-from ensemble.trace.read import read_trace
-from solver.profile import Array, self_affine_profile, single_wave
-from solver.references.exact_wave import ExactWave
-from solver.references.single_wave import SingleWave
+import adhesis.ensemble.command.loop as loop_command
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.heights import closure_warning, read_heights
+from adhesis.ensemble.trace.read import read_trace
+from adhesis.solver.profile import Array, self_affine_profile, single_wave
+from adhesis.solver.references.exact_wave import ExactWave
+from adhesis.solver.references.single_wave import SingleWave
 from tests.support.campaign_support import campaign_text
 
 N = 16

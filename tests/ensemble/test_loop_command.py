@@ -8,10 +8,10 @@ import json
 import numpy as np
 import pytest
 
-import ensemble.command.loop as loop_command
-from ensemble.command.main import main
-from solver.references.exact_wave import ExactWave
-from solver.references.single_wave import SingleWave
+import adhesis.ensemble.command.loop as loop_command
+from adhesis.ensemble.command.main import main
+from adhesis.solver.references.exact_wave import ExactWave
+from adhesis.solver.references.single_wave import SingleWave
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
 MODULUS = 1e6 / 0.75

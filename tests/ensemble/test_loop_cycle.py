@@ -7,7 +7,7 @@ import json
 import pytest
 from matplotlib.image import imread
 
-from ensemble.command.main import main
+from adhesis.ensemble.command.main import main
 
 SCENE = [
     "loop", "--hurst", "0.8", "--seed", "4", "--period", "1e-3", "--n0", "3", "--ratio", "6",

@@ -9,17 +9,17 @@ import h5py
 import numpy as np
 import pytest
 
-from ensemble.campaign.file import load_campaign, parse_campaign
-from ensemble.campaign.tasks import Part
-from ensemble.command.main import main
-from ensemble.errors import InputError
-from ensemble.results.head import write_head
-from ensemble.results.layout import create
-from ensemble.results.merge import merge
-from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, PENDING
-from ensemble.results.write import Writer
-from ensemble.run.session import Options, run_campaign
+from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.tasks import Part
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     campaign_text,
     differences,
@@ -175,7 +175,7 @@ def test_a_part_is_what_it_is(tmp_path, capsys):
 
 MERGED = """
 import resource, sys
-from ensemble.results.merge import merge
+from adhesis.ensemble.results.merge import merge
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 merge(sys.argv[2:], sys.argv[1])
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)

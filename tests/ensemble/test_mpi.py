@@ -14,13 +14,13 @@ import time
 
 import pytest
 
-from ensemble.campaign.file import load_campaign
-from ensemble.campaign.tasks import Part
-from ensemble.results.merge import merge
-from ensemble.results.read import Results
-from ensemble.results.schema import DONE
-from ensemble.results.write import Writer
-from ensemble.run.session import Options, run_campaign
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.campaign.tasks import Part
+from adhesis.ensemble.results.merge import merge
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DONE
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     MPIRUN,
     ROOT,

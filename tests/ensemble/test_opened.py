@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import adhesis
-from ensemble.campaign.tasks import Part
-from ensemble.errors import InputError
-from ensemble.report.figures.catalogue import (
+from adhesis.ensemble.campaign.tasks import Part
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.report.figures.catalogue import (
     HEIGHTS,
     LOOPS,
     LOSSES,
@@ -20,9 +20,9 @@ from ensemble.report.figures.catalogue import (
     PENETRATIONS,
     SHAPES,
 )
-from ensemble.report.plots import Plots
-from ensemble.report.tables.losses import losses
-from ensemble.results.layout import create
+from adhesis.ensemble.report.plots import Plots
+from adhesis.ensemble.report.tables.losses import losses
+from adhesis.ensemble.results.layout import create
 from tests.support.synthetic_results import campaign, rows, sign, write
 
 

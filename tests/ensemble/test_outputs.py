@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ensemble.command.loop as loop_command
-import ensemble.command.trace as trace_command
-from ensemble.command.main import main
-from ensemble.errors import InputError
-from ensemble.loop.record import write_json
-from ensemble.outputs import check_outputs, staged_folder, whole_file
-from solver.references.exact_wave import ExactWave
-from solver.references.single_wave import SingleWave
+import adhesis.ensemble.command.loop as loop_command
+import adhesis.ensemble.command.trace as trace_command
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.record import write_json
+from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file
+from adhesis.solver.references.exact_wave import ExactWave
+from adhesis.solver.references.single_wave import SingleWave
 from tests.support.synthetic_results import campaign, rows, write
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9
@@ -55,8 +55,8 @@ def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("run_loop", "run_loops", "run_path"):
         monkeypatch.setattr(loop_command, name, no_work)
     monkeypatch.setattr(trace_command, "run_plan", no_work)
-    monkeypatch.setattr("ensemble.bench.compare.benchmark", no_work)
-    monkeypatch.setattr("ensemble.report.write.write_report", no_work)
+    monkeypatch.setattr("adhesis.ensemble.bench.compare.benchmark", no_work)
+    monkeypatch.setattr("adhesis.ensemble.report.write.write_report", no_work)
 
 
 # ---------------------------------------------------------------------- adhesis loop
@@ -268,7 +268,7 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("ensemble.report.write._write_files", full)
+    monkeypatch.setattr("adhesis.ensemble.report.write._write_files", full)
     code, _, error = ask("report", "r.h5", "--to", "out")
     assert code == 74
     assert error.splitlines()[-1] == (

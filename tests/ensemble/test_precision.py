@@ -8,15 +8,15 @@ import shutil
 import numpy as np
 import pytest
 
-from ensemble.aggregate.statistics import estimates
-from ensemble.campaign.compare import compare
-from ensemble.campaign.file import load_campaign, parse_campaign
-from ensemble.campaign.precision import LEAST, enough, fewest, looks, narrow, relative_error
-from ensemble.errors import InputError
-from ensemble.interval import interval
-from ensemble.results.read import Results
-from ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
-from ensemble.run.session import Options, run_campaign
+from adhesis.ensemble.aggregate.statistics import estimates
+from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.precision import LEAST, enough, fewest, looks, narrow, relative_error
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.interval import interval
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
+from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import (
     MPIRUN,
     adhesis,

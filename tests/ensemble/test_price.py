@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.campaign.tasks import Part
-from ensemble.errors import InputError
-from ensemble.results.layout import create
-from ensemble.results.write import Writer
-from ensemble.run.plan import prior
-from ensemble.run.price import as_text, price
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.campaign.tasks import Part
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.plan import prior
+from adhesis.ensemble.run.price import as_text, price
 from tests.support.campaign_support import adhesis, campaign_text, write_campaign
 from tests.support.fake_run import fake_result
 
@@ -40,7 +40,7 @@ def test_pilots_tell_what_the_campaign_costs():
 def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
     """Time is up after three cells; the prior says how the fourth compares."""
     clock = iter(range(100))
-    monkeypatch.setattr("ensemble.run.price.time.monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr("adhesis.ensemble.run.price.time.monotonic", lambda: float(next(clock)))
     campaign = parse_campaign(campaign_text(realisations="10"))
     told = price(campaign, compute=compute, seconds=3.0)
     assert told.pilots == 3
@@ -52,7 +52,7 @@ def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
 def test_cells_that_take_more_than_in_proportion_are_followed(monkeypatch):
     """The prior's square: what was not reached is found, as the fit of the others has the power."""
     clock = iter(range(1000))
-    monkeypatch.setattr("ensemble.run.price.time.monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr("adhesis.ensemble.run.price.time.monotonic", lambda: float(next(clock)))
     campaign = parse_campaign(campaign_text(hurst="[0.6, 0.8]", work_of_adhesion="[0.01, 0.05]"))
 
     def compute(campaign, task):
@@ -86,7 +86,7 @@ def test_a_results_file_of_another_campaign_is_refused(tmp_path):
 def test_loops_on_one_loading_branch_are_tried_together(monkeypatch):
     """Time is up within the first three loops: they are gone through, and no others."""
     clock = iter(range(100))
-    monkeypatch.setattr("ensemble.run.price.time.monotonic", lambda: float(next(clock)))
+    monkeypatch.setattr("adhesis.ensemble.run.price.time.monotonic", lambda: float(next(clock)))
     one = {"hurst": "[0.8]", "work_of_adhesion": "[0.04]", "max_penetration": "[0.3, 0.6, 0.9]"}
     campaign = parse_campaign(campaign_text(**one))
     took = {0.3: 2.0, 0.6: 3.0, 0.9: 4.0}

@@ -19,23 +19,23 @@ import xarray
 from matplotlib.container import BarContainer, ErrorbarContainer
 from matplotlib.image import imread
 
-from ensemble.aggregate.average import aggregate
-from ensemble.aggregate.companions import differing_keys, kind_of
-from ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
-from ensemble.campaign.file import load_campaign, parse_campaign
-from ensemble.command.main import main
-from ensemble.report import findings, paper
-from ensemble.report.figures import fields as field_figures
-from ensemble.report.figures import loops, losses
-from ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
-from ensemble.report.figures.style import save, spread_out, style
-from ensemble.report.html import html_page
-from ensemble.report.page import write_page
-from ensemble.report.tables import losses as loss_tables
-from ensemble.report.tables import mechanisms as mechanism_tables
-from ensemble.report.tables.table import number
-from ensemble.report.write import write_report
-from ensemble.task.compute import make_problem
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
+from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
+from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.report import findings, paper
+from adhesis.ensemble.report.figures import fields as field_figures
+from adhesis.ensemble.report.figures import loops, losses
+from adhesis.ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
+from adhesis.ensemble.report.figures.style import save, spread_out, style
+from adhesis.ensemble.report.html import html_page
+from adhesis.ensemble.report.page import write_page
+from adhesis.ensemble.report.tables import losses as loss_tables
+from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
+from adhesis.ensemble.report.tables.table import number
+from adhesis.ensemble.report.write import write_report
+from adhesis.ensemble.task.compute import make_problem
 from tests.support.synthetic_results import campaign, rows, write
 
 ROOT = Path(__file__).parent.parent.parent
@@ -355,7 +355,7 @@ def test_drawing_leaves_the_style_of_the_caller_alone(data):
     with style():
         LOOPS[0].draw(data)
     assert dict(mpl.rcParams) == before
-    catalogue = "import sys, ensemble.report.figures.catalogue"
+    catalogue = "import sys, adhesis.ensemble.report.figures.catalogue"
     code = f"{catalogue}; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
 
@@ -406,7 +406,7 @@ def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, monkeypatch)
         if stem.name in ("fig6_contact_against_stress", "loss_by_mechanism"):
             save(figure, stem)
 
-    monkeypatch.setattr("ensemble.report.figures.style.save", only_some)
+    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", only_some)
     write_report(file, tmp_path, io.StringIO())
     names = {path.name for path in tmp_path.iterdir()}
     assert {"losses.csv", "curves.nc", "report.md", "loss_by_mechanism.pdf"} < names
@@ -425,7 +425,7 @@ def drawn(monkeypatch) -> list[str]:
             figure.draw_without_rendering()
         names.append(stem.name)
 
-    monkeypatch.setattr("ensemble.report.figures.style.save", lay_out)
+    monkeypatch.setattr("adhesis.ensemble.report.figures.style.save", lay_out)
     return names
 
 

@@ -10,13 +10,13 @@ import pytest
 import xarray
 
 import adhesis
-from ensemble.aggregate.average import aggregate
-from ensemble.campaign.file import parse_campaign
-from ensemble.report import paper
-from ensemble.report.figures.catalogue import along_axes
-from ensemble.report.figures.style import style
-from ensemble.report.tables.works import works
-from ensemble.report.write import write_report
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.figures.catalogue import along_axes
+from adhesis.ensemble.report.figures.style import style
+from adhesis.ensemble.report.tables.works import works
+from adhesis.ensemble.report.write import write_report
 from tests.support.synthetic_results import campaign, rows, write
 
 TOPS = (0.5, 0.7, 0.9)
@@ -47,7 +47,7 @@ def report(file):
         for suffix in (".png", ".pdf"):
             stem.with_suffix(suffix).write_bytes(b"")
 
-    patch.setattr("ensemble.report.figures.style.save", note)
+    patch.setattr("adhesis.ensemble.report.figures.style.save", note)
     directory = file.parent / "report"
     write_report(file, directory, io.StringIO())
     patch.undo()

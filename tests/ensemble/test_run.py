@@ -16,15 +16,15 @@ import numpy as np
 import pytest
 import xarray
 
-from ensemble.campaign.file import load_campaign
-from ensemble.errors import InputError
-from ensemble.results.layout import create
-from ensemble.results.write import Writer
-from ensemble.run import session
-from ensemble.run.interrupt import StopSignals, deadline, parse_duration
-from ensemble.run.plan import Plan
-from ensemble.run.session import Engine, Options, run_campaign
-from ensemble.task.compute import check_task
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run import session
+from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
+from adhesis.ensemble.run.plan import Plan
+from adhesis.ensemble.run.session import Engine, Options, run_campaign
+from adhesis.ensemble.task.compute import check_task
 from tests.support.campaign_support import (
     TESTS,
     adhesis,
@@ -62,8 +62,8 @@ def test_a_run_from_nothing_to_done(tmp_path):
 def test_where_there_is_no_launcher_one_process_computes(tmp_path):
     path = write_campaign(tmp_path)
     code = (
-        "import sys; from ensemble.run import launch; launch.launcher = lambda: None\n"
-        "from ensemble.command.main import main; sys.exit(main(sys.argv[1:]))"
+        "import sys; from adhesis.ensemble.run import launch; launch.launcher = lambda: None\n"
+        "from adhesis.ensemble.command.main import main; sys.exit(main(sys.argv[1:]))"
     )
     words = ("run", path, "--out", tmp_path / "r.h5", "--ranks", "3")
     process = subprocess.run(
@@ -410,7 +410,8 @@ def test_status_of_a_large_file_loads_no_mpi(tmp_path):
         for row in range(0, 100_000, 1000):
             writer.write_result(row, result)
     code = (
-        "import sys; from ensemble.command.main import main; main(['status', sys.argv[1]]); "
+        "import sys; from adhesis.ensemble.command.main import main; "
+        "main(['status', sys.argv[1]]); "
         "print([m for m in sys.modules if m.startswith('mpi4py')])"
     )
     process = subprocess.run(

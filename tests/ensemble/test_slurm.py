@@ -21,9 +21,9 @@ from pathlib import Path
 
 import pytest
 
-from ensemble.results.read import Results
-from ensemble.results.schema import DONE
-from ensemble.run import launch
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DONE
+from adhesis.ensemble.run import launch
 from tests.support.campaign_support import CAMPAIGN
 from tests.support.launchers import PATH
 

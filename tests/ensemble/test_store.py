@@ -16,17 +16,17 @@ import xarray
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.errors import InputError
-from ensemble.results import schema
-from ensemble.results.head import write_head
-from ensemble.results.layout import create
-from ensemble.results.read import Results
-from ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
-from ensemble.results.write import DatasetRows, Writer
-from ensemble.run.lock import RunLock, holder
-from ensemble.task.dataset import KEPT
-from ensemble.task.row import RESULT_DATASETS
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.results import schema
+from adhesis.ensemble.results.head import write_head
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
+from adhesis.ensemble.results.write import DatasetRows, Writer
+from adhesis.ensemble.run.lock import RunLock, holder
+from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.row import RESULT_DATASETS
 from tests.support.campaign_support import ROOT, campaign_text
 from tests.support.fake_run import fake_result
 from tests.support.synthetic_results import age
@@ -182,8 +182,8 @@ def test_a_reader_sees_only_whole_rows_while_a_run_writes(path, campaign):
 KILLED_WRITER = """
 import sys, os
 sys.path[:0] = sys.argv[2:]
-from ensemble.results.read import Results
-from ensemble.results.write import Writer
+from adhesis.ensemble.results.read import Results
+from adhesis.ensemble.results.write import Writer
 from tests.support.fake_run import fake_result
 from tests.support.synthetic_results import age
 with Results(sys.argv[1]) as results:
@@ -350,9 +350,9 @@ def test_a_full_disk_leaves_nothing(campaign):
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
         "from tests.support.campaign_support import campaign_text\n"
-        "from ensemble.campaign.file import parse_campaign\n"
-        "from ensemble.errors import InputError\n"
-        "from ensemble.results.layout import create\n"
+        "from adhesis.ensemble.campaign.file import parse_campaign\n"
+        "from adhesis.ensemble.errors import InputError\n"
+        "from adhesis.ensemble.results.layout import create\n"
         "try:\n    create(sys.argv[1], parse_campaign(campaign_text()))\n"
         # HDF5 may crash the process at its end, over what it could not write
         "except InputError as error:\n    print(error, flush=True)\n"
@@ -387,9 +387,9 @@ def test_a_file_of_many_tasks_is_as_large_as_its_data(tmp_path):
 HOLD_LOCK = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
-from ensemble.run.lock import RunLock, holder
-from ensemble.task.dataset import KEPT
-from ensemble.task.row import RESULT_DATASETS
+from adhesis.ensemble.run.lock import RunLock, holder
+from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.row import RESULT_DATASETS
 RunLock(sys.argv[1]).acquire(4, 0.0)
 print("held", flush=True)
 time.sleep(60)
@@ -464,7 +464,7 @@ def test_a_lock_file_that_is_replaced_while_a_run_waits_is_not_taken_for_the_loc
             holders.append(holding(path))
         return descriptor
 
-    monkeypatch.setattr("ensemble.run.lock.os.open", opened_too_early)
+    monkeypatch.setattr("adhesis.ensemble.run.lock.os.open", opened_too_early)
     try:
         with pytest.raises(InputError, match="another run"):
             RunLock(path).acquire(1, 0.2)

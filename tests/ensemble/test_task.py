@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.campaign.tasks import Part
-from ensemble.run.attempt import TimeLimit
-from ensemble.task.compute import Runner, make_problem, run_task
-from ensemble.task.dataset import KEPT, row_shape, sizes_of
-from ensemble.task.doubt import doubtful
-from ensemble.task.row import RESULT_DATASETS, row_of, row_scales
-from solver.jumps import JUMP_KINDS, Jump
-from solver.loop import run_loop
-from solver.loop_result import LoopResult
-from solver.method import MethodReport, PathError
-from solver.record import Record
-from solver.registry import make_method
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.campaign.tasks import Part
+from adhesis.ensemble.run.attempt import TimeLimit
+from adhesis.ensemble.task.compute import Runner, make_problem, run_task
+from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
+from adhesis.ensemble.task.doubt import doubtful
+from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
+from adhesis.solver.jumps import JUMP_KINDS, Jump
+from adhesis.solver.loop import run_loop
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.method import MethodReport, PathError
+from adhesis.solver.record import Record
+from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 
 
@@ -227,7 +227,8 @@ def test_loads_share_a_loading_branch_and_what_runs_away_is_told():
 def test_the_time_of_a_shared_loading_branch_counts_once(monkeypatch):
     """The sum over the loops is what the process took."""
     clock = iter(range(1000))
-    monkeypatch.setattr("ensemble.task.compute.time.process_time", lambda: float(next(clock)))
+    process_time = "adhesis.ensemble.task.compute.time.process_time"
+    monkeypatch.setattr(process_time, lambda: float(next(clock)))
     campaign, runner = parse_campaign(TURNS), Runner()
     rows = [runner(campaign, task) for task in campaign.sharing(campaign.tasks()[0])]
     assert [row["cpu_time"] for row in rows] == [1.0, 1.0, 1.0]

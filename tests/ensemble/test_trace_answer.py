@@ -19,15 +19,22 @@ from markdown_it import MarkdownIt
 from matplotlib.image import imread
 
 from adhesis import Problem, make_method, run_loop, self_affine_profile
-from ensemble.command.main import main
-from ensemble.trace import answer as answers
-from ensemble.trace import page
-from ensemble.trace.answer import COVERAGE, Answer, NoAnswer, loss_of_trace, make_cycle, run_plan
-from ensemble.trace.options import what_was_read
-from ensemble.trace.plan import Plan, make_plan
-from ensemble.trace.pool import Pool
-from ensemble.trace.prepare import Prepared, prepare_trace
-from ensemble.trace.read import Trace
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.trace import answer as answers
+from adhesis.ensemble.trace import page
+from adhesis.ensemble.trace.answer import (
+    COVERAGE,
+    Answer,
+    NoAnswer,
+    loss_of_trace,
+    make_cycle,
+    run_plan,
+)
+from adhesis.ensemble.trace.options import what_was_read
+from adhesis.ensemble.trace.plan import Plan, make_plan
+from adhesis.ensemble.trace.pool import Pool
+from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
+from adhesis.ensemble.trace.read import Trace
 from tests.support.scenes import HALF_SPACE
 from tools.interrupted import Interrupt, interrupted
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ensemble.command.main import main
-from ensemble.errors import InputError
-from ensemble.trace.read import Trace, read_trace
-from ensemble.trace.units import length_text, parse_length
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.trace.read import Trace, read_trace
+from adhesis.ensemble.trace.units import length_text, parse_length
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)

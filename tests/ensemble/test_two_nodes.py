@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from ensemble.results.read import Results
+from adhesis.ensemble.results.read import Results
 from tests.support.campaign_support import (
     MPIRUN,
     adhesis,

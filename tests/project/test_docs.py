@@ -17,10 +17,10 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.command import run
-from ensemble.command.main import COMMANDS, INTERRUPTED, TERMINATED, main, parser_of
-from ensemble.run import launch
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.command import run
+from adhesis.ensemble.command.main import COMMANDS, INTERRUPTED, TERMINATED, main, parser_of
+from adhesis.ensemble.run import launch
 
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [

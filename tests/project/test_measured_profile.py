@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from ensemble.command.main import main
+from adhesis.ensemble.command.main import main
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPT = ROOT / "examples" / "measured_profile.py"

@@ -123,11 +123,26 @@ def raised(thing: Any) -> set[str]:
 
 def test_the_public_names_are_these() -> None:
     assert sorted(adhesis.__all__) == PUBLIC
-    modules = {"annotations"}
-    offered = {n for n, v in vars(adhesis).items() if not n.startswith("_") and n not in modules}
+    beside = {"annotations", "import_module", "TYPE_CHECKING"}
+    offered = {n for n in dir(adhesis) if not n.startswith("_") and n not in beside}
     public = {n for n in offered if not inspect.ismodule(getattr(adhesis, n))}
     assert public == {*PUBLIC, *BESIDE}
     assert (ROOT / "adhesis" / "py.typed").exists()
+    with pytest.raises(AttributeError, match="no attribute 'run_lop'"):
+        adhesis.run_lop  # noqa: B018
+
+
+def test_type_checkers_see_the_modules_that_the_running_program_loads() -> None:
+    """The names of ``adhesis`` stand there twice: as imports and as a table."""
+    tree = ast.parse((ROOT / "adhesis" / "__init__.py").read_text())
+    (branch,) = (node for node in tree.body if isinstance(node, ast.If))
+    imports = {
+        alias.name: str(node.module).removeprefix("adhesis.")
+        for node in branch.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert imports == adhesis._MODULES
 
 
 @pytest.mark.parametrize("name", THINGS)

@@ -18,40 +18,38 @@ import pytest
 from tests.support.synthetic_results import campaign, rows, write
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PACKAGES = ("adhesis", "solver", "ensemble")
-FOLDERS = (*PACKAGES, "tests")
+PACKAGES = {"adhesis": "adhesis", "adhesis.solver": "solver", "adhesis.ensemble": "ensemble"}
+FOLDERS = (*PACKAGES.values(), "tests")
 
 # Who may import what weighs: to the door of MPI, of the file format, of compiled code, of figures.
-MPI = {"ensemble.run.ranks", "ensemble.doctor.probe"}
+MPI = {"adhesis.ensemble.run.ranks", "adhesis.ensemble.doctor.probe"}
 HDF5 = {
-    "ensemble.results.merge",
-    "ensemble.results.head",
-    "ensemble.results.layout",
-    "ensemble.results.read",
-    "ensemble.results.write",
-    "ensemble.run.session",
-    "ensemble.doctor.probe",
-    "ensemble.versions",
+    "adhesis.ensemble.results.merge",
+    "adhesis.ensemble.results.head",
+    "adhesis.ensemble.results.layout",
+    "adhesis.ensemble.results.read",
+    "adhesis.ensemble.results.write",
+    "adhesis.ensemble.run.session",
+    "adhesis.ensemble.doctor.probe",
+    "adhesis.ensemble.versions",
 }
-COMPILED = {"solver.compiled"}
+COMPILED = {"adhesis.solver.compiled"}
 FIGURES = {
-    "ensemble.loop.figure",
-    "ensemble.bench.figure",
-    "ensemble.report.figures.along",
-    "ensemble.report.figures.catalogue",
-    "ensemble.report.figures.fields",
-    "ensemble.report.figures.loops",
-    "ensemble.report.figures.losses",
-    "ensemble.report.figures.style",
-    "ensemble.report.plots",
-    "ensemble.trace.figures",
+    "adhesis.ensemble.loop.figure",
+    "adhesis.ensemble.bench.figure",
+    "adhesis.ensemble.report.figures.along",
+    "adhesis.ensemble.report.figures.catalogue",
+    "adhesis.ensemble.report.figures.fields",
+    "adhesis.ensemble.report.figures.loops",
+    "adhesis.ensemble.report.figures.losses",
+    "adhesis.ensemble.report.figures.style",
+    "adhesis.ensemble.report.plots",
+    "adhesis.ensemble.trace.figures",
 }
 DOORS = {"mpi4py": MPI, "h5py": HDF5, "numba": COMPILED, "matplotlib": FIGURES}
 
 # What the mechanics know nothing of.
 NOT_IN_SOLVER = {
-    "adhesis",
-    "ensemble",
     "h5netcdf",
     "h5py",
     "matplotlib",
@@ -64,34 +62,34 @@ NOT_IN_SOLVER = {
 }
 # The mechanics start no threads for their work: one module keeps the handlers of signals out of the
 # compiler, the other has locks against the threads of callers.
-THREADING = {"solver.uninterrupted", "solver.one_thread"}
+THREADING = {"adhesis.solver.uninterrupted", "adhesis.solver.one_thread"}
 # All that campaigns know of the mechanics.
 SOLVER_FOR_ENSEMBLE = {
-    "solver.checks",
-    "solver.control",
-    "solver.fields",
-    "solver.jumps",
-    "solver.loop",
-    "solver.loop_result",
-    "solver.material",
-    "solver.method",
-    "solver.path",
-    "solver.problem",
-    "solver.profile",
-    "solver.references.single_wave",
-    "solver.registry",
-    "solver.trace",
-    "solver.turns",
-    "solver.validate.claims",
-    "solver.values",
-    "solver.warm",
+    "adhesis.solver.checks",
+    "adhesis.solver.control",
+    "adhesis.solver.fields",
+    "adhesis.solver.jumps",
+    "adhesis.solver.loop",
+    "adhesis.solver.loop_result",
+    "adhesis.solver.material",
+    "adhesis.solver.method",
+    "adhesis.solver.path",
+    "adhesis.solver.problem",
+    "adhesis.solver.profile",
+    "adhesis.solver.references.single_wave",
+    "adhesis.solver.registry",
+    "adhesis.solver.trace",
+    "adhesis.solver.turns",
+    "adhesis.solver.validate.claims",
+    "adhesis.solver.values",
+    "adhesis.solver.warm",
 }
 
 
 def modules() -> Iterator[tuple[str, Path]]:
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            parts = path.relative_to(ROOT).with_suffix("").parts
+    for package, folder in PACKAGES.items():
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            parts = (package, *path.relative_to(ROOT / folder).with_suffix("").parts)
             yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
 
 
@@ -119,7 +117,7 @@ def room(module: str) -> str:
     folder = PATHS[module].parent
     if any((other / "__init__.py").exists() for other in folder.iterdir()):
         return module
-    return ".".join(folder.relative_to(ROOT).parts)
+    return module if PATHS[module].name == "__init__.py" else module.rpartition(".")[0]
 
 
 def rooms() -> dict[str, set[str]]:
@@ -143,10 +141,10 @@ def circle(arrows: Mapping[str, set[str]]) -> list[str]:
 def test_the_statements_are_seen_wherever_they_stand(tmp_path: Path) -> None:
     path = tmp_path / "a.py"
     path.write_text(
-        "import numpy.linalg\nfrom typing import TYPE_CHECKING\nfrom solver import loop\n"
+        "import numpy.linalg\nfrom typing import TYPE_CHECKING\nfrom adhesis.solver import loop\n"
         "if TYPE_CHECKING:\n    from h5py import File\ndef f():\n    import mpi4py.MPI as M\n"
     )
-    expected = {"numpy.linalg", "typing", "solver.loop", "h5py", "mpi4py.MPI"}
+    expected = {"numpy.linalg", "typing", "adhesis.solver.loop", "h5py", "mpi4py.MPI"}
     assert imported(path) == expected
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
     assert len(PATHS) > 80
@@ -162,7 +160,8 @@ def test_no_circle_of_rooms() -> None:
 
 def test_mechanics_know_nothing_of_campaigns_ranks_and_files() -> None:
     for module, names in IMPORTS.items():
-        if module.split(".")[0] == "solver":
+        if module.startswith("adhesis.solver"):
+            assert all(n.startswith("adhesis.solver") for n in names if n.startswith("adhesis"))
             found = {name.split(".")[0] for name in names} & NOT_IN_SOLVER
             assert found == ({"threading"} if module in THREADING else set()), module
 
@@ -171,9 +170,9 @@ def test_campaigns_know_the_public_modules_of_mechanics_alone() -> None:
     used = {
         name
         for module, names in IMPORTS.items()
-        if module.split(".")[0] == "ensemble"
+        if module.startswith("adhesis.ensemble")
         for name in names
-        if name.split(".")[0] in ("solver", "adhesis")
+        if name.startswith("adhesis.solver")
     }
     assert used == SOLVER_FOR_ENSEMBLE
 
@@ -229,7 +228,7 @@ def test_the_public_door_is_light() -> None:
     assert loaded("import adhesis") & {"mpi4py", "h5py", "matplotlib", "xarray", "rich"} == set()
 
 
-COMMAND = "from ensemble.command.main import main\nassert main(sys.argv[1:]) == 0"
+COMMAND = "from adhesis.ensemble.command.main import main\nassert main(sys.argv[1:]) == 0"
 
 
 @pytest.fixture(scope="module")
@@ -245,7 +244,7 @@ def test_status_loads_no_mpi_and_no_figures(results: Path) -> None:
 
 def test_report_loads_no_mpi(results: Path, tmp_path: Path) -> None:
     # Every figure is drawn; putting it on disk takes seconds and loads nothing of ours.
-    quick = "import ensemble.report.figures.style as s; s.save = lambda *_, **__: None\n"
+    quick = "import adhesis.ensemble.report.figures.style as s; s.save = lambda *_, **__: None\n"
     packages = loaded(quick + COMMAND, "report", str(results), "--to", str(tmp_path / "r"))
     assert "matplotlib" in packages
     assert "mpi4py" not in packages
@@ -254,9 +253,20 @@ def test_report_loads_no_mpi(results: Path, tmp_path: Path) -> None:
 def test_the_design_page_names_every_room_and_every_file_that_it_names_is_there() -> None:
     page = (ROOT / "docs" / "design.md").read_text()
     picture = (ROOT / "docs" / "figures" / "rooms.py").read_text()
-    for folder in {path.parent for path in PATHS.values()} - {ROOT / p for p in PACKAGES}:
+    for folder in {path.parent for path in PATHS.values()} - {ROOT / p for p in PACKAGES.values()}:
         assert f"{folder.name}/" in page, folder
         if folder.parent in (ROOT / "solver", ROOT / "ensemble"):
             assert f'"{folder.name}": (' in picture, folder
     known = {path.name for path in PATHS.values()}
     assert set(re.findall(r"`(\w+\.py)`", page)) - known == set()
+
+
+def test_nothing_imports_the_folders_by_their_bare_names() -> None:
+    """A user's own ``solver.py`` or ``ensemble.py`` is another module."""
+    places = [
+        path
+        for top in ("benchmarks", "docs", "examples", "jobs", "tests", "tools")
+        for path in (ROOT / top).rglob("*.py")
+    ]
+    for path in (*PATHS.values(), *places):
+        assert {n.split(".")[0] for n in imported(path)} & {"solver", "ensemble"} == set(), path

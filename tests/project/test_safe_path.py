@@ -13,10 +13,10 @@ import sys
 import numpy as np
 import pytest
 
-from ensemble.doctor import examine
-from ensemble.run import launch
-from ensemble.trace.pool import Pool
-from ensemble.trace.worker import Job
+from adhesis.ensemble.doctor import examine
+from adhesis.ensemble.run import launch
+from adhesis.ensemble.trace.pool import Pool
+from adhesis.ensemble.trace.worker import Job
 from tests.support.campaign_support import ROOT, environment, has_ended, wait_until
 from tests.support.launchers import MPIRUN
 
@@ -79,9 +79,9 @@ def test_ranks_execute_nothing_of_the_working_directory(study, capfd):
 
 PARENT = """
 import json, subprocess, sys, time
-from ensemble.run.launch import python, python_environment
+from adhesis.ensemble.run.launch import python, python_environment
 worker = subprocess.Popen(
-    python("-m", "ensemble.trace.worker"), stdin=int(sys.argv[1]), env=python_environment()
+    python("-m", "adhesis.ensemble.trace.worker"), stdin=int(sys.argv[1]), env=python_environment()
 )
 print(json.dumps(worker.pid), flush=True)
 time.sleep(600)

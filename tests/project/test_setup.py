@@ -68,7 +68,7 @@ def test_dependencies_are_what_is_imported() -> None:
                     imported |= {alias.name.split(".")[0] for alias in node.names}
                 elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                     imported.add(node.module.split(".")[0])
-    imported -= set(sys.stdlib_module_names) | {"solver", "ensemble"}
+    imported -= set(sys.stdlib_module_names) | {"adhesis"}
     extras = project()["optional-dependencies"]
     assert isinstance(extras, dict)
     needed = list(project()["dependencies"]) + extras["mpi"] + extras["instruments"]  # type: ignore[call-overload]

@@ -17,7 +17,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("[0-9]_*.py"))
 
 def test_every_public_name_is_in_the_reference_and_nothing_else() -> None:
     text = (ROOT / "docs" / "reference.rst").read_text()
-    named = re.findall(r"auto\w+:: adhesis\.(\w+)", text)
+    named = re.findall(r"auto\w+:: adhesis\.(\w+)$", text, re.MULTILINE)
     assert sorted(named) == sorted([*adhesis.__all__, "open"])
 
 

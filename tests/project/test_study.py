@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ensemble.campaign.file import load_campaign
-from ensemble.report.paper import TABLE_1
+from adhesis.ensemble.campaign.file import load_campaign
+from adhesis.ensemble.report.paper import TABLE_1
 from tools.study import jumps, monotone
 from tools.study.data import Rows, Study
 from tools.study.page import ALL, filled

@@ -44,14 +44,14 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from ensemble.errors import naming_options
-from ensemble.loop.record import loop_summary, path_summary
-from ensemble.trace.prepare import Prepared
-from ensemble.trace.read import Trace
-from solver.checks import Bounds, counted, plain, real, shown, whole
-from solver.loop import check_cycle
-from solver.method import MethodReport
-from solver.references.exact_wave import ExactWave
+from adhesis.ensemble.errors import naming_options
+from adhesis.ensemble.loop.record import loop_summary, path_summary
+from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.ensemble.trace.read import Trace
+from adhesis.solver.checks import Bounds, counted, plain, real, shown, whole
+from adhesis.solver.loop import check_cycle
+from adhesis.solver.method import MethodReport
+from adhesis.solver.references.exact_wave import ExactWave
 
 PERIOD, AMPLITUDE = 1e-3, 1e-6
 WAVE = single_wave(AMPLITUDE, PERIOD)

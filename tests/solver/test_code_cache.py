@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from solver import code_cache
-from solver import compiled as module
-from solver.code_cache import CodeFiles
+from adhesis.solver import code_cache
+from adhesis.solver import compiled as module
+from adhesis.solver.code_cache import CodeFiles
 
 # Two accounts beside the one of the tests; they need no name.
 MALLORY, ADMIN = 64_001, 64_002

@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-import solver
-from solver import code_cache
-from solver import compiled as module
-from solver.code_cache import CodeFiles, folder_name, kernel_modules
+from adhesis.solver import code_cache
+from adhesis.solver import compiled as module
+from adhesis.solver.code_cache import CodeFiles, folder_name, kernel_modules
 
-SOLVER = Path(solver.__file__).parent
+SOLVER = Path(module.__file__).resolve().parent
 
 
 def double(x):
@@ -101,7 +100,7 @@ def test_settings_and_processor_have_a_folder_each(copy, monkeypatch):
 
 
 def _modules() -> list[types.ModuleType]:
-    found = pkgutil.walk_packages([str(SOLVER)], "solver.")
+    found = pkgutil.walk_packages([str(SOLVER)], "adhesis.solver.")
     return [importlib.import_module(entry.name) for entry in found]
 
 
@@ -117,14 +116,15 @@ def test_compiled_code_reads_nothing_but_kernel_modules():
     assert len(functions) > 40
     for function in functions:
         home = importlib.import_module(function.__module__)
-        assert home.__file__ in kernels
+        assert str(Path(home.__file__).resolve()) in kernels
         defined = _assigned(home)
         for name in function.__code__.co_names:
             value = function.__globals__.get(name)
             if value is None or isinstance(value, (types.ModuleType, type)):
                 continue
             if isinstance(value, Dispatcher):
-                assert importlib.import_module(value.py_func.__module__).__file__ in kernels
+                origin = importlib.import_module(value.py_func.__module__)
+                assert str(Path(str(origin.__file__)).resolve()) in kernels
             elif name not in defined:
                 origin = importlib.import_module(_imported(home)[name])
                 assert origin.__file__ in kernels, (function.__name__, name)
@@ -227,7 +227,7 @@ def test_the_users_folder(monkeypatch, variables, wanted):
 
 
 def test_kept_code_gives_the_same_bits(places, monkeypatch):
-    from solver.grid.kernels import dot
+    from adhesis.solver.grid.kernels import dot
 
     a, b = np.random.default_rng(1).standard_normal((2, 1001))
     fresh = module.compiled_finite_sums(dot.py_func)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.control import Control
-from solver.material import HalfSpace
-from solver.references.single_wave import SingleWave
+from adhesis.solver.control import Control
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.references.single_wave import SingleWave
 
 WAVE = SingleWave.with_alpha(0.3, 1e-6, 1e-3, 1e6)
 UNIT = WAVE.full_contact_stress / WAVE.amplitude

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile, single_wave
-from solver.control import Control
-from solver.loop_result import LoopResult
-from solver.method import PathError
-from solver.profile import Profile
-from solver.references.single_wave import SingleWave
+from adhesis.solver.control import Control
+from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.method import PathError
+from adhesis.solver.profile import Profile
+from adhesis.solver.references.single_wave import SingleWave
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3
 HALF_SPACE = HalfSpace(1e6, 0.0)

@@ -22,13 +22,13 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from solver import one_thread
-from solver.grid.method import GridMethod
-from solver.method import Method, PathError
-from solver.one_thread import on_one_thread
-from solver.references.exact_wave import ExactWave
-from solver.sharp.edges import EdgeMechanics, NoState
-from solver.sharp.method import SharpMethod
+from adhesis.solver import one_thread
+from adhesis.solver.grid.method import GridMethod
+from adhesis.solver.method import Method, PathError
+from adhesis.solver.one_thread import on_one_thread
+from adhesis.solver.references.exact_wave import ExactWave
+from adhesis.solver.sharp.edges import EdgeMechanics, NoState
+from adhesis.solver.sharp.method import SharpMethod
 
 WAVE = single_wave(1e-6, 1e-3)
 ROUGH = self_affine_profile(0.8, period=1e-3, n0=2, ratio=3, seed=4, h_rms=1e-6)

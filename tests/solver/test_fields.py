@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from solver.fields import gap_shares, spectral_density
-from solver.loop import run_loop
-from solver.material import HalfSpace
-from solver.method import ContactState, Method, Opening
-from solver.problem import Problem
-from solver.profile import self_affine_profile, single_wave
-from solver.references.single_wave import SingleWave
-from solver.registry import make_method
+from adhesis.solver.fields import gap_shares, spectral_density
+from adhesis.solver.loop import run_loop
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.method import ContactState, Method, Opening
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import self_affine_profile, single_wave
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.registry import make_method
 
 PERIOD = 2e-3
 SOFT = HalfSpace(young=1e6, poisson=0.5)

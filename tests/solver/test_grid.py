@@ -15,9 +15,9 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from solver.grid.method import GridMethod
-from solver.method import ContactState
-from solver.references.single_wave import SingleWave
+from adhesis.solver.grid.method import GridMethod
+from adhesis.solver.method import ContactState
+from adhesis.solver.references.single_wave import SingleWave
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE = 1e-3, 1e-8  # flat enough for the flat measure: A q0 = 6e-5

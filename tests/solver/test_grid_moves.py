@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from adhesis import Problem, single_wave
-from solver.grid.contact import Contact
-from solver.grid.edges import Edges, patch_ranges
-from solver.grid.lattice import Lattice
-from solver.grid.moves import Motion, apply_moves, edge_moves, least_release
+from adhesis.solver.grid.contact import Contact
+from adhesis.solver.grid.edges import Edges, patch_ranges
+from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.moves import Motion, apply_moves, edge_moves, least_release
 from tests.support.scenes import HALF_SPACE
 
 N = 256

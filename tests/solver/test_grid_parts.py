@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from adhesis import Problem, self_affine_profile, single_wave
-from solver.control import Control
-from solver.grid import relax
-from solver.grid.compliance import EdgeCompliance
-from solver.grid.contact import Contact, ContactSolver
-from solver.grid.edges import patch_ranges, survey
-from solver.grid.elasticity import ElasticGrid
-from solver.grid.kernels import dot, inverse_form
-from solver.grid.lattice import Lattice
-from solver.grid.method import GridMethod
-from solver.grid.moves import Move
-from solver.grid.pairs import pairs
-from solver.grid.path import Steps
+from adhesis.solver.control import Control
+from adhesis.solver.grid import relax
+from adhesis.solver.grid.compliance import EdgeCompliance
+from adhesis.solver.grid.contact import Contact, ContactSolver
+from adhesis.solver.grid.edges import patch_ranges, survey
+from adhesis.solver.grid.elasticity import ElasticGrid
+from adhesis.solver.grid.kernels import dot, inverse_form
+from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.method import GridMethod
+from adhesis.solver.grid.moves import Move
+from adhesis.solver.grid.pairs import pairs
+from adhesis.solver.grid.path import Steps
 from tests.support.scenes import HALF_SPACE
 
 PERIOD = 2e-3 * np.pi

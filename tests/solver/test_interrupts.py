@@ -10,7 +10,6 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,18 +18,18 @@ from numba import njit, types
 from numba.core import boxing, pythonapi, serialize
 from numba.core.dispatcher import Dispatcher
 
-import solver
-from solver import compiled
-from solver.loop import run_loop
-from solver.material import HalfSpace
-from solver.method import Method
-from solver.problem import Problem
-from solver.profile import self_affine_profile
-from solver.registry import make_method
-from solver.sharp.edges import Stage
-from solver.sharp.solution import Hold
-from solver.uninterrupted import uninterrupted
-from solver.warm import COMPILED_METHODS, _small_loops, small_problem
+import adhesis.solver
+from adhesis.solver import compiled
+from adhesis.solver.loop import run_loop
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.method import Method
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.registry import make_method
+from adhesis.solver.sharp.edges import Stage
+from adhesis.solver.sharp.solution import Hold
+from adhesis.solver.uninterrupted import uninterrupted
+from adhesis.solver.warm import COMPILED_METHODS, _small_loops, small_problem
 from tools.interrupted import Interrupt, interrupted
 
 KERNELS = 20  # at least so many are called from Python
@@ -129,7 +128,7 @@ def boxed_in_c(typ: Any) -> bool:
     box = pythonapi._boxers.lookup(type(typ))
     if box in (boxing.box_tuple, compiled._box_named_tuple):
         of_ours = not isinstance(typ, types.BaseNamedTuple) or (
-            typ.instance_class.__module__.startswith("solver.")
+            typ.instance_class.__module__.startswith("adhesis.solver.")
         )
         return of_ours and all(boxed_in_c(item) for item in typ)
     if isinstance(typ, types.Optional):
@@ -153,7 +152,7 @@ def test_no_result_of_a_kernel_runs_python_code_while_it_is_boxed(monkeypatch):
     assert Counted.read == 0
     results = {
         f"{function.__module__}.{function.__name__}": result.signature.return_type
-        for entry in pkgutil.walk_packages([str(Path(str(solver.__file__)).parent)], "solver.")
+        for entry in pkgutil.walk_packages(adhesis.solver.__path__, "adhesis.solver.")
         for function in vars(importlib.import_module(entry.name)).values()
         if isinstance(function, Dispatcher)
         for result in function.overloads.values()

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.sharp.linear import cholesky, factor_rows, is_definite, solve_column, solve_factored
+from adhesis.solver.sharp.linear import (
+    cholesky,
+    factor_rows,
+    is_definite,
+    solve_column,
+    solve_factored,
+)
 
 
 @pytest.mark.parametrize("n", [1, 7, 8, 9, 41])

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from adhesis import ContactState, Control, HalfSpace, Path, Problem, run_loop, single_wave
-from solver.jumps import Jump, classify
-from solver.loop import check_cycle
-from solver.loop_result import estimated_error
-from solver.method import Fields, Method, MethodReport, Opening, PathError
-from solver.profile import Profile
-from solver.record import Record
-from solver.references.exact_wave import ExactWave
-from solver.references.single_wave import SingleWave
+from adhesis.solver.jumps import Jump, classify
+from adhesis.solver.loop import check_cycle
+from adhesis.solver.loop_result import estimated_error
+from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
+from adhesis.solver.profile import Profile
+from adhesis.solver.record import Record
+from adhesis.solver.references.exact_wave import ExactWave
+from adhesis.solver.references.single_wave import SingleWave
 from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE = 1e-3, 1e-9  # A q0 = 6e-6: flat and arc measure agree to 3e-11

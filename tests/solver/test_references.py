@@ -7,16 +7,16 @@ import pytest
 from scipy.integrate import quad
 
 from adhesis import self_affine_profile, single_wave
-from solver.references.full_contact import full_contact_energy, full_contact_stress
-from solver.references.parabola import parabola_load, parabola_pull_off, parabola_stress
-from solver.references.periodic_punch import (
+from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
+from adhesis.solver.references.parabola import parabola_load, parabola_pull_off, parabola_stress
+from adhesis.solver.references.periodic_punch import (
     pull_off_stress,
     punch_separation,
     punch_stress,
     punch_stress_intensity,
 )
-from solver.references.single_wave import SingleWave
-from solver.references.wavy_parabola import WavyParabola
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.references.wavy_parabola import WavyParabola
 
 MODULUS = 1.3
 

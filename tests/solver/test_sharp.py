@@ -14,9 +14,9 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from solver.references.single_wave import SingleWave
-from solver.sharp.box import running_step
-from solver.sharp.method import SharpMethod
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp.box import running_step
+from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE
 
 PERIOD = 2e-3 * np.pi

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from adhesis import Problem, self_affine_profile, single_wave
-from solver.grid.method import GridMethod
-from solver.sharp.along import forces_on
-from solver.sharp.coordinate import map_gaps, theta_at
-from solver.sharp.derivatives import derivatives
-from solver.sharp.field import GapField, solve, solve_again
-from solver.sharp.moments import gap_moments
-from solver.sharp.opening import fine_opening, sum_modes, work_of_gaps
-from solver.sharp.rules import RULES, choose_kinds
-from solver.sharp.solution import FIXED, Hold
-from solver.sharp.source import StressSource
+from adhesis.solver.grid.method import GridMethod
+from adhesis.solver.sharp.along import forces_on
+from adhesis.solver.sharp.coordinate import map_gaps, theta_at
+from adhesis.solver.sharp.derivatives import derivatives
+from adhesis.solver.sharp.field import GapField, solve, solve_again
+from adhesis.solver.sharp.moments import gap_moments
+from adhesis.solver.sharp.opening import fine_opening, sum_modes, work_of_gaps
+from adhesis.solver.sharp.rules import RULES, choose_kinds
+from adhesis.solver.sharp.solution import FIXED, Hold
+from adhesis.solver.sharp.source import StressSource
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.scenes import HALF_SPACE
 

@@ -8,25 +8,25 @@ import numpy as np
 import pytest
 
 from adhesis import HalfSpace, Problem, self_affine_profile
-from solver.loop import run_loop
-from solver.sharp.balance import imbalance, moved_gaps, symmetric, tangent_of
-from solver.sharp.coordinate import map_gaps
-from solver.sharp.derivatives import derivatives
-from solver.sharp.edges import CORRECTED, EdgeMechanics
-from solver.sharp.far import solve_many
-from solver.sharp.field import solve_plain
-from solver.sharp.gaps import with_patches
-from solver.sharp.landing import landed
-from solver.sharp.linear import is_definite
-from solver.sharp.method import SharpMethod
-from solver.sharp.nearby import Window
-from solver.sharp.point import Point
-from solver.sharp.rules import RULES, choose_kinds
-from solver.sharp.solution import FIXED, Solution
-from solver.sharp.source import StressSource
-from solver.sharp.tree import plant
-from solver.sharp.window import known_about, open_window
-from solver.sharp.yielding import newton_many, newton_step, yielding_gaps
+from adhesis.solver.loop import run_loop
+from adhesis.solver.sharp.balance import imbalance, moved_gaps, symmetric, tangent_of
+from adhesis.solver.sharp.coordinate import map_gaps
+from adhesis.solver.sharp.derivatives import derivatives
+from adhesis.solver.sharp.edges import CORRECTED, EdgeMechanics
+from adhesis.solver.sharp.far import solve_many
+from adhesis.solver.sharp.field import solve_plain
+from adhesis.solver.sharp.gaps import with_patches
+from adhesis.solver.sharp.landing import landed
+from adhesis.solver.sharp.linear import is_definite
+from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.sharp.nearby import Window
+from adhesis.solver.sharp.point import Point
+from adhesis.solver.sharp.rules import RULES, choose_kinds
+from adhesis.solver.sharp.solution import FIXED, Solution
+from adhesis.solver.sharp.source import StressSource
+from adhesis.solver.sharp.tree import plant
+from adhesis.solver.sharp.window import known_about, open_window
+from adhesis.solver.sharp.yielding import newton_many, newton_step, yielding_gaps
 from tests.support import next_to_a_fold
 
 

@@ -14,11 +14,11 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from solver.method import ContactState, PathError
-from solver.references.single_wave import SingleWave
-from solver.sharp import follow
-from solver.sharp.course import Course
-from solver.sharp.method import SharpMethod
+from adhesis.solver.method import ContactState, PathError
+from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp import follow
+from adhesis.solver.sharp.course import Course
+from adhesis.solver.sharp.method import SharpMethod
 from tests.support.explicit_solution import explicit_openings
 
 SOLID = HalfSpace(young=1e6, poisson=0.5)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from solver.references.parabola import parabola_load
-from solver.references.periodic_punch import pull_off_stress
-from solver.references.single_wave import SingleWave
+from adhesis.solver.references.parabola import parabola_load
+from adhesis.solver.references.periodic_punch import pull_off_stress
+from adhesis.solver.references.single_wave import SingleWave
 
 A, PERIOD, MODULUS = 0.7, 3.0, 2.0  # any numbers: the closed form has one group, α
 ALPHAS = (0.0, 0.05, 0.3, 0.6)

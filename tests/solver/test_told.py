@@ -6,8 +6,8 @@ import logging
 
 import pytest
 
-from solver.compiled import Compilation
-from solver.told import _Teller, hushed
+from adhesis.solver.compiled import Compilation
+from adhesis.solver.told import _Teller, hushed
 
 
 def compiling(seconds: float) -> None:

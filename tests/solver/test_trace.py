@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.profile import self_affine_profile
-from solver.trace import (
+from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.trace import (
     band_limited,
     form_shares,
     one_period,

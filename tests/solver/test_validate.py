@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import solver.validate.claims as validation
-import solver.validate.judge as judging
+import adhesis.solver.validate.claims as validation
+import adhesis.solver.validate.judge as judging
 from adhesis import ContactState, HalfSpace, Problem
-from ensemble.command.main import main
-from solver.references.exact_wave import ExactWave
-from solver.validate.claims import METHODS, Row, validate
+from adhesis.ensemble.command.main import main
+from adhesis.solver.references.exact_wave import ExactWave
+from adhesis.solver.validate.claims import METHODS, Row, validate
 
 WAVE_CLAIMS = tuple(
     claim

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.control import Control
-from solver.loop import run_loop
-from solver.material import HalfSpace
-from solver.problem import Problem
-from solver.profile import self_affine_profile
-from solver.registry import make_method
-from solver.sharp.method import SharpMethod
-from solver.warm import small_problem, warm, watch_compilation
+from adhesis.solver.control import Control
+from adhesis.solver.loop import run_loop
+from adhesis.solver.material import HalfSpace
+from adhesis.solver.problem import Problem
+from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.registry import make_method
+from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.warm import small_problem, warm, watch_compilation
 
 
 @pytest.mark.parametrize(

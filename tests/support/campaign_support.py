@@ -86,7 +86,7 @@ def environment(**extra: str) -> dict[str, str]:
 
 def command(words: Iterable[object], ranks: int = 0, fake: str | None = None) -> list[str]:
     """Return the command line of ``adhesis WORDS``, under mpirun if ranks are given."""
-    entry = [str(TESTS / "fake_run.py"), fake] if fake is not None else ["-m", "ensemble"]
+    entry = [str(TESTS / "fake_run.py"), fake] if fake is not None else ["-m", "adhesis"]
     start = [MPIRUN, "-n", str(ranks)] if ranks else []
     module = ["-m", "mpi4py"] if ranks else []
     return [*start, sys.executable, *module, *entry, *map(str, words)]

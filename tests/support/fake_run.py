@@ -23,13 +23,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ensemble.campaign.tables import Campaign
-from ensemble.campaign.tasks import Task
-from ensemble.results.write import Writer
-from ensemble.run.session import Engine
-from ensemble.task.dataset import KEPT, row_shape, sizes_of
-from ensemble.task.fields import field_plan
-from ensemble.task.row import RESULT_DATASETS, Row, row_scales
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.results.write import Writer
+from adhesis.ensemble.run.session import Engine
+from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
+from adhesis.ensemble.task.fields import field_plan
+from adhesis.ensemble.task.row import RESULT_DATASETS, Row, row_scales
 
 
 def matches(pattern: str | None, task: Task) -> bool:
@@ -107,8 +107,8 @@ def fake_engine(behaviour: str) -> Engine:
 
 
 if __name__ == "__main__":
-    from ensemble.command import run
-    from ensemble.command.main import main
+    from adhesis.ensemble.command import run
+    from adhesis.ensemble.command.main import main
 
     program = [sys.executable, "-m", "mpi4py", __file__, sys.argv[1]]
     run.execute = partial(run.execute, engine=fake_engine(sys.argv[1]), program=program)

@@ -10,11 +10,11 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from ensemble.command import run
-from ensemble.command.main import main
-from ensemble.run.session import Engine
-from ensemble.task.compute import run_task
-from solver.warm import watch_compilation
+from adhesis.ensemble.command import run
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.run.session import Engine
+from adhesis.ensemble.task.compute import run_task
+from adhesis.solver.warm import watch_compilation
 
 if __name__ == "__main__":
     log = Path(sys.argv[1])

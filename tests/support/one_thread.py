@@ -5,7 +5,7 @@ Threads for small matrices wait for one another on a busy machine: one module to
 
 import os
 
-from ensemble.run.launch import ONE_THREAD
+from adhesis.ensemble.run.launch import ONE_THREAD
 
 for _variable, _count in ONE_THREAD.items():
     os.environ.setdefault(_variable, _count)

@@ -7,15 +7,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ensemble.campaign.file import parse_campaign
-from ensemble.campaign.tables import Campaign
-from ensemble.results.checksum import row_checksums
-from ensemble.results.head import HEAD, write_head
-from ensemble.results.layout import create
-from ensemble.results.schema import LATER_DATASETS, axis_datasets, kept_rows
-from ensemble.task.dataset import KEPT
-from ensemble.task.fields import GAP_EDGES, field_plan
-from solver.jumps import JUMP_KINDS
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.results.checksum import row_checksums
+from adhesis.ensemble.results.head import HEAD, write_head
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.schema import LATER_DATASETS, axis_datasets, kept_rows
+from adhesis.ensemble.task.dataset import KEPT
+from adhesis.ensemble.task.fields import GAP_EDGES, field_plan
+from adhesis.solver.jumps import JUMP_KINDS
 
 CAMPAIGN = """
 [profile]

@@ -49,10 +49,10 @@ LIMIT = 1200.0  # s after which a process is taken for hanging
 
 def make(method: str, work_of_adhesion: float, ratio: int) -> Any:
     """Return a method for the paper's profile, up to ``ratio`` times its longest wave."""
-    from solver.material import HalfSpace
-    from solver.problem import Problem
-    from solver.profile import self_affine_profile
-    from solver.registry import make_method
+    from adhesis.solver.material import HalfSpace
+    from adhesis.solver.problem import Problem
+    from adhesis.solver.profile import self_affine_profile
+    from adhesis.solver.registry import make_method
 
     profile = self_affine_profile(
         0.8, period=2e-3 * np.pi, n0=WAVES, ratio=ratio, seed=1, h_rms=1e-6
@@ -71,7 +71,7 @@ class Loops:
     """Stretches of one loop, each from a load step that is drawn, and loops from the beginning."""
 
     def __init__(self, method: str, work_of_adhesion: float, ratio: int) -> None:
-        from solver.loop import run_loop
+        from adhesis.solver.loop import run_loop
 
         self._run_loop = run_loop
         self.method = make(method, work_of_adhesion, ratio)
@@ -119,7 +119,7 @@ class First:
 
     def once(self, rng: np.random.Generator) -> str:
         """Interrupt once; then the loop runs to its end."""
-        from solver.loop import run_loop
+        from adhesis.solver.loop import run_loop
 
         def loop() -> str:
             found = run_loop(make("sharp", 0.04, 4), max_penetration=0.8, load_steps=4)
@@ -133,10 +133,10 @@ class Traces:
     """``loss_of_trace`` of a small trace."""
 
     def __init__(self, processes: int, longest: float) -> None:
-        from ensemble.trace.prepare import prepare_trace
-        from ensemble.trace.read import Trace
-        from solver.material import HalfSpace
-        from solver.profile import self_affine_profile
+        from adhesis.ensemble.trace.prepare import prepare_trace
+        from adhesis.ensemble.trace.read import Trace
+        from adhesis.solver.material import HalfSpace
+        from adhesis.solver.profile import self_affine_profile
 
         profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=6, seed=2, h_rms=1e-6)
         x = np.linspace(0.0, 1e-3, 400, endpoint=False, dtype=np.float64)
@@ -146,7 +146,7 @@ class Traces:
         self._processes, self._longest = processes, longest
 
     def _work(self) -> None:
-        from ensemble.trace.answer import loss_of_trace
+        from adhesis.ensemble.trace.answer import loss_of_trace
 
         loss_of_trace(
             self._prepared,
@@ -189,7 +189,7 @@ class Campaigns:
     """
 
     def __init__(self, longest: float) -> None:
-        from ensemble.campaign.file import parse_campaign
+        from adhesis.ensemble.campaign.file import parse_campaign
 
         text = "\n".join(line.strip() for line in self.TEXT.splitlines())
         self._campaign = parse_campaign(text)
@@ -197,8 +197,8 @@ class Campaigns:
 
     def once(self, rng: np.random.Generator) -> str:
         """Interrupt once, in a results file of its own."""
-        from ensemble.results.status import read_status
-        from ensemble.run.session import run_campaign
+        from adhesis.ensemble.results.status import read_status
+        from adhesis.ensemble.run.session import run_campaign
 
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "r.h5"

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ensemble.interval import interval
-from ensemble.report.figures.style import MM, TWO_COLUMNS, new_figure, style
-from ensemble.report.paper import TABLE_1
+from adhesis.ensemble.interval import interval
+from adhesis.ensemble.report.figures.style import MM, TWO_COLUMNS, new_figure, style
+from adhesis.ensemble.report.paper import TABLE_1
 from tools.study import jumps, monotone
 from tools.study.data import Study
 from tools.study.readings import readings

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import stdtr
 
-from ensemble.interval import interval
+from adhesis.ensemble.interval import interval
 from tools.study.data import Array, Study, aligned
 
 LEVEL = 0.05

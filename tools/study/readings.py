@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from ensemble.report.paper import M2, TABLE_1
+from adhesis.ensemble.report.paper import M2, TABLE_1
 from tools.study.data import Array, Study
 
 TURNS = (0.6, 0.7, 0.8, 0.9)

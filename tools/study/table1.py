@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from ensemble.report.paper import TABLE_1
+from adhesis.ensemble.report.paper import TABLE_1
 from tools.study.data import Study, aligned
 from tools.study.readings import OF_PAPER, Losses, Reading, readings
 from tools.study.text import Table, mean_text

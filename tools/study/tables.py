@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ensemble.interval import interval
+from adhesis.ensemble.interval import interval
 from tools.study import jumps, monotone
 from tools.study.data import Study, aligned
 from tools.study.table1 import cells, main_readings, stress, tens, under_load, without

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ensemble.interval import interval
+from adhesis.ensemble.interval import interval
 from tools.study.data import Array
 
 Table = tuple[list[str], list[list[str]]]

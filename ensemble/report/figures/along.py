@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell
-from ensemble.campaign.axes import Axis
-from ensemble.report.axes import axis_label, lines_along, place, together
-from ensemble.report.figures.losses import errorbar
-from ensemble.report.figures.style import (
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.report.axes import axis_label, lines_along, place, together
+from adhesis.ensemble.report.figures.losses import errorbar
+from adhesis.ensemble.report.figures.style import (
     MM,
     MOST_PANELS,
     ONE_COLUMN,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.report.axes import together
-from ensemble.report.figures import fields, loops, losses
-from ensemble.report.figures.along import TURNING_POINTS, along, with_figure
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.report.axes import together
+from adhesis.ensemble.report.figures import fields, loops, losses
+from adhesis.ensemble.report.figures.along import TURNING_POINTS, along, with_figure
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell
-from ensemble.aggregate.fields import DeformedShape, FieldStatistics
-from ensemble.report.figures.style import (
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.aggregate.fields import DeformedShape, FieldStatistics
+from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     LINES,
     MM,
@@ -29,9 +29,9 @@ from ensemble.report.figures.style import (
     plain_decades,
     spread_out,
 )
-from ensemble.report.findings import typical_cell
-from solver.method import BRANCHES
-from solver.profile import Array
+from adhesis.ensemble.report.findings import typical_cell
+from adhesis.solver.method import BRANCHES
+from adhesis.solver.profile import Array
 
 _LEAST_DENSITY = 1e-6
 # Colour of a branch where both are drawn over the rigid profile.

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell
-from ensemble.report.figures.style import (
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     MM,
     MOST_CURVES,
@@ -25,7 +25,7 @@ from ensemble.report.figures.style import (
     shown_gammas,
     spread_out,
 )
-from solver.method import BRANCHES
+from adhesis.solver.method import BRANCHES
 
 _MARKERS_PER_CURVE = 8
 

@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell, stress_scale
-from ensemble.aggregate.companions import Companion
-from ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
-from ensemble.aggregate.statistics import Estimate, estimates
-from ensemble.report import paper
-from ensemble.report.figures.style import (
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell, stress_scale
+from adhesis.ensemble.aggregate.companions import Companion
+from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
+from adhesis.ensemble.aggregate.statistics import Estimate, estimates
+from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.figures.style import (
     LINES,
     MM,
     MOST_CURVES,
@@ -32,7 +32,7 @@ from ensemble.report.figures.style import (
     shown_gammas,
     spread_out,
 )
-from ensemble.report.findings import typical_cell
+from adhesis.ensemble.report.findings import typical_cell
 
 _MOST_BARS = 9  # in one column, so that their labels do not touch
 

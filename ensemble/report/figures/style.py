@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.average import Aggregate
 
 STYLE = Path(__file__).parent / "adhesis.mplstyle"
 

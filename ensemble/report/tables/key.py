@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell
-from ensemble.campaign.axes import Axis
-from ensemble.report.tables.table import KEY, TableColumn, Value
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.report.tables.table import KEY, TableColumn, Value
 
 _UNITS = {"1": "", "m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
 _CSV_UNITS = {"1": "", "m": " [m]", "m2": " [m^2]", "Pa": " [Pa]", "Pa m-1": " [Pa/m]"}

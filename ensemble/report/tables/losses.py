@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell, stress_scale
-from ensemble.aggregate.companions import difference
-from ensemble.aggregate.statistics import Estimate
-from ensemble.interval import interval_method
-from ensemble.report import paper
-from ensemble.report.tables.key import axis_columns, key, key_columns
-from ensemble.report.tables.table import (
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell, stress_scale
+from adhesis.ensemble.aggregate.companions import difference
+from adhesis.ensemble.aggregate.statistics import Estimate
+from adhesis.ensemble.interval import interval_method
+from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.tables.key import axis_columns, key, key_columns
+from adhesis.ensemble.report.tables.table import (
     Table,
     TableColumn,
     Value,
@@ -22,7 +22,7 @@ from ensemble.report.tables.table import (
     plain,
     signed_percent,
 )
-from solver.profile import Array
+from adhesis.solver.profile import Array
 
 
 def losses(data: Aggregate) -> Table:

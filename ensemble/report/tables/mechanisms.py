@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.fields import fitted_slope
-from ensemble.report.tables.key import key, key_columns
-from ensemble.report.tables.table import (
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.fields import fitted_slope
+from adhesis.ensemble.report.tables.key import key, key_columns
+from adhesis.ensemble.report.tables.table import (
     Table,
     TableColumn,
     Value,
@@ -17,7 +17,7 @@ from ensemble.report.tables.table import (
     percent,
     plain,
 )
-from solver.method import BRANCHES
+from adhesis.solver.method import BRANCHES
 
 
 def jumps(data: Aggregate) -> Table:

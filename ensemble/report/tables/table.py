@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from ensemble.escape import markdown
+from adhesis.ensemble.escape import markdown
 
 Value = float | int | str | None
 Format = Callable[[Any], str]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ensemble.aggregate.average import Aggregate
-from ensemble.aggregate.cells import Cell
-from ensemble.report.tables.key import key, key_columns
-from ensemble.report.tables.table import Table, TableColumn, Value, make_table, number
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.aggregate.cells import Cell
+from adhesis.ensemble.report.tables.key import key, key_columns
+from adhesis.ensemble.report.tables.table import Table, TableColumn, Value, make_table, number
 
 _PER_CONTACT = ("effective_work_of_approach", "effective_work_of_separation", "loss_per_contact")
 

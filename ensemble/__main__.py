@@ -1,7 +1,0 @@
-"""``python -m ensemble COMMAND …``: the command line, where no script is installed."""
-
-import sys
-
-from ensemble.command.main import main
-
-sys.exit(main())
