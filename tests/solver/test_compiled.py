@@ -106,7 +106,7 @@ def _modules() -> list[types.ModuleType]:
 
 def test_compiled_code_reads_nothing_but_kernel_modules():
     """What a compiled function finds under a global name is part of its code: it must be keyed."""
-    kernels = {str(path) for path in kernel_modules()}
+    kernels = set(kernel_modules())
     functions = {
         value.py_func
         for each in _modules()
@@ -116,7 +116,7 @@ def test_compiled_code_reads_nothing_but_kernel_modules():
     assert len(functions) > 40
     for function in functions:
         home = importlib.import_module(function.__module__)
-        assert str(Path(home.__file__).resolve()) in kernels
+        assert _source(home) in kernels
         defined = _assigned(home)
         for name in function.__code__.co_names:
             value = function.__globals__.get(name)
@@ -124,11 +124,15 @@ def test_compiled_code_reads_nothing_but_kernel_modules():
                 continue
             if isinstance(value, Dispatcher):
                 origin = importlib.import_module(value.py_func.__module__)
-                assert str(Path(str(origin.__file__)).resolve()) in kernels
+                assert _source(origin) in kernels
             elif name not in defined:
                 origin = importlib.import_module(_imported(home)[name])
-                assert origin.__file__ in kernels, (function.__name__, name)
+                assert _source(origin) in kernels, (function.__name__, name)
                 assert name in _assigned(origin)
+
+
+def _source(home: types.ModuleType) -> Path:
+    return Path(str(home.__file__)).resolve()
 
 
 def _assigned(home: types.ModuleType) -> set[str]:
