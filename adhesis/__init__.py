@@ -22,51 +22,51 @@ if TYPE_CHECKING:
     from adhesis.ensemble.trace.answer import loss_of_trace
     from adhesis.ensemble.trace.prepare import prepare_trace
     from adhesis.ensemble.trace.read import read_trace
-    from adhesis.solver.control import Control
-    from adhesis.solver.jumps import Jump
-    from adhesis.solver.loop import run_loop
-    from adhesis.solver.loop_result import LoopResult
-    from adhesis.solver.material import HalfSpace
+    from adhesis.solver.loading.loop import run_loop
+    from adhesis.solver.loading.loop_result import LoopResult
+    from adhesis.solver.loading.path import MinorLoop, PathResult, run_path
+    from adhesis.solver.loading.turning_points import run_loops
     from adhesis.solver.method import ContactState, Fields, Method, Opening, Path, PathError
-    from adhesis.solver.path import MinorLoop, PathResult, run_path
-    from adhesis.solver.problem import Problem
-    from adhesis.solver.profile import (
+    from adhesis.solver.model.control import Control
+    from adhesis.solver.model.half_space import HalfSpace
+    from adhesis.solver.model.jump import Jump
+    from adhesis.solver.model.problem import Problem
+    from adhesis.solver.model.profile import (
         Profile,
         profile_from_heights,
         self_affine_profile,
         single_wave,
     )
     from adhesis.solver.registry import make_method
-    from adhesis.solver.turns import run_loops
 
 # The same list for the running program; a test compares the two.
 _MODULES = {
     "ContactState": "solver.method",
-    "Control": "solver.control",
+    "Control": "solver.model.control",
     "Fields": "solver.method",
-    "HalfSpace": "solver.material",
+    "HalfSpace": "solver.model.half_space",
     "InputError": "ensemble.errors",
-    "Jump": "solver.jumps",
-    "LoopResult": "solver.loop_result",
+    "Jump": "solver.model.jump",
+    "LoopResult": "solver.loading.loop_result",
     "Method": "solver.method",
-    "MinorLoop": "solver.path",
+    "MinorLoop": "solver.loading.path",
     "Opening": "solver.method",
     "Path": "solver.method",
     "PathError": "solver.method",
-    "PathResult": "solver.path",
-    "Problem": "solver.problem",
-    "Profile": "solver.profile",
+    "PathResult": "solver.loading.path",
+    "Problem": "solver.model.problem",
+    "Profile": "solver.model.profile",
     "loss_of_trace": "ensemble.trace.answer",
     "make_method": "solver.registry",
     "open": "_open",
     "prepare_trace": "ensemble.trace.prepare",
-    "profile_from_heights": "solver.profile",
+    "profile_from_heights": "solver.model.profile",
     "read_trace": "ensemble.trace.read",
-    "run_loop": "solver.loop",
-    "run_loops": "solver.turns",
-    "run_path": "solver.path",
-    "self_affine_profile": "solver.profile",
-    "single_wave": "solver.profile",
+    "run_loop": "solver.loading.loop",
+    "run_loops": "solver.loading.turning_points",
+    "run_path": "solver.loading.path",
+    "self_affine_profile": "solver.model.profile",
+    "single_wave": "solver.model.profile",
 }
 
 __all__ = [

@@ -15,11 +15,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from adhesis.solver.loop import run_loop
-from adhesis.solver.loop_result import LoopResult
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.sharp.method import SharpMethod
 
 PROFILES = ((0.8, 2, 16), (0.5, 3, 20))  # H, n0, q_max/q_min

@@ -14,12 +14,12 @@ from time import process_time
 
 import numpy as np
 
-from adhesis.solver.loop import run_loop
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import self_affine_profile
+from adhesis.solver.precompile import warm
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.warm import warm
 
 
 def main() -> None:

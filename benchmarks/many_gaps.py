@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.solver.memory import keep_freed
-from adhesis.solver.profile import Array, self_affine_profile
-from adhesis.solver.sharp.coordinate import map_gaps
-from adhesis.solver.sharp.derivatives import derivatives
-from adhesis.solver.sharp.far import solve_many
-from adhesis.solver.sharp.field import solve_plain
-from adhesis.solver.sharp.rules import RULES, choose_kinds
-from adhesis.solver.sharp.solution import FIXED, Solution
-from adhesis.solver.sharp.source import StressSource
-from adhesis.solver.sharp.yielding import newton_many
+from adhesis.solver.model.profile import Array, self_affine_profile
+from adhesis.solver.runtime.malloc import keep_freed
+from adhesis.solver.sharp.equilibrium.edge_elimination import newton_many
+from adhesis.solver.sharp.field.dense_solver import solve_plain
+from adhesis.solver.sharp.field.edge_derivatives import derivatives
+from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.solution import FIXED, Solution
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
 
 _FEW = 100  # gaps up to which dense matrices are timed as often as the tree
 

@@ -48,13 +48,13 @@ step("numpy")(imported("numpy"))
 step("scipy: what the solver uses")(imported("scipy.fft", "scipy.linalg"))
 step("numba, the compiler")(imported("numba"))
 step("mpi4py and h5py")(imported("mpi4py.MPI", "h5py"))
-packages = ("adhesis.ensemble.command.run", "adhesis.solver.warm")
+packages = ("adhesis.ensemble.command.run", "adhesis.solver.precompile")
 step("solver and ensemble")(imported(*packages))
 
 
 @step("code for loops, from its cache")
 def _load() -> None:
-    from adhesis.solver.warm import warm
+    from adhesis.solver.precompile import warm
 
     warm(("sharp",))
 

@@ -25,10 +25,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from adhesis.ensemble.trace.answer import QUANTITIES, loss_of_trace
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.read import read_trace
-from adhesis.solver.loop import run_loop
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Profile, self_affine_profile
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Profile, self_affine_profile
 from adhesis.solver.registry import make_method
 from tests.support import instrument_files
 

@@ -15,15 +15,15 @@ from time import process_time
 
 import numpy as np
 
-from adhesis.solver.jumps import Jump
-from adhesis.solver.loop import run_loop
-from adhesis.solver.loop_result import LoopResult
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.memory import keep_freed
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.jump import Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import self_affine_profile
+from adhesis.solver.precompile import warm
+from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.warm import warm
 
 _SAME = 5e-3  # separations of a jump in both loops, in h_max
 

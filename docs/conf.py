@@ -76,7 +76,7 @@ def start_page(app: Any, name: str, source: list[str]) -> None:
 
 
 def public_name(app: Any, env: Any, node: Any, content: Any) -> Any:
-    """Resolve `adhesis.solver.loop_result.LoopResult` to the entry of `adhesis.LoopResult`."""
+    """Resolve `adhesis.solver.….LoopResult` to the entry of `adhesis.LoopResult`."""
     wanted = PUBLIC.get(node.get("reftarget", ""))
     if wanted is None:
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Collection
 
-from adhesis.solver.warm import Compilation, compiled_in, processor, warm
+from adhesis.solver.precompile import Compilation, compiled_in, processor, warm
 
 _MOMENT = 1.0  # s that pass without a word
 _BETWEEN_LINES = 10.0  # s

@@ -1,8 +1,8 @@
 """What a method must offer, and the contact states that it hands out.
 
-A method finds equilibrium contact states of one :class:`~adhesis.solver.problem.Problem`. The
-loading path, the energy audit and the catalogue of jumps (:mod:`adhesis.solver.loop`,
-:mod:`adhesis.solver.jumps`) are written against this contract alone.
+A method finds equilibrium contact states of one :class:`~adhesis.solver.model.problem.Problem`. The
+loading path, the energy audit and the catalogue of jumps (:mod:`adhesis.solver.loading.loop`,
+:mod:`adhesis.solver.model.jump`) are written against this contract alone.
 
 To add a method, subclass :class:`Method` and keep these promises:
 
@@ -16,9 +16,9 @@ To add a method, subclass :class:`Method` and keep these promises:
     maximum, never leaping over a neighbouring minimum; inside a contact nothing opens; gaps may
     close, patches merge and vanish.
 4.  Where the path jumps, ``follow`` returns the states just before and just after, both at the
-    separation of the jump as the method located it, and a :class:`~adhesis.solver.jumps.Jump` whose
-    energy drop is computed from the two energies, not from the load curve. Outside jumps the states
-    are dense enough for the trapezoidal rule.
+    separation of the jump as the method located it, and a :class:`~adhesis.solver.model.jump.Jump`
+    whose energy drop is computed from the two energies, not from the load curve. Outside jumps the
+    states are dense enough for the trapezoidal rule.
 5.  Same input, same bits: no clocks, no unseeded random numbers, no threads.
 6.  A state is immutable; ``follow`` may be called again from an older state (partial loops).
 7.  No state is handed out that the path does not visit, or in which surfaces overlap: no gap is
@@ -37,11 +37,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from adhesis.solver.checks import instance
-from adhesis.solver.jumps import BRANCHES, Branch, Jump
-from adhesis.solver.one_thread import new_lock
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Array
-from adhesis.solver.state import ContactState
+from adhesis.solver.model.contact_state import ContactState
+from adhesis.solver.model.jump import BRANCHES, Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.threads import new_lock
 from adhesis.solver.values import ByValue
 
 __all__ = [
@@ -121,7 +121,7 @@ class Fields(ByValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Opening(ByValue):
-    """Opening of one gap, from edge to edge of contact; see :mod:`adhesis.solver.fields`.
+    """Opening of one gap, from edge to edge of contact; see :mod:`adhesis.solver.observables`.
 
     Attributes
     ----------

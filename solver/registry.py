@@ -7,8 +7,8 @@ from typing import Literal, get_args
 
 from adhesis.solver.checks import ACCURACY, NODES, NODES_PER_WAVE, choice, instance, real, whole
 from adhesis.solver.method import Method
-from adhesis.solver.problem import Problem
-from adhesis.solver.uninterrupted import uninterrupted
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.runtime.uninterrupted import uninterrupted
 
 MethodName = Literal["grid", "sharp", "auto"]
 METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
@@ -74,7 +74,7 @@ def make_method(
 @uninterrupted  # an import that is interrupted leaves modules that are never whole again
 def _load(name: Literal["grid", "sharp"]) -> None:
     """Import a method, and with it the compiler."""
-    from adhesis.solver.told import tell_of_compiling
+    from adhesis.solver.runtime.compile_log import tell_of_compiling
 
     tell_of_compiling()
     import_module(f"adhesis.solver.{name}.method")

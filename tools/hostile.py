@@ -18,7 +18,7 @@ from adhesis import (
     self_affine_profile,
 )
 from adhesis.solver.method import ContactState, PathError
-from adhesis.solver.profile import Amplitudes
+from adhesis.solver.model.profile import Amplitudes
 from adhesis.solver.registry import MethodName
 from tests.support.explicit_solution import explicit_openings
 

@@ -14,7 +14,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile
-from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.loading.loop_result import LoopResult
 
 COLOURS = {"loading": "#1f5fa8", "unloading": "#c4472b"}
 

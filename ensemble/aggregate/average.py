@@ -28,7 +28,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
 from adhesis.solver.method import BRANCHES
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 _MOST_FAILURES = 20
 

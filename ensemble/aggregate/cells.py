@@ -15,9 +15,9 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
 from adhesis.ensemble.task.fields import FieldPlan, field_plan
-from adhesis.solver import problem
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.profile import Array
+from adhesis.solver.model import problem
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.profile import Array
 
 Rows = NDArray[np.intp]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.results.blocks import column_blocks
 from adhesis.ensemble.results.read import Results
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 

@@ -16,7 +16,7 @@ from adhesis.ensemble.results.blocks import row_blocks
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import FieldPlan
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.results.blocks import row_blocks
 from adhesis.ensemble.results.read import Results
-from adhesis.solver.jumps import JUMP_KINDS, SMALL_SCALE
-from adhesis.solver.profile import Array
+from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE
+from adhesis.solver.model.profile import Array
 
 BINS_PER_DECADE = 2
 # Energy drops outside these bounds (J/m²) are counted in the outermost bin.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.ensemble.interval import interval
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 @dataclass(frozen=True)

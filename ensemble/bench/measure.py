@@ -20,10 +20,10 @@ from typing import Literal
 from adhesis.ensemble.bench.scenes import WARM_UP, Scene
 from adhesis.ensemble.bench.tamaas import tamaas_loop
 from adhesis.ensemble.run.launch import ONE_THREAD, end_with_parent, python, python_environment
-from adhesis.solver.loop import run_loop
-from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.precompile import warm, watch_compilation
 from adhesis.solver.registry import MethodName, make_method
-from adhesis.solver.warm import warm, watch_compilation
 
 Measured = Literal["grid", "sharp", "tamaas"]
 

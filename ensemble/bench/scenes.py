@@ -10,9 +10,9 @@ from typing import Literal
 
 import numpy as np
 
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Profile, self_affine_profile, single_wave
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Profile, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 
 Shape = Literal["one wave", "two waves", "rough"]

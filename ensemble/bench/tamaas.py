@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Array
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
 
 _NODES_PER_ZONE = 4
 _NODES_PER_WAVE = 8

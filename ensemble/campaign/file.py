@@ -16,8 +16,8 @@ from adhesis.ensemble.campaign.rules import list_of, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError
 from adhesis.solver.checks import MOST_WAVES
-from adhesis.solver.problem import check_slope
-from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.model.problem import check_slope
+from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.registry import check_nodes
 
 # HDF5 keeps an attribute of at most 64 KiB, and the text is one.

@@ -43,7 +43,7 @@ from adhesis.solver.checks import (
     WORK_OF_ADHESION,
     YOUNG,
 )
-from adhesis.solver.profile import NORMALISATIONS, Amplitudes, Array
+from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
 
 

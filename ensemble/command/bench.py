@@ -66,7 +66,7 @@ def execute(args: argparse.Namespace) -> int:
         page,
     )
     from adhesis.ensemble.warm import warm_missing
-    from adhesis.solver.warm import COMPILED_METHODS
+    from adhesis.solver.precompile import COMPILED_METHODS
 
     if not (math.isfinite(args.budget) and args.budget > 0):
         raise InputError(f"--budget is {args.budget!r}: it must be positive, in seconds")

@@ -34,15 +34,15 @@ from adhesis.ensemble.trace.options import (
     what_was_read,
 )
 from adhesis.ensemble.warm import warm_missing
-from adhesis.solver.loop import Progress, run_loop
-from adhesis.solver.loop_result import LoopResult
-from adhesis.solver.material import HalfSpace
+from adhesis.solver.loading.loop import Progress, run_loop
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.path import PathResult, run_path
+from adhesis.solver.loading.turning_points import run_loops
 from adhesis.solver.method import Branch, ContactState, Method, PathError
-from adhesis.solver.path import PathResult, run_path
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Profile, profile_from_heights, self_affine_profile
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Profile, profile_from_heights, self_affine_profile
 from adhesis.solver.registry import make_method
-from adhesis.solver.turns import run_loops
 
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
 _SECONDS_BETWEEN_LINES = 5.0

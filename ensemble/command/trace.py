@@ -13,7 +13,7 @@ from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle,
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
 from adhesis.ensemble.trace.plan import Plan, clock, make_plan
 from adhesis.ensemble.trace.pool import Pool
-from adhesis.solver.material import HalfSpace
+from adhesis.solver.model.half_space import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
 _FIGURES = ("trace.png", "spectrum.png", "loop.png", "cut-off.png", "tables.png")

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Compile what is not compiled yet; 0 if the code is kept."""
     from adhesis.ensemble.warm import warm_up
-    from adhesis.solver.warm import COMPILED_METHODS, compiled_in, in_installation, processor
+    from adhesis.solver.precompile import COMPILED_METHODS, compiled_in, in_installation, processor
 
     def say(text: str) -> None:
         print(text, flush=True)

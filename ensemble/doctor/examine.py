@@ -205,7 +205,7 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
 def compiled_code() -> Check:
     """Whether the compiler loads, and where its code lies."""
     try:
-        from adhesis.solver import warm
+        from adhesis.solver import precompile as warm
     except (ImportError, RuntimeError, OSError) as error:
         return Check("compiled code", False, f"does not load: {last_lines(str(error))}")
     told = warm.settings()

@@ -7,11 +7,11 @@ import math
 from dataclasses import dataclass
 
 from adhesis.ensemble.errors import InputError
-from adhesis.solver.control import Control
-from adhesis.solver.loop import check_cycle
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.path import check_path
-from adhesis.solver.problem import Problem
+from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.loading.path import check_path
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
 
 _OUT = "out"
 _MAX_PENETRATION = 0.9

@@ -15,8 +15,8 @@ from adhesis.ensemble.report.figures.style import (
     new_figure,
     style,
 )
-from adhesis.solver.loop_result import LoopResult
-from adhesis.solver.path import PathResult
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.path import PathResult
 
 
 def draw_loops(results: Sequence[LoopResult] | PathResult) -> Figure:

@@ -12,7 +12,7 @@ from adhesis.ensemble.trace.containers import container
 from adhesis.ensemble.trace.read import holds_numbers, load_array
 from adhesis.ensemble.trace.text import Table, read_column
 from adhesis.ensemble.trace.units import METRES, length_text, parse_units, units_of_header
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 # A word in brackets, as long as a unit is: "z [æm]" after a wrong conversion.
 _PERHAPS_A_UNIT = re.compile(r"[(\[<{]\s*([^\W\d_]{1,3})\s*[)\]>}]")

@@ -16,11 +16,11 @@ import numpy as np
 
 from adhesis.ensemble.outputs import whole_file
 from adhesis.solver.checks import counted
-from adhesis.solver.jumps import Jump
-from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
-from adhesis.solver.path import PathResult
-from adhesis.solver.problem import Problem
+from adhesis.solver.model.jump import Jump
+from adhesis.solver.model.problem import Problem
 
 _STATE_KEYS = ("branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy")
 _MORE_STATE_KEYS = ("separation", "elastic_energy", "adhesion_energy", "load_step")

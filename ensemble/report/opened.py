@@ -37,7 +37,7 @@ from adhesis.ensemble.results.schema import (
     scales,
 )
 from adhesis.ensemble.task.dataset import KEPT, Dataset
-from adhesis.solver.jumps import BRANCHES, JUMP_KINDS
+from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
 
 # Dimensions of the file under the names that they have here.
 _RENAMED = {

@@ -30,7 +30,7 @@ from adhesis.ensemble.task.compute import Runner, check_task, methods_of
 from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
-from adhesis.solver.loop import Progress
+from adhesis.solver.loading.loop import Progress
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,14 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.dataset import sizes_of
 from adhesis.ensemble.task.fields import FieldPlan, FieldRecorder, field_plan
 from adhesis.ensemble.task.row import Row, row_of, row_scales
-from adhesis.solver.control import Control
-from adhesis.solver.loop import Progress, run_loop
-from adhesis.solver.material import HalfSpace
+from adhesis.solver.loading.loop import Progress, run_loop
+from adhesis.solver.loading.turning_points import LoadingBranch
 from adhesis.solver.method import Branch, Method
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Array, self_affine_profile
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.registry import make_method
-from adhesis.solver.turns import LoadingBranch
 
 
 def make_problem(campaign: Campaign, task: Task) -> Problem:

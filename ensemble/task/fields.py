@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
-from adhesis.solver.fields import gap_shares, spectral_density
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
+from adhesis.solver.observables import gap_shares, spectral_density
 
 # Nodes per shortest wave: spectra then reach four times the highest wave number of the profile.
 NODES_PER_WAVE = 8

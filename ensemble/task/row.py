@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.task.dataset import COUNT, FLAG, FLOAT, Dataset, Scale, flags, row_shape
 from adhesis.ensemble.task.fields import FIELD_DATASETS, field_plan, field_scales
-from adhesis.solver.jumps import BRANCHES, JUMP_KINDS, Jump
-from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.method import Branch
-from adhesis.solver.profile import Array
+from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS, Jump
+from adhesis.solver.model.profile import Array
 
 Row = dict[str, Any]
 """Values of one task by dataset; those of kept fields only where the task keeps them."""
@@ -246,8 +246,8 @@ def row_of(
         where their axis ends; of more jumps than the catalogue holds those with the largest drops
         are kept, in the order of the path.
     axes : mapping of arrays, optional
-        Penetrations (:meth:`adhesis.solver.loop_result.LoopResult.at`) of the curves of each
-        branch, where these are not the loop's load steps.
+        Penetrations (:meth:`adhesis.solver.loading.loop_result.LoopResult.at`) of the curves of
+        each branch, where these are not the loop's load steps.
     """
     row: Row = {d.name: d.value(loop) for d in (*NUMBERS, JUMP_COUNT) if d.value is not None}
     for branch, curves in CURVES.items():

@@ -25,9 +25,9 @@ from adhesis.solver.checks import (
     row,
     whole,
 )
-from adhesis.solver.loop import check_cycle
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.problem import Problem
+from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
 from adhesis.solver.registry import METHOD_NAMES, MethodName
 from adhesis.solver.values import ByValue
 

@@ -20,8 +20,8 @@ from adhesis.ensemble.report.figures.style import (
     style,
 )
 from adhesis.ensemble.trace.answer import Answer
-from adhesis.solver.profile import Array
-from adhesis.solver.trace import trace_spectrum
+from adhesis.solver.model.measured_profile import trace_spectrum
+from adhesis.solver.model.profile import Array
 
 _GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
 _MOST_SHOWN = 4000  # points of a curve; of more, the lowest and highest of each stretch

@@ -14,8 +14,8 @@ from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.units import length_text
 from adhesis.ensemble.trace.worker import Job
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.profile import Profile
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName
 
 # Loops beyond this many waves are compared at a coarser cut-off when a doubt is measured.

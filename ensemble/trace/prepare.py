@@ -11,8 +11,7 @@ from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.trace.read import Trace
 from adhesis.ensemble.trace.units import length_text
 from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
-from adhesis.solver.profile import Array, Profile
-from adhesis.solver.trace import (
+from adhesis.solver.model.measured_profile import (
     Continuation,
     TraceSpectrum,
     band_limited,
@@ -22,6 +21,7 @@ from adhesis.solver.trace import (
     trace_spectrum,
     trusted_wavelength,
 )
+from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
 
 MOST_DEGREE = 6
@@ -143,7 +143,7 @@ def prepare_trace(
         stands out.
     cut_off : float, optional
         Shortest wavelength kept, in m; without it the longest of the limits that step, noise and
-        tip set (:func:`adhesis.solver.trace.trusted_wavelength`).
+        tip set (:func:`adhesis.solver.model.measured_profile.trusted_wavelength`).
     tip_radius : float, optional
         In m; without it that of the file, if it tells one.
     longest_gap : float, optional

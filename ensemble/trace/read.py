@@ -22,7 +22,7 @@ from adhesis.ensemble.trace.units import (
 )
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 FEWEST_POINTS = 32
 _COLUMN = checks.Bounds(1, 1_000_000, whole=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
 from adhesis.solver.checks import counted
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 MOST_BYTES = 200_000_000
 _ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with

@@ -73,11 +73,11 @@ def main() -> None:
 
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop; returns its numbers, and its states as lists."""
-    from adhesis.solver.loop import run_loop
-    from adhesis.solver.material import HalfSpace
+    from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.method import Branch, ContactState
-    from adhesis.solver.problem import Problem
-    from adhesis.solver.profile import Profile
+    from adhesis.solver.model.half_space import HalfSpace
+    from adhesis.solver.model.problem import Problem
+    from adhesis.solver.model.profile import Profile
     from adhesis.solver.registry import make_method
 
     last = time.monotonic()

@@ -1,4 +1,4 @@
 """Method ``grid``: contact sets of equally spaced nodes, moved by energy comparison.
 
-Import :class:`adhesis.solver.grid.method.GridMethod`; the other modules are its parts.
+Import ``method.GridMethod``; the other modules are its parts.
 """

@@ -18,7 +18,7 @@ from functools import cache
 import numpy as np
 
 from adhesis.solver.grid.kernels import inverse_form
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 # Blocks of one node at the end of a patch that faces the node, and the growth of those behind them.
 _SINGLE_NODES = 5

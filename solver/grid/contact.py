@@ -5,8 +5,8 @@ With the contact set Ω given, the stress solves V_ΩΩ σ = (h - s)_Ω. V is po
 preconditioner: with it the number of iterations grows only like log n (see e.g. Rey, Anciaux &
 Molinari, Comput. Mech. 60 (2017) for FFT contact solvers). Two pairs of transforms an iteration.
 
-Where the separation is not fixed (:mod:`adhesis.solver.control`) a second solution, V_ΩΩ σ₁ = 1,
-tells how the stress follows it: σ = σ₀ - (s - s₀) σ₁, and s from what is prescribed.
+Where the separation is not fixed (``control``) a second solution, V_ΩΩ σ₁ =
+1, tells how the stress follows it: σ = σ₀ - (s - s₀) σ₁, and s from what is prescribed.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.control import Control
 from adhesis.solver.grid.elasticity import ElasticGrid
 from adhesis.solver.grid.kernels import advance, dot, turn
 from adhesis.solver.method import PathError
-from adhesis.solver.profile import Array
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.profile import Array
 
 Mask = NDArray[np.bool_]
 
@@ -60,7 +60,7 @@ class Contact:
     separation : float
         s in m.
     prescribed : float
-        What the control prescribes, x of :mod:`adhesis.solver.control`.
+        What the control prescribes, x of ``control``.
     mask : bool array, shape (n,)
         The contact nodes Ω.
     stress : array, shape (n,)

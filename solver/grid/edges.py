@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact, Mask
 from adhesis.solver.grid.lattice import Lattice
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 Indices = NDArray[np.intp]
 

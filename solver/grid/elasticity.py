@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.grid.fourier import RealFourier, symbol
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 class ElasticGrid:

@@ -10,7 +10,7 @@ import numpy as np
 import pyfftw
 from numpy.typing import NDArray
 
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 def symbol(eigenvalues: Array) -> Array:

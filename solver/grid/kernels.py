@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from adhesis.solver.compiled import compiled, compiled_finite_sums
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled, compiled_finite_sums
 
 
 @compiled_finite_sums

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.control import Control
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import EDGE_COMPLIANCE, Contact
 from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Array
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Lattice:
         return self.dx / (self.elastic.period * (k + held)), opening
 
     def conjugate(self, contact: Contact) -> float:
-        """Y of :mod:`adhesis.solver.control`: p̄ in Pa, under a load s - h_max in m."""
+        """Y of ``control``: p̄ in Pa, under a load s - h_max in m."""
         mean_stress = float(contact.stress.mean())
         return self.control.conjugate(contact.separation, mean_stress, self.h_max)
 
@@ -102,7 +102,7 @@ class Lattice:
         return -self.dx * float(np.sum(self.adhesion[contact.mask]))
 
     def energy(self, contact: Contact) -> float:
-        """W of :mod:`adhesis.solver.control` in J/m, per period: U at fixed separation.
+        """W of ``control`` in J/m, per period: U at fixed separation.
 
         Under a tension nothing is as low as no contact.
         """

@@ -11,15 +11,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from adhesis.solver.fields import openings_between
 from adhesis.solver.grid.contact import Contact, ContactSolver
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.path import Counters, Steps
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import mask_of
 from adhesis.solver.method import Branch, ContactState, Fields, Method, MethodReport, Opening, Path
-from adhesis.solver.one_thread import one_at_a_time
-from adhesis.solver.problem import Problem
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.observables import openings_between
+from adhesis.solver.runtime.threads import one_at_a_time
 
 _FEWEST_NODES_PER_WAVE = 8
 # The loss is of first order in dx. At 32 nodes per shortest wave it is good to 1e-3 on the rough
@@ -74,7 +74,7 @@ class GridMethod(Method):
     nodes : int, optional
         Number of nodes, even, instead of the above.
     chosen : str, optional
-        See :class:`~adhesis.solver.method.Method`.
+        See ``method.Method``.
 
     Raises
     ------
@@ -122,7 +122,7 @@ class GridMethod(Method):
     def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the quasi-static path from ``state`` to where x is ``prescribed``.
 
-        See :class:`~adhesis.solver.method.Method`. A state without contact stays without contact
+        See ``method.Method``. A state without contact stays without contact
         down to s = h_max, where the surfaces touch.
         """
         control = self.problem.control

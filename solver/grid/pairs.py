@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.edges import Edges, Indices
 from adhesis.solver.grid.lattice import Lattice
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 # More than |S_12|/S_11 of any pair (0.3 across a patch of three nodes).
 COUPLING = 0.6

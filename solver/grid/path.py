@@ -10,9 +10,9 @@ from adhesis.solver.grid.contact import Contact, Mask
 from adhesis.solver.grid.edges import patch_ranges
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import state_of
-from adhesis.solver.jumps import Branch, Jump
 from adhesis.solver.method import ContactState, PathError
-from adhesis.solver.problem import Problem
+from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.problem import Problem
 
 # The relative error of a loss, times the nodes in the first equilibrium width on a crest of rms
 # curvature: above it lay one in a hundred of rough loops (docs/methods.md).
@@ -280,7 +280,7 @@ class Steps:
             before, end, self.branch, self.period, raced=other is not None, at_stake=at_stake
         )
         if lost:
-            # The load's own work is not counted (adhesis.solver.control).
+            # The load's own work is not counted (adhesis.solver.model.control).
             jump = replace(jump, energy_drop=before.energy / self.period)
         self.error += self.coarse * abs(jump.energy_drop)
         self.jumps.append(jump)

@@ -31,7 +31,7 @@ from adhesis.solver.grid.moves import (
     pair_moves,
 )
 from adhesis.solver.method import PathError
-from adhesis.solver.profile import EQUAL_CRESTS
+from adhesis.solver.model.profile import EQUAL_CRESTS
 
 _MAX_SWEEPS = 1_000_000
 _MAX_ACTIVE_SETS = 1000

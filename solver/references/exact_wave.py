@@ -1,9 +1,9 @@
 """The single wave as a method: Johnson's closed form behind the contract of a method.
 
-An oracle. It runs the loading path and the audit (:mod:`adhesis.solver.loop`) with a solution that
-is exact to rounding, so whatever error is left belongs to them, and other methods can be held
-against it state by state. For a single wave only; the adhesive area is measured along the profile,
-as :class:`~adhesis.solver.problem.Problem` defines it.
+An oracle. It runs the loading path and the audit (``loop``) with a
+solution that is exact to rounding, so whatever error is left belongs to them, and other methods can
+be held against it state by state. For a single wave only; the adhesive area is measured along the
+profile, as ``problem.Problem`` defines it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from adhesis.solver.jumps import Branch, Jump
 from adhesis.solver.method import (
     ContactState,
     Fields,
@@ -24,8 +23,9 @@ from adhesis.solver.method import (
     Path,
     PathError,
 )
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Array
+from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave, WaveLoop
 
 
@@ -37,7 +37,7 @@ class ExactWaveReport(MethodReport):
 
 
 class ExactWave(Method):
-    """Johnson's single wave as a :class:`~adhesis.solver.method.Method`.
+    """Johnson's single wave as a ``method.Method``.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class ExactWave(Method):
         )
 
     def follow(self, state: ContactState, prescribed: float) -> Path:
-        """Follow the stable branch; see :class:`~adhesis.solver.method.Method`."""
+        """Follow the stable branch; see ``method.Method``."""
         control, amplitude = self.problem.control, self.wave.amplitude
         branch: Branch = "unloading"
         if prescribed <= self.problem.prescribed_in(state):
@@ -103,7 +103,7 @@ class ExactWave(Method):
                 states.append(self.detached(prescribed))
             if before.patches:
                 jump = Jump.between(before, after, branch, self.wave.period)
-                if control.is_load:  # the load's own work is not counted (adhesis.solver.control)
+                if control.is_load:  # the load's own work is not counted (model.control)
                     jump = replace(jump, energy_drop=before.energy / self.wave.period)
                 jumps.append(jump)
         else:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adhesis.solver.profile import Array, Profile
+from adhesis.solver.model.profile import Array, Profile
 
 
 def full_contact_stress(profile: Profile, modulus: float, x: ArrayLike) -> Array:

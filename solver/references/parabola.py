@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 def parabola_load(a: ArrayLike, radius: float, modulus: float, work_of_adhesion: float) -> Array:

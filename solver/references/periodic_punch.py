@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 def pull_off_stress(a: ArrayLike, period: float, modulus: float, work_of_adhesion: float) -> Array:

@@ -48,7 +48,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import ellipeinc
 
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 Measure = Literal["flat", "arc"]
 

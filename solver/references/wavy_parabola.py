@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import j0, j1
 
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
 """Method ``sharp``: real-valued contact edges, followed along branches and through jumps.
 
-Import :class:`adhesis.solver.sharp.method.SharpMethod`; the other modules are its parts.
+Import ``method.SharpMethod``; the other modules are its parts.
 """

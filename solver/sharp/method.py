@@ -1,10 +1,10 @@
 """Method ``sharp``: contact edges are real numbers; no grid in the mechanics.
 
-The elastic field of given edges is that of :mod:`adhesis.solver.sharp.field`. Along a stable branch
-(:mod:`adhesis.solver.sharp.follow`) the method steps in the separation with a tangent predictor and
-Newton's corrector; where the corrector finds no stable equilibrium within reach, the step is cut
-down to the wanted resolution of a jump, and the edges then descend in energy at fixed separation
-(:mod:`adhesis.solver.sharp.jump`).
+The elastic field of given edges is that of ``dense_solver``. Along a
+stable branch (``branch``) the method steps in the separation
+with a tangent predictor and Newton's corrector; where the corrector finds no stable equilibrium
+within reach, the step is cut down to the wanted resolution of a jump, and the edges then descend in
+energy at fixed separation (``jump``).
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from adhesis.solver.jumps import Branch
-from adhesis.solver.memory import keep_freed
 from adhesis.solver.method import (
     ContactState,
     Fields,
@@ -25,16 +23,18 @@ from adhesis.solver.method import (
     Path,
     PathError,
 )
-from adhesis.solver.one_thread import on_one_thread, one_at_a_time
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Profile
-from adhesis.solver.sharp.edges import CORRECTED, EdgeMechanics, FullContact, NoState
-from adhesis.solver.sharp.follow import Follower, Resolution, Target
-from adhesis.solver.sharp.jump import Jumps
-from adhesis.solver.sharp.output import fields_of, openings_of
-from adhesis.solver.sharp.source import StressSource
-from adhesis.solver.sharp.states import States, Trace, hold_of
-from adhesis.solver.sharp.touch import Nucleation
+from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Profile
+from adhesis.solver.runtime.malloc import keep_freed
+from adhesis.solver.runtime.threads import on_one_thread, one_at_a_time
+from adhesis.solver.sharp.continuation.branch import Follower, Resolution, Target
+from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics, FullContact, NoState
+from adhesis.solver.sharp.nucleation.nucleation import Nucleation
+from adhesis.solver.sharp.output.contact_states import States, Trace, hold_of
+from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 
 _RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
 _NOISE = 1e-13  # of h_max: no jump is located more finely
@@ -67,7 +67,7 @@ class SharpReport(MethodReport):
     jump_resolution : float
         Separation to which a jump is located, over h_max.
     fields, derivatives, energies, openings, newton_steps, descent_steps : int
-        See :class:`~adhesis.solver.sharp.counters.Counters`.
+        See ``counters.Counters``.
     """
 
     accuracy: float
@@ -106,7 +106,7 @@ class SharpMethod(Method):
         Wanted relative error of the loss: sets the accuracy of the field, the resolution of the
         separation of jumps and the density of the states.
     chosen : str, optional
-        See :class:`~adhesis.solver.method.Method`.
+        See ``method.Method``.
     """
 
     name = "sharp"

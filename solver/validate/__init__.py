@@ -1,5 +1,5 @@
 """The methods judged by the closed forms: claims of (quantity, error, bound).
 
-Import :func:`adhesis.solver.validate.claims.validate`; :mod:`adhesis.solver.validate.judge`
+Import ``claims.validate``; ``judge``
 measures the errors.
 """

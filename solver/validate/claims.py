@@ -1,6 +1,6 @@
 """The methods against the closed forms: :func:`validate` gives rows of (claim, error, bound).
 
-What is claimed, and why the bounds are what they are (:mod:`adhesis.solver.validate.judge` for the
+What is claimed, and why the bounds are what they are (``judge`` for the
 rest):
 
 *   losses: the promise of the method (grid: 0.5 % at no more than 4096 nodes; sharp: 1e-8);
@@ -24,11 +24,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.solver.control import Control
-from adhesis.solver.loop import run_loop
+from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.method import ContactState
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Array, Profile, self_affine_profile
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array, Profile, self_affine_profile
 from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
 from adhesis.solver.references.parabola import parabola_load, parabola_pull_off
 from adhesis.solver.references.periodic_punch import pull_off_stress

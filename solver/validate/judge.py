@@ -7,7 +7,7 @@ is off by e at the same s. Where a stress is compared at a *given* width, that w
 and Griffith's balance holds within e.
 
 The waves are so shallow (A q0 = 6e-6) that the flat and the arc measure of the adhesive area
-(:mod:`adhesis.solver.references.single_wave`) agree to 3e-11.
+(``single_wave``) agree to 3e-11.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver.loop import run_loop
-from adhesis.solver.loop_result import LoopResult
-from adhesis.solver.material import HalfSpace
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.method import Method
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import Array, single_wave
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array, single_wave
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import MethodName, make_method
 

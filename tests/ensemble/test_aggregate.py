@@ -20,7 +20,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import interval, interval_method, untransformed
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.task.fields import field_plan
-from adhesis.solver.jumps import JUMP_KINDS
+from adhesis.solver.model.jump import JUMP_KINDS
 from tests.support.synthetic_results import campaign, rows, sign, write
 
 E_STAR, Q0 = 1e6 / 0.75, 1000.0

@@ -25,7 +25,7 @@ from adhesis.ensemble.run.dispatch import (
 )
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
-from adhesis.solver import compiled as module
+from adhesis.solver.runtime import jit as module
 from tools.interrupted import Interrupt
 
 

@@ -14,7 +14,7 @@ from adhesis.ensemble import versions
 from adhesis.ensemble.doctor import examine as doctor
 from adhesis.ensemble.run import launch
 from adhesis.solver import code_cache, warm
-from adhesis.solver.code_cache import CodeFiles
+from adhesis.solver.runtime.disk_cache import CodeFiles
 
 
 def run_doctor(*options: str, **env: str) -> subprocess.CompletedProcess[str]:

@@ -14,7 +14,7 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.task.compute import make_problem, run_task
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import GAP_EDGES, HEIGHT_EDGES, FieldRecorder, field_plan
-from adhesis.solver.loop import run_loop
+from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.registry import make_method
 from tests.support.campaign_support import campaign_text
 from tests.support.fake_run import fake_result

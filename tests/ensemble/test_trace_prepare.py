@@ -10,7 +10,7 @@ import pytest
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.read import Trace
-from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.model.profile import self_affine_profile
 
 N, STEP = 1600, 1e-6
 X = STEP * np.arange(N)

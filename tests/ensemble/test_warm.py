@@ -12,9 +12,9 @@ import pytest
 from adhesis.ensemble import warm as ensemble_warm
 from adhesis.ensemble.command import warm as command
 from adhesis.solver import code_cache, warm
-from adhesis.solver import compiled as door
-from adhesis.solver.code_cache import CodeFiles
-from adhesis.solver.compiled import Compilation
+from adhesis.solver.runtime import jit as door
+from adhesis.solver.runtime.disk_cache import CodeFiles
+from adhesis.solver.runtime.jit import Compilation
 from tests.support.campaign_support import ROOT, campaign_text, environment, write_campaign
 from tests.support.launchers import MPIRUN
 
@@ -71,8 +71,8 @@ import numpy as np
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.trace.worker import Job, run
-from adhesis.solver.profile import self_affine_profile
-from adhesis.solver.warm import COMPILED_METHODS, compiled_in, warm, watch_compilation
+from adhesis.solver.model.profile import self_affine_profile
+from adhesis.solver.precompile import COMPILED_METHODS, compiled_in, warm, watch_compilation
 def kept():
     return {path.name for path in Path(os.environ["ADHESIS_CACHE"]).glob("*/*")}
 warm(method for method in COMPILED_METHODS if compiled_in(method) is None)

@@ -33,7 +33,7 @@ HDF5 = {
     "adhesis.ensemble.doctor.probe",
     "adhesis.ensemble.versions",
 }
-COMPILED = {"adhesis.solver.compiled"}
+COMPILED = {"adhesis.solver.runtime.jit"}
 FIGURES = {
     "adhesis.ensemble.loop.figure",
     "adhesis.ensemble.bench.figure",
@@ -62,27 +62,27 @@ NOT_IN_SOLVER = {
 }
 # The mechanics start no threads for their work: one module keeps the handlers of signals out of the
 # compiler, the other has locks against the threads of callers.
-THREADING = {"adhesis.solver.uninterrupted", "adhesis.solver.one_thread"}
+THREADING = {"adhesis.solver.runtime.uninterrupted", "adhesis.solver.runtime.threads"}
 # All that campaigns know of the mechanics.
 SOLVER_FOR_ENSEMBLE = {
     "adhesis.solver.checks",
-    "adhesis.solver.control",
-    "adhesis.solver.fields",
-    "adhesis.solver.jumps",
-    "adhesis.solver.loop",
-    "adhesis.solver.loop_result",
-    "adhesis.solver.material",
+    "adhesis.solver.model.control",
+    "adhesis.solver.observables",
+    "adhesis.solver.model.jump",
+    "adhesis.solver.loading.loop",
+    "adhesis.solver.loading.loop_result",
+    "adhesis.solver.model.half_space",
     "adhesis.solver.method",
-    "adhesis.solver.path",
-    "adhesis.solver.problem",
-    "adhesis.solver.profile",
+    "adhesis.solver.loading.path",
+    "adhesis.solver.model.problem",
+    "adhesis.solver.model.profile",
     "adhesis.solver.references.single_wave",
     "adhesis.solver.registry",
-    "adhesis.solver.trace",
-    "adhesis.solver.turns",
+    "adhesis.solver.model.measured_profile",
+    "adhesis.solver.loading.turning_points",
     "adhesis.solver.validate.claims",
     "adhesis.solver.values",
-    "adhesis.solver.warm",
+    "adhesis.solver.precompile",
 }
 
 
@@ -141,10 +141,11 @@ def circle(arrows: Mapping[str, set[str]]) -> list[str]:
 def test_the_statements_are_seen_wherever_they_stand(tmp_path: Path) -> None:
     path = tmp_path / "a.py"
     path.write_text(
-        "import numpy.linalg\nfrom typing import TYPE_CHECKING\nfrom adhesis.solver import loop\n"
+        "import numpy.linalg\nfrom typing import TYPE_CHECKING\n"
+        "from adhesis.solver.loading import loop\n"
         "if TYPE_CHECKING:\n    from h5py import File\ndef f():\n    import mpi4py.MPI as M\n"
     )
-    expected = {"numpy.linalg", "typing", "adhesis.solver.loop", "h5py", "mpi4py.MPI"}
+    expected = {"numpy.linalg", "typing", "adhesis.solver.loading.loop", "h5py", "mpi4py.MPI"}
     assert imported(path) == expected
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
     assert len(PATHS) > 80

@@ -49,7 +49,7 @@ from adhesis.ensemble.loop.record import loop_summary, path_summary
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.read import Trace
 from adhesis.solver.checks import Bounds, counted, plain, real, shown, whole
-from adhesis.solver.loop import check_cycle
+from adhesis.solver.loading.loop import check_cycle
 from adhesis.solver.method import MethodReport
 from adhesis.solver.references.exact_wave import ExactWave
 

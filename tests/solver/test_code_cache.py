@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from adhesis.solver import code_cache
-from adhesis.solver import compiled as module
-from adhesis.solver.code_cache import CodeFiles
+from adhesis.solver.runtime import disk_cache as code_cache
+from adhesis.solver.runtime import jit as module
+from adhesis.solver.runtime.disk_cache import CodeFiles
 
 # Two accounts beside the one of the tests; they need no name.
 MALLORY, ADMIN = 64_001, 64_002

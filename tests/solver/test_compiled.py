@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from adhesis.solver import code_cache
-from adhesis.solver import compiled as module
-from adhesis.solver.code_cache import CodeFiles, folder_name, kernel_modules
+from adhesis.solver.runtime import disk_cache as code_cache
+from adhesis.solver.runtime import jit as module
+from adhesis.solver.runtime.disk_cache import CodeFiles, folder_name, kernel_modules
 
-SOLVER = Path(module.__file__).resolve().parent
+SOLVER = Path(module.__file__).resolve().parent.parent
 
 
 def double(x):
@@ -72,7 +72,7 @@ def test_an_edit_of_a_kernel_gives_another_folder_wherever_it_lies(copy):
 
 def test_a_kernel_that_moves_gives_another_folder(copy):
     before = name_of(copy)
-    (copy / "sharp" / "box.py").rename(copy / "grid" / "box.py")
+    (copy / "grid" / "kernels.py").rename(copy / "sharp" / "kernels.py")
     assert name_of(copy) != before
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis.solver.control import Control
-from adhesis.solver.material import HalfSpace
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.references.single_wave import SingleWave
 
 WAVE = SingleWave.with_alpha(0.3, 1e-6, 1e-3, 1e6)

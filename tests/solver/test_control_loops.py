@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from adhesis import HalfSpace, Problem, make_method, run_loop, self_affine_profile, single_wave
-from adhesis.solver.control import Control
-from adhesis.solver.loop_result import LoopResult
+from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.method import PathError
-from adhesis.solver.profile import Profile
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.profile import Profile
 from adhesis.solver.references.single_wave import SingleWave
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3

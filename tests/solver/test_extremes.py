@@ -22,12 +22,12 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from adhesis.solver import one_thread
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.method import Method, PathError
-from adhesis.solver.one_thread import on_one_thread
 from adhesis.solver.references.exact_wave import ExactWave
-from adhesis.solver.sharp.edges import EdgeMechanics, NoState
+from adhesis.solver.runtime import threads as one_thread
+from adhesis.solver.runtime.threads import on_one_thread
+from adhesis.solver.sharp.mechanics import EdgeMechanics, NoState
 from adhesis.solver.sharp.method import SharpMethod
 
 WAVE = single_wave(1e-6, 1e-3)

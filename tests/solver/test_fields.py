@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from adhesis.solver.fields import gap_shares, spectral_density
-from adhesis.solver.loop import run_loop
-from adhesis.solver.material import HalfSpace
+from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.method import ContactState, Method, Opening
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import self_affine_profile, single_wave
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import self_affine_profile, single_wave
+from adhesis.solver.observables import gap_shares, spectral_density
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import make_method
 

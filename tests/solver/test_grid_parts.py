@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from adhesis import Problem, self_affine_profile, single_wave
-from adhesis.solver.control import Control
 from adhesis.solver.grid import relax
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import Contact, ContactSolver
@@ -18,6 +17,7 @@ from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.grid.moves import Move
 from adhesis.solver.grid.pairs import pairs
 from adhesis.solver.grid.path import Steps
+from adhesis.solver.model.control import Control
 from tests.support.scenes import HALF_SPACE
 
 PERIOD = 2e-3 * np.pi

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from adhesis import Control, run_loop
+from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.point import Point
 from tools.hostile import draw, independent_clearance, judge
 
 

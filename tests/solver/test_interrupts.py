@@ -19,17 +19,17 @@ from numba.core import boxing, pythonapi, serialize
 from numba.core.dispatcher import Dispatcher
 
 import adhesis.solver
-from adhesis.solver import compiled
-from adhesis.solver.loop import run_loop
-from adhesis.solver.material import HalfSpace
+from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.method import Method
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import self_affine_profile
+from adhesis.solver.precompile import COMPILED_METHODS, _small_loops, small_problem
 from adhesis.solver.registry import make_method
-from adhesis.solver.sharp.edges import Stage
-from adhesis.solver.sharp.solution import Hold
-from adhesis.solver.uninterrupted import uninterrupted
-from adhesis.solver.warm import COMPILED_METHODS, _small_loops, small_problem
+from adhesis.solver.runtime import jit as compiled
+from adhesis.solver.runtime.uninterrupted import uninterrupted
+from adhesis.solver.sharp.field.solution import Hold
+from adhesis.solver.sharp.mechanics import Stage
 from tools.interrupted import Interrupt, interrupted
 
 KERNELS = 20  # at least so many are called from Python

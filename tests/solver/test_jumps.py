@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis.solver.jumps import JUMP_KINDS, SMALL_SCALE, Jump, classify
+from adhesis.solver.model.jump import JUMP_KINDS, SMALL_SCALE, Jump, classify
 
 NONE = np.empty((0, 2))
 

@@ -7,12 +7,12 @@ import pytest
 
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.sharp.balance import imbalance, moved_gaps, tangent_of
-from adhesis.solver.sharp.coordinate import map_gaps
-from adhesis.solver.sharp.field import solve
-from adhesis.solver.sharp.kinetics import flow_step, hessian, leaving_step
+from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian, leaving_step
+from adhesis.solver.sharp.equilibrium.griffith import imbalance, moved_gaps, tangent_of
+from adhesis.solver.sharp.field.dense_solver import solve
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.rules import RULES, choose_kinds
 
 SOLID = HalfSpace(1e6, 0.5)
 PHASES = [

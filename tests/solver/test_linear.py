@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis.solver.sharp.linear import (
+from adhesis.solver.sharp.field.cholesky import (
     cholesky,
     factor_rows,
     is_definite,

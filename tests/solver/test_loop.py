@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from adhesis import ContactState, Control, HalfSpace, Path, Problem, run_loop, single_wave
-from adhesis.solver.jumps import Jump, classify
-from adhesis.solver.loop import check_cycle
-from adhesis.solver.loop_result import estimated_error
+from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.loading.loop_result import estimated_error
+from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import Fields, Method, MethodReport, Opening, PathError
-from adhesis.solver.profile import Profile
-from adhesis.solver.record import Record
+from adhesis.solver.model.jump import Jump, classify
+from adhesis.solver.model.profile import Profile
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.scenes import HALF_SPACE

@@ -7,12 +7,12 @@ import sys
 
 import pytest
 
-from adhesis.solver.memory import keep_freed
+from adhesis.solver.runtime.malloc import keep_freed
 
 WORK = """
 import resource
 import numpy as np
-from adhesis.solver.memory import keep_freed
+from adhesis.solver.runtime.malloc import keep_freed
 KEEP
 def faults():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt

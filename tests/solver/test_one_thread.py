@@ -6,10 +6,10 @@ import pytest
 from scipy.linalg import cython_lapack  # noqa: F401  # a library of its own
 from threadpoolctl import ThreadpoolController
 
-from adhesis.solver.loop import run_loop
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.precompile import small_problem
 from adhesis.solver.registry import make_method
-from adhesis.solver.sharp.edges import EdgeMechanics
-from adhesis.solver.warm import small_problem
+from adhesis.solver.sharp.mechanics import EdgeMechanics
 
 
 def threads() -> set[int]:

@@ -15,11 +15,11 @@ from adhesis import (
     run_path,
     self_affine_profile,
 )
+from adhesis.solver.loading.path_record import Axis
+from adhesis.solver.loading.turning_points import LoadingBranch
 from adhesis.solver.method import PathError
-from adhesis.solver.record import Axis
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.turns import LoadingBranch
 from tests.solver.test_control_loops import AMPLITUDE, PERIOD, single_wave, wave_of
 
 ROUGH = self_affine_profile(0.8, period=PERIOD, n0=3, ratio=8, seed=4, h_rms=1e-6)

@@ -15,7 +15,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp.box import running_step
+from adhesis.solver.sharp.descent.bound_constrained_step import running_step
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE
 

@@ -7,15 +7,15 @@ import pytest
 
 from adhesis import Problem, self_affine_profile, single_wave
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.sharp.along import forces_on
-from adhesis.solver.sharp.coordinate import map_gaps, theta_at
-from adhesis.solver.sharp.derivatives import derivatives
-from adhesis.solver.sharp.field import GapField, solve, solve_again
-from adhesis.solver.sharp.moments import gap_moments
-from adhesis.solver.sharp.opening import fine_opening, sum_modes, work_of_gaps
-from adhesis.solver.sharp.rules import RULES, choose_kinds
-from adhesis.solver.sharp.solution import FIXED, Hold
-from adhesis.solver.sharp.source import StressSource
+from adhesis.solver.sharp.field.dense_solver import GapField, solve, solve_again
+from adhesis.solver.sharp.field.edge_derivatives import derivatives
+from adhesis.solver.sharp.field.force_along_step import forces_on
+from adhesis.solver.sharp.field.opening_series import fine_opening, sum_modes, work_of_gaps
+from adhesis.solver.sharp.field.solution import FIXED, Hold
+from adhesis.solver.sharp.gap.chebyshev_moments import gap_moments
+from adhesis.solver.sharp.gap.conformal_map import map_gaps, theta_at
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.scenes import HALF_SPACE
 

@@ -8,25 +8,29 @@ import numpy as np
 import pytest
 
 from adhesis import HalfSpace, Problem, self_affine_profile
-from adhesis.solver.loop import run_loop
-from adhesis.solver.sharp.balance import imbalance, moved_gaps, symmetric, tangent_of
-from adhesis.solver.sharp.coordinate import map_gaps
-from adhesis.solver.sharp.derivatives import derivatives
-from adhesis.solver.sharp.edges import CORRECTED, EdgeMechanics
-from adhesis.solver.sharp.far import solve_many
-from adhesis.solver.sharp.field import solve_plain
-from adhesis.solver.sharp.gaps import with_patches
-from adhesis.solver.sharp.landing import landed
-from adhesis.solver.sharp.linear import is_definite
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.edge_elimination import (
+    newton_many,
+    newton_step,
+    yielding_gaps,
+)
+from adhesis.solver.sharp.equilibrium.griffith import imbalance, moved_gaps, symmetric, tangent_of
+from adhesis.solver.sharp.equilibrium.last_correction import landed
+from adhesis.solver.sharp.equilibrium.linear_exterior import known_about, open_window
+from adhesis.solver.sharp.equilibrium.window import Window
+from adhesis.solver.sharp.field.cholesky import is_definite
+from adhesis.solver.sharp.field.cluster_tree import plant
+from adhesis.solver.sharp.field.dense_solver import solve_plain
+from adhesis.solver.sharp.field.edge_derivatives import derivatives
+from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.solution import FIXED, Solution
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.ends import with_patches
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.nearby import Window
-from adhesis.solver.sharp.point import Point
-from adhesis.solver.sharp.rules import RULES, choose_kinds
-from adhesis.solver.sharp.solution import FIXED, Solution
-from adhesis.solver.sharp.source import StressSource
-from adhesis.solver.sharp.tree import plant
-from adhesis.solver.sharp.window import known_about, open_window
-from adhesis.solver.sharp.yielding import newton_many, newton_step, yielding_gaps
 from tests.support import next_to_a_fold
 
 

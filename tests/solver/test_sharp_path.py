@@ -16,8 +16,8 @@ from adhesis import (
 )
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp import follow
-from adhesis.solver.sharp.course import Course
+from adhesis.solver.sharp.continuation import branch as follow
+from adhesis.solver.sharp.continuation.predictor import Course
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.explicit_solution import explicit_openings
 

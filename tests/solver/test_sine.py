@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis.solver.sharp.opening import fast_size
-from adhesis.solver.sharp.sine import circle, sine_sums
+from adhesis.solver.sharp.field.opening_series import fast_size
+from adhesis.solver.sharp.gap.sine_transform import circle, sine_sums
 
 
 @pytest.mark.parametrize("count", [4, 8, 12, 20, 36, 60, 64, 96, 100, 108, 144, 240, 500])

@@ -6,8 +6,8 @@ import logging
 
 import pytest
 
-from adhesis.solver.compiled import Compilation
-from adhesis.solver.told import _Teller, hushed
+from adhesis.solver.runtime.compile_log import _Teller, hushed
+from adhesis.solver.runtime.jit import Compilation
 
 
 def compiling(seconds: float) -> None:

@@ -7,10 +7,10 @@ import pytest
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp.aim import Closing
-from adhesis.solver.sharp.bottom import bottoms
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.touch import Minima, Nucleation, Touch
+from adhesis.solver.sharp.nucleation.closing import Closing
+from adhesis.solver.sharp.nucleation.gap_minima import bottoms
+from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation, Touch
 from tests.support.scenes import HALF_SPACE
 
 AMPLITUDE, PERIOD = 1e-6, 1e-3

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesis.solver.profile import self_affine_profile
-from adhesis.solver.trace import (
+from adhesis.solver.model.measured_profile import (
     band_limited,
     form_shares,
     one_period,
@@ -14,6 +13,7 @@ from adhesis.solver.trace import (
     trace_spectrum,
     trusted_wavelength,
 )
+from adhesis.solver.model.profile import self_affine_profile
 
 N, STEP = 1200, 1e-6
 X = STEP * np.arange(N)

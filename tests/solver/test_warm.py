@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis.solver.control import Control
-from adhesis.solver.loop import run_loop
-from adhesis.solver.material import HalfSpace
-from adhesis.solver.problem import Problem
-from adhesis.solver.profile import self_affine_profile
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import self_affine_profile
+from adhesis.solver.precompile import small_problem, warm, watch_compilation
 from adhesis.solver.registry import make_method
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.warm import small_problem, warm, watch_compilation
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from adhesis.ensemble.command import run
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.run.session import Engine
 from adhesis.ensemble.task.compute import run_task
-from adhesis.solver.warm import watch_compilation
+from adhesis.solver.precompile import watch_compilation
 
 if __name__ == "__main__":
     log = Path(sys.argv[1])

@@ -15,7 +15,7 @@ from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.schema import LATER_DATASETS, axis_datasets, kept_rows
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import GAP_EDGES, field_plan
-from adhesis.solver.jumps import JUMP_KINDS
+from adhesis.solver.model.jump import JUMP_KINDS
 
 CAMPAIGN = """
 [profile]

@@ -49,9 +49,9 @@ LIMIT = 1200.0  # s after which a process is taken for hanging
 
 def make(method: str, work_of_adhesion: float, ratio: int) -> Any:
     """Return a method for the paper's profile, up to ``ratio`` times its longest wave."""
-    from adhesis.solver.material import HalfSpace
-    from adhesis.solver.problem import Problem
-    from adhesis.solver.profile import self_affine_profile
+    from adhesis.solver.model.half_space import HalfSpace
+    from adhesis.solver.model.problem import Problem
+    from adhesis.solver.model.profile import self_affine_profile
     from adhesis.solver.registry import make_method
 
     profile = self_affine_profile(
@@ -71,7 +71,7 @@ class Loops:
     """Stretches of one loop, each from a load step that is drawn, and loops from the beginning."""
 
     def __init__(self, method: str, work_of_adhesion: float, ratio: int) -> None:
-        from adhesis.solver.loop import run_loop
+        from adhesis.solver.loading.loop import run_loop
 
         self._run_loop = run_loop
         self.method = make(method, work_of_adhesion, ratio)
@@ -119,7 +119,7 @@ class First:
 
     def once(self, rng: np.random.Generator) -> str:
         """Interrupt once; then the loop runs to its end."""
-        from adhesis.solver.loop import run_loop
+        from adhesis.solver.loading.loop import run_loop
 
         def loop() -> str:
             found = run_loop(make("sharp", 0.04, 4), max_penetration=0.8, load_steps=4)
@@ -135,8 +135,8 @@ class Traces:
     def __init__(self, processes: int, longest: float) -> None:
         from adhesis.ensemble.trace.prepare import prepare_trace
         from adhesis.ensemble.trace.read import Trace
-        from adhesis.solver.material import HalfSpace
-        from adhesis.solver.profile import self_affine_profile
+        from adhesis.solver.model.half_space import HalfSpace
+        from adhesis.solver.model.profile import self_affine_profile
 
         profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=6, seed=2, h_rms=1e-6)
         x = np.linspace(0.0, 1e-3, 400, endpoint=False, dtype=np.float64)

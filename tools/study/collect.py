@@ -9,7 +9,7 @@ import numpy as np
 
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, axis_datasets
-from adhesis.solver.jumps import BRANCHES, JUMP_KINDS
+from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
 
 AXES = ("max_penetration", "max_stress", "ratio", "stiffness")
 NUMBERS = (

@@ -31,7 +31,7 @@ from adhesis.ensemble.report.figures.style import (
 )
 from adhesis.ensemble.report.findings import typical_cell
 from adhesis.solver.method import BRANCHES
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 _LEAST_DENSITY = 1e-6
 # Colour of a branch where both are drawn over the rigid profile.

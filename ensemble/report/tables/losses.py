@@ -22,7 +22,7 @@ from adhesis.ensemble.report.tables.table import (
     plain,
     signed_percent,
 )
-from adhesis.solver.profile import Array
+from adhesis.solver.model.profile import Array
 
 
 def losses(data: Aggregate) -> Table:

@@ -1,0 +1,4 @@
+"""Loading paths through contact states: loops, several turning points, any path; their results.
+
+Import from its modules.
+"""

@@ -1,0 +1,240 @@
+"""The loading path: one complete loading-unloading loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from time import process_time
+from typing import TypeVar
+
+from adhesis.solver.checks import (
+    FAR_DISPLACEMENT,
+    LOAD_STEPS,
+    MAX_PENETRATION,
+    MAX_STRESS,
+    function,
+    instance,
+    real,
+    whole,
+)
+from adhesis.solver.loading.loop_result import LoopResult, result_of
+from adhesis.solver.loading.path_record import Axis, Record
+from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.problem import Problem
+
+T = TypeVar("T")
+
+HOW_METHOD = "make_method(name, problem)"
+"""How to make a method, for whoever gives something else."""
+
+Progress = Callable[[Branch, float, ContactState], None]
+"""Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
+
+# After so many times the loading stroke, unloading skips load steps that are shorter than a share
+# of the control's natural range (h_max at fixed separation) or of the way since first touch; loops
+# of ordinary depth have detached long before.
+_STROKES_AT_STEP = 20
+_LONG_STEP = 0.02
+# Unloading is given up so many natural ranges below first touch. Contact detaches at about
+# sqrt(γ/energy of full contact) ranges, and no method accepts more than 1e12 of those energies.
+_FARTHEST = 1e7
+
+
+def check_cycle(
+    turning_point: float, load_steps: int, control: Control | None = None
+) -> tuple[float, int]:
+    """Check a cycle; return its turning point and load steps as float and int.
+
+    Raises
+    ------
+    ValueError
+        Unless the turning point is positive and finite and, at fixed separation, below 1, and
+        load_steps is a whole number from 1 to 100,000.
+    TypeError
+        If one of them is no number.
+    """
+    control = control or Control()
+    name, bounds = "max_penetration", FAR_DISPLACEMENT
+    if control.is_fixed:
+        bounds = MAX_PENETRATION
+    elif control.is_load:
+        name, bounds = "max_stress", MAX_STRESS
+    return real(name, turning_point, bounds), whole("load_steps", load_steps, LOAD_STEPS)
+
+
+def run_loop(
+    method: Method,
+    *,
+    max_penetration: float | None = None,
+    max_stress: float | None = None,
+    load_steps: int,
+    progress: Progress | None = None,
+    on_state: Callable[[Branch, ContactState], None] | None = None,
+) -> LoopResult:
+    """Load from first touch to the turning point, then unload until detached.
+
+    Parameters
+    ----------
+    method : Method
+    max_penetration : float
+        Δ~max = Δ/h_max, 0 < Δ~max < 1; where a stiffness holds the half-space u_tot/h_max.
+    max_stress : float
+        Under a load, instead: p̄ in Pa, positive.
+    load_steps : int
+        Equal steps of the loading branch; unloading goes on with the same step.
+    progress : callable, optional
+        See :data:`Progress`.
+    on_state : callable, optional
+        Called with every state of the path, in order (for fields at chosen penetrations).
+
+    Raises
+    ------
+    ValueError
+        If the cycle cannot be run (:func:`check_cycle`).
+    TypeError
+        If the method is no Method, or a value no number.
+    PathError
+        If the path cannot be followed, or the contact does not detach (:func:`unload`).
+
+    References
+    ----------
+    docs/theory.md, "3. The loop"
+    """
+    control = instance("method", method, Method, HOW_METHOD).problem.control
+    turning_point = turning_of(method.problem, max_penetration, max_stress)
+    turning_point, load_steps = check_cycle(turning_point, load_steps, control)
+    function("progress", progress)
+    function("on_state", on_state)
+    started = process_time()
+    record = Record(on_state)
+    axis = Axis(turning_point, load_steps)
+    state = method.detached(method.problem.profile.h_max)
+    record.visit("loading", False, state)
+    load = recorder(method, record, "loading", state, progress)
+    for i in range(load_steps + 1):
+        state = load(axis(i))
+    unload_recorded(method, record, state, axis, turning_point, progress)
+    return result_of(method, record, turning_point, load_steps, started)
+
+
+def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None) -> T:
+    """The turning point, or points, that belong to the control.
+
+    Raises
+    ------
+    ValueError
+        If the other one is given, or none.
+    """
+    wanted, other = ("max_penetration", max_penetration), ("max_stress", max_stress)
+    if problem.control.is_load:
+        wanted, other = other, wanted
+    if wanted[1] is None or other[1] is not None:
+        held = "a load" if problem.control.is_load else "a separation or a stiffness"
+        raise ValueError(f"a path under {held} turns at {wanted[0]}: give that, and no {other[0]}")
+    return wanted[1]
+
+
+def recorder(
+    method: Method,
+    record: Record,
+    branch: Branch,
+    state: ContactState,
+    progress: Progress | None,
+) -> Callable[[float], ContactState]:
+    """Return a function that follows one branch from ``state``, a load step a call.
+
+    It takes the place of a load step (Δ/h_max, u_tot/h_max or Pa), adds the states on the way to
+    the record, and returns the last one.
+    """
+
+    def step(drive: float) -> ContactState:
+        nonlocal state
+        state = record.extend(branch, method.follow(state, method.problem.prescribed(drive)))
+        if progress is not None:
+            progress(branch, drive, state)
+        return state
+
+    return step
+
+
+def unload_recorded(
+    method: Method,
+    record: Record,
+    state: ContactState,
+    axis: Axis,
+    turn: float,
+    progress: Progress | None,
+    marks: Sequence[float] = (),
+) -> None:
+    """Add the unloading branch of a loop to the record of its loading branch; see :func:`unload`.
+
+    The turning point belongs to both branches: its state starts the unloading curve.
+    """
+    record.visit("unloading", True, state)
+    step = recorder(method, record, "unloading", state, progress)
+    unload(method.problem, axis, turn, state, step, marks)
+
+
+def unload(
+    problem: Problem,
+    axis: Axis,
+    turn: float,
+    state: ContactState,
+    step: Callable[[float], ContactState],
+    marks: Sequence[float] = (),
+) -> None:
+    """Unload by load steps until contact is lost: the rule of all loops and paths.
+
+    Parameters
+    ----------
+    problem : Problem
+    axis : Axis
+    turn : float
+        Where unloading begins, on the axis or between two of its load steps.
+    state : ContactState
+        The state there.
+    step : callable
+        Follows the path to a place on the axis and returns the state there.
+    marks : sequence of float
+        Further places at which a step ends; those above ``turn`` are not passed. A load step within
+        rounding of one gives way to it.
+
+    Raises
+    ------
+    PathError
+        If the path cannot be followed, or contact lasts where no contact has ever lasted.
+    """
+    first = i = axis.above(turn)
+    stride = 1
+    ahead = sorted(mark for mark in marks if mark < turn)
+    unit = _natural_range(problem)
+    while state.patches:
+        i -= stride
+        end = axis(i)
+        if end < -_FARTHEST * unit:
+            raise PathError(
+                f"unloading does not end: surfaces are still in contact at "
+                f"{problem.place(problem.prescribed(end))}, {_FARTHEST:g} times further than the "
+                "profile's height alone would hold them; check the units of work_of_adhesion, "
+                "young and the heights, or try the other method"
+            )
+        if first - i >= _STROKES_AT_STEP * axis.load_steps:
+            wanted = _LONG_STEP * max(unit, -end) / (axis(i + 1) - end)
+            stride = max(1, min(2 * stride, int(wanted)))
+        stops = []
+        while ahead and ahead[-1] > end - axis.near:
+            stops.append(ahead.pop())
+        if not stops or stops[-1] > end + axis.near:
+            stops.append(end)
+        for drive in stops:
+            state = step(drive)
+            if not state.patches:
+                break
+
+
+def _natural_range(problem: Problem) -> float:
+    """Range of the prescribed quantity that the profile alone sets: 1 (in h_max), or Pa."""
+    if problem.control.is_load:
+        return problem.stress_scale
+    return 1.0 + problem.stress_scale / (problem.control.stiffness * problem.profile.h_max)

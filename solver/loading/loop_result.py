@@ -1,0 +1,366 @@
+"""What a loop gives: its curves, its losses and its energy audit.
+
+dU/ds = -λ p̄ at equilibrium, so over a closed loop the loop integral of the mean stress and the sum
+of the energy drops at the jumps are the same energy. They are computed independently of each other
+(stresses against energies), and their difference is the audit of the loop.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from time import process_time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.checks import choice, counted, reals
+from adhesis.solver.loading.path_record import Record
+from adhesis.solver.method import Method, MethodReport
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.jump import BRANCHES, Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.values import ByValue
+
+STEEP = 0.3
+"""Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
+
+# Where the method was asked for no accuracy, an audit residual or an error of the loss beyond this
+# share of the loss is said.
+_LARGE = 0.02
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopResult(ByValue):
+    """A complete loop; arrays have the shape (states,), in the order of the path.
+
+    Immutable; two loops are equal if all is that they hold but ``seconds`` and ``method``: the same
+    problem followed twice by one method gives equal loops.
+
+    Attributes
+    ----------
+    problem : Problem
+    turning_point : float
+        What was asked for at the turning point: Δ/h_max, u_tot/h_max where a stiffness holds the
+        half-space, p̄ in Pa under a load.
+    max_penetration : float
+        Δ/h_max at the turning point: as asked for, or where the control does not fix it, as found.
+    load_steps : int
+        Equal steps of the loading branch.
+    branch : array of str, shape (states,)
+        "loading" or "unloading".
+    load_step : bool array
+        True at the states on the uniform axis of load steps, False at those that the method added
+        in between (before and after jumps, and where the curve bends).
+    penetration : array
+        Δ/h_max.
+    separation : array
+        s in m.
+    mean_stress : array
+        p̄ in Pa, compression positive.
+    contact_fraction : array
+        A/A0.
+    patches : int array
+    elastic_energy, adhesion_energy : array
+        In J/m, per period.
+    jumps : tuple of Jump
+    loss : float
+        ∮ p̄ dΔ in J/m² of nominal area, over all states
+        (:func:`adhesis.solver.loading.path_record.integral`).
+    loss_dimensionless : float
+        W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
+    loss_from_drops : float
+        Sum of the energy drops at the jumps, in J/m².
+    loss_error : float
+        Estimated numerical error of the loss, in J/m² (docs/methods.md, "Error of the loss").
+    work_gained, work_spent : float
+        Work that is gained on loading and spent on unloading, in J/m² of nominal area: ∓∫ p̄ du_tot
+        along the branch. Their difference is the loss.
+    seconds : float
+        CPU time of this process, in s.
+    method : MethodReport
+        What the method says of itself (name, resolution, counters).
+
+    References
+    ----------
+    docs/theory.md, "3. The loop"
+    """
+
+    problem: Problem = field(repr=False)
+    turning_point: float
+    max_penetration: float
+    load_steps: int
+    branch: NDArray[np.str_]
+    load_step: NDArray[np.bool_]
+    penetration: Array
+    separation: Array
+    mean_stress: Array
+    contact_fraction: Array
+    patches: NDArray[np.int64]
+    elastic_energy: Array
+    adhesion_energy: Array
+    jumps: tuple[Jump, ...]
+    loss: float
+    loss_dimensionless: float
+    loss_from_drops: float
+    loss_error: float
+    work_gained: float
+    work_spent: float
+    seconds: float = field(compare=False)
+    method: MethodReport = field(compare=False)
+
+    def __repr__(self) -> str:
+        """Two lines: what was followed, and its loss; the first warnings are counted only."""
+        return (
+            f"LoopResult(turning_point={self.turning_point:g}, {self.load_steps} load steps, "
+            f"{len(self.separation)} states, method {self.method.name!r},\n"
+            f"  loss={self.loss:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
+            f"{counted(len(self.jumps), 'jump')}, {counted(len(self.warnings), 'warning')})"
+        )
+
+    @property
+    def energy(self) -> Array:
+        """U in J/m, per period, shape (states,)."""
+        return self.elastic_energy + self.adhesion_energy
+
+    @property
+    def audit_residual(self) -> float:
+        """(loop integral - sum of drops) / loop integral; 0 for a loop without loss.
+
+        Without adhesion there is no loss: the loop integral is only rounding, and counts as such in
+        ``loss_error``.
+        """
+        if self.problem.work_of_adhesion == 0:
+            return 0.0
+        return (self.loss - self.loss_from_drops) / self.loss if self.loss else 0.0
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what makes the loss doubtful; none for most loops."""
+        found = []
+        slope = float(np.sqrt(self.problem.profile.m2))
+        if slope > STEEP:
+            found.append(
+                f"the rms slope is {slope:.3g}: above {STEEP:g} linear elasticity itself is "
+                "doubtful, and with it the loss"
+            )
+        if self.problem.work_of_adhesion == 0:
+            return tuple(found)  # there is no loss to doubt
+        most = getattr(self.method, "accuracy", _LARGE)
+        if abs(self.audit_residual) > most:
+            found.append(
+                f"the audit residual, {self.audit_residual:.2g}, is larger than {most:g}, the "
+                "relative error allowed"
+            )
+        if self.loss_error > most * abs(self.loss):
+            found.append(
+                f"the numerical error of the loss, {self.loss_error:.2g} J/m² of {self.loss:.3g} "
+                f"J/m², is larger than {most:g} of it, the relative error allowed"
+            )
+        return tuple(found)
+
+    @property
+    def races(self) -> int:
+        """Number of jumps that another rule of descent would have ended elsewhere."""
+        return sum(jump.raced for jump in self.jumps)
+
+    @property
+    def energy_at_stake(self) -> float:
+        """Sum over the jumps of the energy that depends on the rule of descent, in J/m²."""
+        return float(sum(jump.at_stake for jump in self.jumps))
+
+    @property
+    def pull_off_penetration(self) -> float:
+        """Δ/h_max of the state that has lost all contact."""
+        return float(self.penetration[-1])
+
+    @property
+    def pull_off_stress(self) -> float:
+        """Largest mean tension on unloading, -min p̄, in Pa."""
+        return float(0.0 - self.mean_stress[self.branch == "unloading"].min())
+
+    @property
+    def largest_contact_fraction(self) -> float:
+        """Largest A/A0 on the loop."""
+        return float(self.contact_fraction.max())
+
+    @property
+    def effective_work_of_approach(self) -> float:
+        """Work gained per largest contact area, in J/m² of contact."""
+        return self.work_gained / self.largest_contact_fraction
+
+    @property
+    def effective_work_of_separation(self) -> float:
+        """Work spent per largest contact area, in J/m² of contact."""
+        return self.work_spent / self.largest_contact_fraction
+
+    def __str__(self) -> str:
+        """A few lines for a terminal: what was followed, its losses, jumps, pull-off, warnings."""
+        profile = self.problem.profile
+        kinds = Counter(jump.kind for jump in self.jumps)
+        several = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+        return "\n".join(
+            (
+                f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
+                f"period {profile.period:.4g} m",
+                f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
+                f"Δ/h_max up to {self.max_penetration:.4g} in {self.load_steps} load steps, "
+                f"method {self.method.name}",
+                f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
+                f"(W~ = {self.loss_dimensionless:.5g}); "
+                f"sum of drops {self.loss_from_drops:.5g} J/m²",
+                f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
+                f"pull-off   {self.pull_off_stress:.4g} Pa, "
+                f"out of contact at Δ/h_max = {self.pull_off_penetration:.4g}",
+                f"states     {len(self.separation)}, {self.seconds:.2g} s of CPU time",
+                *(f"WARNING    {text}" for text in self.warnings),
+            )
+        )
+
+    def on_axis(self, branch: Branch, values: Array) -> Array:
+        """Values of one branch at every load step, interpolated where unloading skips some.
+
+        Parameters
+        ----------
+        branch : {"loading", "unloading"}
+        values : array, shape (states,)
+
+        Returns
+        -------
+        array, shape (load steps from the branch's first state on the axis to its last,)
+
+        Raises
+        ------
+        ValueError
+            If the branch is unknown, or there are not as many values as states.
+        """
+        values = self._of_states(values)
+        chosen = self.states(branch, load_steps_only=True)
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        drive = -control.prescribed(self.separation[chosen], self.mean_stress[chosen])
+        unit = self.turning_point / self.load_steps * (1.0 if control.is_load else h_max)
+        place = np.abs(np.rint((drive - drive[0]) / unit)) if len(chosen) else np.empty(0)
+        if branch == "loading" or len(chosen) < 2 or place[-1] == len(chosen) - 1:
+            return values[chosen]
+        # under a load the last state lies where contact was lost, off the axis
+        return np.interp(np.arange(place[-1] + 1), place, values[chosen])
+
+    def at(self, branch: Branch, drives: Array, values: Array) -> Array:
+        """Values of one branch wherever it passes, straight lines between its states.
+
+        Parameters
+        ----------
+        branch : {"loading", "unloading"}
+        drives : array, shape (places,)
+            Δ/h_max at fixed separation, u_tot/h_max for a stiffness; Δ/h_max under a load too, as
+            its jumps there are lines.
+        values : array, shape (states,)
+
+        Returns
+        -------
+        array, shape (places,)
+            After a jump at the very place; 0 out of contact; NaN beyond the turning point.
+
+        Raises
+        ------
+        ValueError
+            If the branch is unknown, or there are not as many values as states.
+        """
+        values, drives = self._of_states(values), reals("drives", drives)
+        chosen = self.states(branch)
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        control = Control() if control.is_load else control
+        x = control.prescribed(self.separation[chosen], self.mean_stress[chosen])
+        wanted = h_max * (1.0 - drives)
+        sign = -1.0 if branch == "loading" else 1.0  # of the way that the branch goes
+        x, wanted = sign * x, sign * wanted
+        turn = x[-1] if branch == "loading" else x[0]
+        near = 1e-12 * h_max
+        beyond = wanted > turn + near if branch == "loading" else wanted < turn - near
+        left, right = (0.0, None) if branch == "loading" else (None, 0.0)
+        found = np.interp(wanted, x, values[chosen].astype(float), left, right)
+        return np.where(beyond, np.nan, found)
+
+    def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
+        """Indices of the states of one branch, optionally only those on the load-step axis.
+
+        Raises
+        ------
+        ValueError
+            If the branch is neither "loading" nor "unloading".
+        """
+        choice("branch", branch, BRANCHES)
+        chosen = self.branch == branch
+        return np.flatnonzero(chosen & self.load_step if load_steps_only else chosen)
+
+    def _of_states(self, values: Array) -> Array:
+        """Refuse values that are not one for each state."""
+        array = np.asarray(values)
+        if array.shape != self.separation.shape:
+            raise ValueError(
+                f"values have the shape {array.shape}: there must be one for each of the "
+                f"{len(self.separation)} states"
+            )
+        return array
+
+
+def result_of(
+    method: Method, record: Record, turning_point: float, load_steps: int, started: float
+) -> LoopResult:
+    """The loop of a record; ``started`` is the CPU time at which it was begun, in s."""
+    problem = method.problem
+    separation = record.column("separation")
+    loss = record.work(problem)
+    turn = record.branches.index("unloading")  # the turning point's state stands in both branches
+    gained = -record.slice(0, turn).work(problem)
+    max_penetration = turning_point
+    if not problem.control.is_fixed:
+        max_penetration = problem.penetration(separation[turn])
+    drops = float(sum(jump.energy_drop for jump in record.jumps))
+    return LoopResult(
+        problem=problem,
+        turning_point=turning_point,
+        max_penetration=max_penetration,
+        load_steps=load_steps,
+        branch=np.array(record.branches),
+        load_step=np.array(record.on_axis),
+        penetration=problem.penetration(separation),
+        separation=separation,
+        mean_stress=record.column("mean_stress"),
+        contact_fraction=record.column("contact_fraction"),
+        patches=record.column("patches").astype(np.int64),
+        elastic_energy=record.column("elastic_energy"),
+        adhesion_energy=record.column("adhesion_energy"),
+        jumps=tuple(record.jumps),
+        loss=loss,
+        loss_dimensionless=loss / problem.loss_scale,
+        loss_from_drops=drops,
+        loss_error=estimated_error(record, loss - drops, problem),
+        work_gained=gained,
+        work_spent=loss + gained,
+        seconds=process_time() - started,
+        method=method.report(),
+    )
+
+
+def estimated_error(record: Record, audited: float, problem: Problem) -> float:
+    """Estimated error of a path's loss in J/m².
+
+    The method's own, or failing that a part in a hundred of the drops; what the audit sees,
+    ``audited``; and drops that came out negative, as far as they did: nothing jumps upwards.
+
+    Parameters
+    ----------
+    record : Record
+    audited : float
+        Difference of the work and the sum of the drops, in J/m².
+    problem : Problem
+    """
+    # Under a load the last drop is U, and may be negative (adhesis.solver.model.control).
+    counted = [j for j in record.jumps if not (problem.control.is_load and j.kind == "pull-off")]
+    own = record.error
+    if not np.isfinite(own):
+        own = 0.01 * abs(sum(jump.energy_drop for jump in record.jumps))
+    negative = sum(max(0.0, -jump.energy_drop) for jump in counted)
+    return float(own + abs(audited) + negative)

@@ -1,0 +1,417 @@
+"""Any loading path: legs in any order, and the loops that they close on the way.
+
+A path starts at first touch, goes from one turning point to the next, loading and unloading in
+turn, and ends at the last one or out of contact. Where a leg comes back to the turning point at
+which the leg before it began, it has closed a minor loop. Whether the state is then the one that
+was left (return-point memory) is not assumed: it is measured, and every part is audited,
+
+    -∫ Y dx = ΔW/λ + sum of the drops,
+
+with ΔW the change of the potential from its begin to its end (:mod:`adhesis.solver.model.control`),
+0 for a part that closes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from time import process_time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.checks import counted, finite_row, flag, function, instance
+from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, unload
+from adhesis.solver.loading.loop_result import estimated_error
+from adhesis.solver.loading.path_record import Axis, Record
+from adhesis.solver.method import ContactState, Method, MethodReport, PathError
+from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.values import ByValue
+
+_SHOWN = 6  # turning points of a path in its repr
+_SAME = 1e-6  # states whose stress and contact differ by less (of what they went through) are one
+
+
+@dataclass(frozen=True)
+class MinorLoop:
+    """A part of a path that leaves a turning point and comes back to it.
+
+    Attributes
+    ----------
+    start, turn : float
+        The turning point that is left and come back to, and the one between: Δ/h_max, u_tot/h_max
+        or Pa, as in :attr:`PathResult.turning_points`.
+    branch : {"loading", "unloading"}
+        On which it is left.
+    loss : float
+        Work done on the way, -∫ Y dx, in J/m² of nominal area.
+    loss_from_drops : float
+        Sum of the energy drops at its jumps, in J/m².
+    energy_change : float
+        (W at its end - W at its begin) per nominal area, in J/m²: 0 if the state comes back.
+    stress_change : float
+        p̄ at its end less that at its begin, in Pa.
+    contact_change : float
+        A/A0 at its end less that at its begin.
+    closes : bool
+        Whether it ends in the state in which it began: stress and contact agree to a millionth of
+        what they went through on the way.
+
+    References
+    ----------
+    docs/theory.md, "8. Paths and controls"
+    """
+
+    start: float
+    turn: float
+    branch: Branch
+    loss: float
+    loss_from_drops: float
+    energy_change: float
+    stress_change: float
+    contact_change: float
+    closes: bool
+
+    @property
+    def audit_residual(self) -> float:
+        """Work less change of energy and drops, in J/m²."""
+        return self.loss - self.energy_change - self.loss_from_drops
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PathResult(ByValue):
+    """A path of several legs; arrays have the shape (states,), in the order of the path.
+
+    Immutable; two paths are equal if all is that they hold but ``seconds`` and ``method``.
+
+    Attributes
+    ----------
+    problem : Problem
+    turning_points : tuple of float
+        Ends of the legs: Δ/h_max, u_tot/h_max where a stiffness holds the half-space, p̄ in Pa under
+        a load. A path that ends out of contact has one leg more.
+    load_steps : int
+        Equal steps up to the largest turning point.
+    leg : int array
+        Number of the leg, from 0.
+    branch : array of str
+        "loading" or "unloading".
+    load_step : bool array
+        True at load steps and at turning points.
+    penetration, separation, mean_stress, contact_fraction : array
+        Δ/h_max, s in m, p̄ in Pa, A/A0.
+    patches : int array
+    elastic_energy, adhesion_energy, potential : array
+        In J/m, per period; the potential is W of :mod:`adhesis.solver.model.control`.
+    jumps : tuple of Jump
+    jump_leg : int array, shape (jumps,)
+    minor_loops : tuple of MinorLoop
+        In the order in which they end.
+    work : float
+        -∫ Y dx over the whole path, in J/m² of nominal area: the loss if it ends out of contact.
+    loss_from_drops : float
+        Sum of all energy drops, in J/m².
+    energy_change : float
+        (W at the end - W at the begin) per nominal area, in J/m²; 0 for a path that ends out of
+        contact.
+    loss_error : float
+        Estimated numerical error of the work, in J/m².
+    seconds : float
+        CPU time of this process, in s.
+    method : MethodReport
+
+    References
+    ----------
+    docs/theory.md, "8. Paths and controls"
+    """
+
+    problem: Problem = field(repr=False)
+    turning_points: tuple[float, ...]
+    load_steps: int
+    leg: NDArray[np.int64]
+    branch: NDArray[np.str_]
+    load_step: NDArray[np.bool_]
+    penetration: Array
+    separation: Array
+    mean_stress: Array
+    contact_fraction: Array
+    patches: NDArray[np.int64]
+    elastic_energy: Array
+    adhesion_energy: Array
+    potential: Array
+    jumps: tuple[Jump, ...]
+    jump_leg: NDArray[np.int64]
+    minor_loops: tuple[MinorLoop, ...]
+    work: float
+    loss_from_drops: float
+    energy_change: float
+    loss_error: float
+    seconds: float = field(compare=False)
+    method: MethodReport = field(compare=False)
+
+    def __repr__(self) -> str:
+        """Two lines: what was followed, and its work."""
+        points = ", ".join(f"{point:g}" for point in self.turning_points[:_SHOWN])
+        points += ", …" if len(self.turning_points) > _SHOWN else ""
+        return (
+            f"PathResult({points}{', out' if self.ends_out else ''}; {self.load_steps} load steps, "
+            f"{len(self.separation)} states, method {self.method.name!r},\n"
+            f"  work={self.work:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
+            f"{counted(len(self.jumps), 'jump')}, "
+            f"{counted(len(self.minor_loops), 'minor loop')})"
+        )
+
+    @property
+    def energy(self) -> Array:
+        """U in J/m, per period, shape (states,)."""
+        return self.elastic_energy + self.adhesion_energy
+
+    @property
+    def ends_out(self) -> bool:
+        """Whether the path ends out of contact."""
+        return bool(self.patches[-1] == 0)
+
+    @property
+    def audit_residual(self) -> float:
+        """(work - change of energy - sum of drops) / largest of their sizes; 0 without any.
+
+        Without adhesion a path that ends out of contact has none: its work is only rounding.
+        """
+        if self.problem.work_of_adhesion == 0 and self.ends_out:
+            return 0.0
+        scale = max(abs(self.work), abs(self.energy_change), self.loss_from_drops)
+        rest = self.work - self.energy_change - self.loss_from_drops
+        return rest / scale if scale else 0.0
+
+
+def check_path(
+    turning_points: Sequence[float], load_steps: int, problem: Problem
+) -> tuple[float, ...]:
+    """Refuse a path that cannot be followed; returns its turning points.
+
+    Raises
+    ------
+    ValueError
+        Unless it starts with loading and turns at every point, and the largest turning point could
+        be that of a loop (:func:`adhesis.solver.loading.loop.check_cycle`).
+    TypeError
+        If one of them, or load_steps, is no number.
+    """
+    found = finite_row("turning_points", turning_points, entry="turning point")
+    points: tuple[float, ...] = tuple(found.tolist())
+    if not points:
+        raise ValueError("a path needs at least one turning point")
+    if points[0] <= 0:
+        raise ValueError(
+            f"the path starts with {points[0]:g}: it must start with loading, to a turning point "
+            "above 0"
+        )
+    for i in range(1, len(points)):
+        falls = points[i] < points[i - 1]
+        if falls != (i % 2 == 1) or points[i] == points[i - 1]:
+            raise ValueError(
+                f"the path goes from {points[i - 1]:g} to {points[i]:g}: after "
+                f"{'loading it must unload' if i % 2 else 'unloading it must load'}"
+            )
+    check_cycle(max(points), load_steps, problem.control)
+    return points
+
+
+def run_path(
+    method: Method,
+    turning_points: Sequence[float],
+    *,
+    load_steps: int,
+    out: bool = True,
+    progress: Progress | None = None,
+    on_state: Callable[[Branch, ContactState], None] | None = None,
+) -> PathResult:
+    """Follow a path from first touch through the turning points, and out of contact.
+
+    Parameters
+    ----------
+    method : Method
+    turning_points : sequence of float, shape (legs,)
+        Ends of the legs, loading first: Δ/h_max, u_tot/h_max where a stiffness holds the
+        half-space, p̄ in Pa under a load (:mod:`adhesis.solver.model.control`).
+    load_steps : int
+        Equal steps up to the largest turning point; every leg has them.
+    out : bool
+        Whether the path goes on until contact is lost. Not after a last leg of unloading, which
+        then simply goes on: its turning point is one no more.
+    progress, on_state : callable, optional
+        As in :func:`adhesis.solver.loading.loop.run_loop`.
+
+    Raises
+    ------
+    ValueError
+        If the path cannot be followed (:func:`check_path`).
+    TypeError
+        If the method is no Method, or a value no number.
+    PathError
+        If there are no states to follow, or contact is lost before the path has ended.
+
+    References
+    ----------
+    docs/theory.md, "8. Paths and controls"
+    """
+    instance("method", method, Method, HOW_METHOD)
+    points = check_path(turning_points, load_steps, method.problem)
+    load_steps = int(load_steps)
+    function("progress", progress)
+    function("on_state", on_state)
+    if flag("out", out) and len(points) % 2 == 0:
+        raise ValueError(
+            f"the path ends with unloading to {points[-1]:g} and goes out: leave that turning "
+            "point away"
+        )
+    started = process_time()
+    walk = _Walk(method, Axis(max(points), load_steps), Record(on_state), progress)
+    for point in points:
+        walk.to(point)
+    if out:
+        walk.out()
+    return walk.result(points, load_steps, started)
+
+
+@dataclass
+class _Turn:
+    """A turning point that a later leg may come back to: its drive, and its state's number."""
+
+    drive: float
+    state: int
+
+
+class _Walk:
+    """A path while it is followed."""
+
+    def __init__(
+        self, method: Method, axis: Axis, record: Record, progress: Progress | None
+    ) -> None:
+        self.method, self.problem = method, method.problem
+        self.axis, self.record, self.progress = axis, record, progress
+        self.legs: list[int] = []  # of the states
+        self.jump_legs: list[int] = []
+        self.jump_steps: list[int] = []  # number of states before the load step of each jump
+        self.minor: list[MinorLoop] = []
+        self.open: list[_Turn] = []
+        self.leg = -1
+        self.drive = 0.0
+        self.state = method.detached(method.problem.profile.h_max)
+
+    def to(self, point: float) -> None:
+        """Follow one leg."""
+        branch: Branch = "loading" if point > self.drive or self.leg < 0 else "unloading"
+        self._begin(branch)
+        marks = [turn.drive for turn in self.open]
+        drives = self.axis.between(self.drive, point, marks)
+        for drive in drives[1:] if self.leg else drives:  # the first leg begins with first touch
+            self._step(branch, drive)
+            if not self.state.patches and self.leg > 0:
+                unit = "Pa" if self.problem.control.is_load else "h_max"
+                raise PathError(
+                    f"contact is lost on the way to {point:g} {unit}, at "
+                    f"{self.problem.place(self.problem.prescribed(drive))}, before the path has "
+                    "ended: let it turn where contact lasts, or end there with out"
+                )
+        self.drive = point
+
+    def out(self) -> None:
+        """Unload until contact is lost, as a loop does."""
+        self._begin("unloading")
+        marks = [turn.drive for turn in self.open[:-1]]
+        unload(
+            self.problem,
+            self.axis,
+            self.drive,
+            self.state,
+            lambda drive: self._step("unloading", drive),
+            marks,
+        )
+
+    def _begin(self, branch: Branch) -> None:
+        """The turning point belongs to both legs: it starts the next one."""
+        self.leg += 1
+        if self.record.states:
+            self.open.append(_Turn(self.drive, len(self.record.states)))
+        self.record.visit(branch, self.leg > 0, self.state)
+        self.legs.append(self.leg)
+
+    def _step(self, branch: Branch, drive: float) -> ContactState:
+        path = self.method.follow(self.state, self.problem.prescribed(drive))
+        self.jump_steps += [len(self.record.states)] * len(path.jumps)
+        self.jump_legs += [self.leg] * len(path.jumps)
+        self.state = self.record.extend(branch, path)
+        self.legs += [self.leg] * len(path.states)
+        if self.progress is not None:
+            self.progress(branch, drive, self.state)
+        while len(self.open) > 1 and drive == self.open[-2].drive:
+            self._close(self.open[-2], self.open[-1])
+            del self.open[-2:]
+        return self.state
+
+    def _close(self, start: _Turn, turn: _Turn) -> None:
+        """Take down the minor loop from ``start`` over ``turn`` to the last state."""
+        record, period = self.record, self.problem.profile.period
+        part = record.slice(start.state)
+        begin, end = part.states[0], part.states[-1]
+        drops = sum(
+            jump.energy_drop
+            for jump, step in zip(record.jumps, self.jump_steps, strict=True)
+            if step > start.state
+        )
+        stress, contact = part.column("mean_stress"), part.column("contact_fraction")
+        stress_change = float(stress[-1] - stress[0])
+        contact_change = float(contact[-1] - contact[0])
+        self.minor.append(
+            MinorLoop(
+                start=start.drive,
+                turn=turn.drive,
+                branch="loading" if turn.drive > start.drive else "unloading",
+                loss=part.work(self.problem),
+                loss_from_drops=float(drops),
+                energy_change=(end.potential - begin.potential) / period,
+                stress_change=stress_change,
+                contact_change=contact_change,
+                closes=bool(
+                    abs(stress_change) <= _SAME * np.ptp(stress)
+                    and abs(contact_change) <= _SAME * np.ptp(contact)
+                ),
+            )
+        )
+
+    def result(self, points: tuple[float, ...], load_steps: int, started: float) -> PathResult:
+        """The path that has been followed."""
+        record, problem = self.record, self.problem
+        work = record.work(problem)
+        drops = float(sum(jump.energy_drop for jump in record.jumps))
+        states = record.states
+        change = (states[-1].potential - states[0].potential) / problem.profile.period
+        separation = record.column("separation")
+        return PathResult(
+            problem=problem,
+            turning_points=points,
+            load_steps=load_steps,
+            leg=np.array(self.legs),
+            branch=np.array(record.branches),
+            load_step=np.array(record.on_axis),
+            penetration=problem.penetration(separation),
+            separation=separation,
+            mean_stress=record.column("mean_stress"),
+            contact_fraction=record.column("contact_fraction"),
+            patches=record.column("patches").astype(np.int64),
+            elastic_energy=record.column("elastic_energy"),
+            adhesion_energy=record.column("adhesion_energy"),
+            potential=record.column("potential"),
+            jumps=tuple(record.jumps),
+            jump_leg=np.array(self.jump_legs, dtype=np.int64),
+            minor_loops=tuple(self.minor),
+            work=work,
+            loss_from_drops=drops,
+            energy_change=change,
+            loss_error=estimated_error(record, work - change - drops, problem),
+            seconds=process_time() - started,
+            method=self.method.report(),
+        )

@@ -1,0 +1,159 @@
+"""What a path has passed: its states in order, its jumps, and the work done on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from adhesis.solver.method import ContactState, Path, PathError
+from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+
+_NEAR = 1e-9  # load steps closer than this share of one are the same
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Load steps as multiples of a step: ``load_steps`` of them make ``top``."""
+
+    top: float
+    load_steps: int
+
+    def __call__(self, index: int) -> float:
+        """Return the place of a load step; of the last one ``top`` itself, without rounding."""
+        return self.top if index == self.load_steps else self.top * index / self.load_steps
+
+    @property
+    def near(self) -> float:
+        """Distance within which two places are one."""
+        return _NEAR * self.top / self.load_steps
+
+    def above(self, drive: float) -> int:
+        """Number of the first load step at or above ``drive``."""
+        return math.ceil(drive * self.load_steps / self.top - _NEAR)
+
+    def apart(self, places: Sequence[float], others: Sequence[float] = ()) -> list[float]:
+        """Those of the places that are no load step, none of the others, and differ."""
+        found: list[float] = []
+        for place in sorted(places):
+            step = self(round(place * self.load_steps / self.top))
+            if all(abs(place - other) > self.near for other in (step, *others, *found[-1:])):
+                found.append(place)
+        return found
+
+    def between(self, start: float, end: float, marks: Sequence[float] = ()) -> list[float]:
+        """Load steps of a leg from ``start`` to ``end``, both included, and the marks on the way.
+
+        A load step within rounding of a mark or an end gives way to it.
+        """
+        low, high = min(start, end), max(start, end)
+        kept = sorted({low, high, *(m for m in marks if low < m < high)})
+        grid = (self(k) for k in range(self.above(low), self.above(high)))
+        way = sorted([*kept, *(p for p in grid if min(abs(p - k) for k in kept) > self.near)])
+        return way if start <= end else way[::-1]
+
+
+@dataclass
+class Record:
+    """The states of a path in order, each with its branch, and the jumps between them.
+
+    Parameters
+    ----------
+    on_state : callable, optional
+        Called with every state of the path, in order.
+    """
+
+    on_state: Callable[[Branch, ContactState], None] | None = None
+    branches: list[Branch] = field(default_factory=list)
+    on_axis: list[bool] = field(default_factory=list)
+    states: list[ContactState] = field(default_factory=list)
+    jumps: list[Jump] = field(default_factory=list)
+    error: float = 0.0
+    """Sum of what the method knows of its own error, in J/m²; NaN if it does not know."""
+
+    def visit(self, branch: Branch, on_axis: bool, state: ContactState) -> None:
+        """Take down one state; ``on_axis`` if it ends a load step."""
+        self.branches.append(branch)
+        self.on_axis.append(on_axis)
+        self.states.append(state)
+        if self.on_state is not None:
+            self.on_state(branch, state)
+
+    def extend(self, branch: Branch, path: Path) -> ContactState:
+        """Take down one load step, whose last state lies on the axis; return that state."""
+        for passed in path.states[:-1]:
+            self.visit(branch, False, passed)
+        self.visit(branch, True, path.states[-1])
+        self.jumps += path.jumps
+        self.error += path.error
+        return path.states[-1]
+
+    def column(self, name: str) -> Array:
+        """One attribute of every state, shape (states,)."""
+        return np.array([getattr(state, name) for state in self.states])
+
+    def slice(self, first: int, stop: int | None = None) -> Record:
+        """The states numbered from ``first``, to the end or below ``stop``, without jumps."""
+        part = slice(first, stop)
+        return Record(
+            branches=self.branches[part],
+            on_axis=self.on_axis[part],
+            states=self.states[part],
+        )
+
+    def copy(self) -> Record:
+        """A record that goes on from the same states and jumps."""
+        return Record(
+            self.on_state,
+            list(self.branches),
+            list(self.on_axis),
+            list(self.states),
+            list(self.jumps),
+            self.error,
+        )
+
+    def work(self, problem: Problem) -> float:
+        """Work of the driving device, -∫ Y dx over the states, in J/m².
+
+        x and Y are those of :mod:`adhesis.solver.model.control`.
+
+        Raises
+        ------
+        PathError
+            If a state without contact lies below s = h_max, where surfaces overlap. Without
+            adhesion patches narrower than a method resolves are left out, and overlap so much.
+        """
+        control, h_max = problem.control, problem.profile.h_max
+        separation, mean_stress = self.column("separation"), self.column("mean_stress")
+        free = separation[self.column("patches") == 0]
+        held = not control.is_load and problem.work_of_adhesion > 0
+        if held and free.min(initial=np.inf) < h_max * (1 - _NEAR):
+            raise PathError(
+                f"the path is without contact at s = {free.min() / h_max:.9g} h_max "
+                f"({free.min():.9g} m), where surfaces overlap: there is no such state"
+            )
+        return -integral(
+            control.prescribed(separation, mean_stress),
+            control.conjugate(separation, mean_stress, h_max),
+            self.column("stiffness"),
+        )
+
+
+def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:
+    """∫ Y dx over the states, in J/m²: trapezoidal rule, end-corrected where dY/dx is known.
+
+    At fixed separation that is ∫ p̄ ds. The correction h²/12 (Y'_0 - Y'_1) raises the order from two
+    to four on smooth pieces; it is left out where a stiffness is NaN.
+
+    Parameters
+    ----------
+    prescribed, conjugate, stiffness : array, shape (states,)
+        x, Y and dY/dx (:mod:`adhesis.solver.model.control`; m, Pa and Pa/m, or Pa, m and m/Pa), in
+        the order of the path.
+    """
+    bend = -np.diff(stiffness) * np.diff(prescribed) ** 2 / 12
+    return float(np.trapezoid(conjugate, prescribed)) + float(np.nansum(bend))

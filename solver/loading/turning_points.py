@@ -1,0 +1,204 @@
+"""Loops that share one loading branch: it is followed once, and left at every turning point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from time import process_time
+
+from adhesis.solver.checks import function, instance, row
+from adhesis.solver.loading.loop import (
+    HOW_METHOD,
+    Progress,
+    check_cycle,
+    turning_of,
+    unload_recorded,
+)
+from adhesis.solver.loading.loop_result import LoopResult, result_of
+from adhesis.solver.loading.path_record import Axis, Record
+from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.model.jump import Branch
+
+
+class LoadingBranch:
+    """A loading branch that is followed as far as it is asked for, and left at its turning points.
+
+    What a loop that leaves it becomes depends on the turning points and marks of the branch, and
+    neither on which of them are asked for nor on what was computed before.
+
+    Parameters
+    ----------
+    method : Method
+    turning_points : sequence of float, shape (loops,)
+        Different ones: Δ/h_max or u_tot/h_max, or p̄ in Pa under a load.
+    load_steps : int
+        Equal steps up to the largest turning point; every unloading branch goes on with that step.
+    marks : sequence of float
+        Further places at which a step of the loading branch ends.
+
+    Raises
+    ------
+    ValueError
+        If a cycle cannot be run (:func:`adhesis.solver.loading.loop.check_cycle`), or a turning
+        point is given twice, or none.
+    TypeError
+        If the method is no Method, or a value no number.
+
+    References
+    ----------
+    docs/theory.md, "8. Paths and controls"
+    """
+
+    def __init__(
+        self,
+        method: Method,
+        turning_points: Sequence[float],
+        *,
+        load_steps: int,
+        marks: Sequence[float] = (),
+    ) -> None:
+        instance("method", method, Method, HOW_METHOD)
+        points = row("turning points", turning_points, entry="turning point").tolist()
+        turns = sorted(points)
+        if not turns or len(set(turns)) < len(turns):
+            raise ValueError(f"turning points are {points}: there must be some, all different")
+        for turn in turns:
+            _, load_steps = check_cycle(turn, load_steps, method.problem.control)
+        self.method = method
+        self._axis = Axis(turns[-1], load_steps)
+        further = self._axis.apart(marks, turns)
+        self._drives = self._axis.between(0.0, turns[-1], [*turns, *further])
+        self._turns = frozenset(turns)
+        self._passed = 0  # drives
+        self._record = Record()
+        self._state = method.detached(method.problem.profile.h_max)
+        self._record.visit("loading", False, self._state)
+        self._seconds = 0.0
+        self._error: PathError | None = None
+
+    def to(self, turn: float, progress: Progress | None = None) -> None:
+        """Follow it to a turning point, unless it has come as far.
+
+        Raises
+        ------
+        ValueError
+            If that is none of its turning points.
+        PathError
+            If it cannot be followed so far; also when it is asked to again.
+        """
+        if turn not in self._turns:
+            raise ValueError(f"{turn!r} is not a turning point of this loading branch")
+        started = process_time()
+        problem = self.method.problem
+        while self._passed < len(self._drives) and self._drives[self._passed] <= turn:
+            if self._error is not None:
+                raise self._error
+            drive = self._drives[self._passed]
+            try:
+                path = self.method.follow(self._state, problem.prescribed(drive))
+            except PathError as error:
+                self._error = error
+                raise
+            if progress is not None:
+                progress("loading", drive, path.states[-1])
+            self._state = self._record.extend("loading", path)
+            self._passed += 1
+        self._seconds += process_time() - started
+
+    def loop(
+        self,
+        turn: float,
+        *,
+        marks: Sequence[float] = (),
+        progress: Progress | None = None,
+        on_state: Callable[[Branch, ContactState], None] | None = None,
+    ) -> LoopResult:
+        """Follow it to a turning point that it has not passed, and unload from there.
+
+        Parameters
+        ----------
+        turn : float
+        marks : sequence of float
+            Further places at which a step of the unloading branch ends.
+        progress : callable, optional
+            See :data:`adhesis.solver.loading.loop.Progress`.
+        on_state : callable, optional
+            Called with every state of the loop, in order, those of the loading branch too.
+
+        Returns
+        -------
+        LoopResult
+            ``load_steps`` counts those of its own loading branch, and ``seconds`` holds that branch
+            up to the turning point and the unloading from there.
+
+        Raises
+        ------
+        ValueError
+            If that is none of its turning points, or one that it has passed.
+        PathError
+            As in :func:`adhesis.solver.loading.loop.run_loop`.
+        """
+        self.to(turn, progress)
+        if self._drives[self._passed - 1] != turn:
+            raise ValueError(f"this loading branch has passed {turn!r}")
+        started = process_time() - self._seconds
+        record = self._record.copy()
+        record.on_state = on_state
+        if on_state is not None:
+            for branch, state in zip(record.branches, record.states, strict=True):
+                on_state(branch, state)
+        axis = self._axis
+        apart = axis.apart(marks)
+        unload_recorded(self.method, record, self._state, axis, turn, progress, apart)
+        return result_of(self.method, record, turn, self._passed - 1, started)
+
+
+def run_loops(
+    method: Method,
+    *,
+    max_penetration: Sequence[float] | None = None,
+    max_stress: Sequence[float] | None = None,
+    load_steps: int,
+    progress: Progress | None = None,
+) -> tuple[LoopResult, ...]:
+    """Run loops that share one loading branch, followed once and left at every turning point.
+
+    Parameters
+    ----------
+    method : Method
+    max_penetration, max_stress : sequence of float, shape (loops,)
+        The turning points, different ones: Δ/h_max or u_tot/h_max, or Pa under a load. Any iterable
+        of numbers will do.
+    load_steps : int
+        Equal steps up to the largest turning point; every unloading branch goes on with that step.
+    progress : callable, optional
+        See :data:`adhesis.solver.loading.loop.Progress`.
+
+    Returns
+    -------
+    tuple of LoopResult
+        One a turning point, in the order in which they were given. ``load_steps`` counts those of
+        its own loading branch, and ``seconds`` holds that branch up to the turning point and the
+        unloading from there.
+
+    Raises
+    ------
+    ValueError
+        If a cycle cannot be run (:func:`adhesis.solver.loading.loop.check_cycle`), or a turning
+        point is given twice, or none.
+    TypeError
+        If the method is no Method, or a value no number.
+    PathError
+        As in :func:`adhesis.solver.loading.loop.run_loop`.
+
+    References
+    ----------
+    docs/theory.md, "8. Paths and controls"
+    """
+    instance("method", method, Method, HOW_METHOD)
+    name = "max_stress" if method.problem.control.is_load else "max_penetration"
+    given = turning_of(method.problem, max_penetration, max_stress)
+    points = row(name, given, entry="turning point").tolist()
+    function("progress", progress)
+    branch = LoadingBranch(method, points, load_steps=load_steps)
+    loops = {turn: branch.loop(turn, progress=progress) for turn in sorted(points)}
+    return tuple(loops[turn] for turn in points)

@@ -1,0 +1,70 @@
+"""Equilibrium contact states, as every method hands them out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.values import ByValue
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactState(ByValue):
+    """An equilibrium contact state.
+
+    Immutable; two states are equal if all numbers but ``internal`` are.
+
+    Attributes
+    ----------
+    separation : float
+        s in m; equals the mean gap.
+    edges : array, shape (patches, 2)
+        Left and right edge of each patch in m, 0 ≤ left < λ, left < right, sorted by the left
+        edge; the right edge of the last patch may exceed λ.
+    mean_stress : float
+        p̄ in Pa, compression positive.
+    elastic_energy, adhesion_energy : float
+        ½∫σ(h - s)dx and -γ∫sqrt(1 + h'²)dx over the contact of one period, in J/m.
+    contact_fraction : float
+        A/A0.
+    stiffness : float
+        dp̄/ds along the branch in Pa/m where the method knows it, else NaN; under another control
+        than a fixed separation dY/dx (:mod:`adhesis.solver.model.control`).
+    hold_energy : float
+        What the control adds to U, in J/m per period; 0 at fixed separation.
+    internal : object
+        What the method needs to go on from here; nobody else reads it.
+
+    References
+    ----------
+    docs/theory.md, "1. The problem"
+    """
+
+    separation: float
+    edges: Array
+    mean_stress: float
+    elastic_energy: float
+    adhesion_energy: float
+    contact_fraction: float
+    stiffness: float = float("nan")
+    hold_energy: float = 0.0
+    internal: Any = field(default=None, repr=False, compare=False)
+
+    @property
+    def patches(self) -> int:
+        """Number of contact patches in one period."""
+        return len(self.edges)
+
+    @property
+    def energy(self) -> float:
+        """U = elastic + adhesion energy of one period, in J/m."""
+        return self.elastic_energy + self.adhesion_energy
+
+    @property
+    def potential(self) -> float:
+        """Potential in J/m that is minimal under the control; U at fixed separation.
+
+        It is W of :mod:`adhesis.solver.model.control`.
+        """
+        return self.energy + self.hold_energy

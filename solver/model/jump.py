@@ -1,0 +1,180 @@
+"""Jumps: where a contact state loses its stability, and what happens to its patches.
+
+The kinds, in the order in which one that fits is chosen (a jump may run through several events):
+
+``pull-off``    the last contact is lost.
+``snap-in``     a patch appears where there was none.
+``merging``     two or more patches become one.
+``vanishing``   a patch is lost while others stay.
+``splitting``   a patch becomes two.
+``spreading``   edges run outwards, the patches stay the same ones.
+``receding``    edges run inwards, the patches stay the same ones.
+
+Spreading and receding are the small-scale mechanism (an edge runs inside one patch, over the
+roughness under it); the others are the large-scale mechanism (patches come and go).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.model.contact_state import ContactState
+from adhesis.solver.model.profile import Array
+
+Indices = NDArray[np.int64]
+
+Branch = Literal["loading", "unloading"]
+BRANCHES: tuple[Branch, ...] = get_args(Branch)
+
+JumpKind = Literal[
+    "pull-off", "snap-in", "merging", "vanishing", "splitting", "spreading", "receding"
+]
+JUMP_KINDS: tuple[JumpKind, ...] = get_args(JumpKind)
+SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
+
+
+@dataclass(frozen=True)
+class Jump:
+    """One jump, at fixed separation (or what else is prescribed).
+
+    Attributes
+    ----------
+    branch : {"loading", "unloading"}
+    separation : float
+        s at which stability is lost, in m.
+    energy_drop : float
+        U before minus U after (the potential W, where the separation is not fixed), per unit
+        nominal area, in J/m². Negative by no more than the energies' error, which then counts in
+        the error of the loss; but for the loss of contact under a load, where it is U before
+        (:mod:`adhesis.solver.model.control`).
+    kind : JumpKind
+    patches_before, patches_after : int
+    contact_before, contact_after : float
+        Contact fractions.
+    patch_length : float
+        Length in m of the largest patch that the jump changed, on the side where it is larger.
+    raced : bool
+        Whether several edges ran and another rule of descent would have ended elsewhere.
+    at_stake : float
+        |U_other - U_after| per unit nominal area, in J/m²: how far the energy of the minimum that
+        the other rule reaches lies from that of this one; 0 unless ``raced``.
+
+    References
+    ----------
+    docs/theory.md, "4. Jumps and mechanisms"
+    """
+
+    branch: Branch
+    separation: float
+    energy_drop: float
+    kind: JumpKind
+    patches_before: int
+    patches_after: int
+    contact_before: float
+    contact_after: float
+    patch_length: float
+    raced: bool = False
+    at_stake: float = 0.0
+
+    @classmethod
+    def between(
+        cls,
+        before: ContactState,
+        after: ContactState,
+        branch: Branch,
+        period: float,
+        *,
+        raced: bool = False,
+        at_stake: float = 0.0,
+    ) -> Jump:
+        """Jump from one contact state to another, what is prescribed being the same.
+
+        Parameters
+        ----------
+        before, after : ContactState
+        branch : {"loading", "unloading"}
+        period : float
+            λ in m.
+        raced, at_stake
+            As in the class.
+        """
+        kind, length = classify(before.edges, after.edges, period)
+        return cls(
+            branch=branch,
+            separation=before.separation,
+            energy_drop=(before.potential - after.potential) / period,
+            kind=kind,
+            patches_before=before.patches,
+            patches_after=after.patches,
+            contact_before=before.contact_fraction,
+            contact_after=after.contact_fraction,
+            patch_length=length,
+            raced=raced,
+            at_stake=at_stake,
+        )
+
+    @property
+    def small_scale(self) -> bool:
+        """Whether edges only ran inside existing patches."""
+        return self.kind in SMALL_SCALE
+
+
+def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, float]:
+    """Kind of a jump, and the length of the largest patch that it changed.
+
+    Parameters
+    ----------
+    before, after : array, shape (patches, 2)
+        Edges in m, as in :class:`~adhesis.solver.model.contact_state.ContactState`.
+    period : float
+        λ in m.
+    """
+    if len(after) == 0:
+        longest = float((before[:, 1] - before[:, 0]).max()) if len(before) else 0.0
+        return "pull-off", longest
+    touches, one = _overlapping(before, after, period)
+    touched, other = _overlapping(after, before, period)
+    length = 0.0
+    for mine, others, hits, hit in ((before, after, touches, one), (after, before, touched, other)):
+        moved = hits != 1
+        single = np.flatnonzero(~moved)
+        moved[single] = ~_same(mine[single], others[hit[single]], period)
+        length = float((mine[moved, 1] - mine[moved, 0]).max(initial=length))
+    if (touched == 0).any():
+        return "snap-in", length
+    if (touched > 1).any():
+        return "merging", length
+    if (touches == 0).any():
+        return "vanishing", length
+    if (touches > 1).any():
+        return "splitting", length
+    grown = (after[:, 1] - after[:, 0]).sum() - (before[:, 1] - before[:, 0]).sum()
+    return ("spreading" if grown >= 0 else "receding"), length
+
+
+def _overlapping(patches: Array, others: Array, period: float) -> tuple[Indices, Indices]:
+    """How many of ``others`` share a point with each patch on the circle, and the first of them.
+
+    Patches of one state do not overlap, so their left and their right edges come in one order.
+    """
+    if len(others) == 0:
+        return np.zeros(len(patches), dtype=np.int64), np.zeros(len(patches), dtype=np.int64)
+    order = np.argsort(others[:, 0])
+    turns = period * np.arange(-1, 2)
+    left = np.add.outer(turns, others[order, 0]).ravel()
+    right = np.add.outer(turns, others[order, 1]).ravel()
+    first = np.searchsorted(right, patches[:, 0], side="right")
+    stop = np.searchsorted(left, patches[:, 1], side="left")
+    return np.clip(stop - first, 0, len(others)), order[first % len(others)]
+
+
+def _same(one: Array, two: Array, period: float) -> NDArray[np.bool_]:
+    """Whether patches have the same edges on the circle as others."""
+    offset = (one[:, 0] - two[:, 0] + period / 2) % period - period / 2
+    change = (one[:, 1] - one[:, 0]) - (two[:, 1] - two[:, 0])
+    same: NDArray[np.bool_] = np.maximum(np.abs(offset), np.abs(change)) < 1e-12 * period
+    return same

@@ -1,0 +1,149 @@
+"""Compiling ahead: all that loops and fields of a method call, before the first one is timed."""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.method import Branch, ContactState
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import self_affine_profile
+from adhesis.solver.registry import make_method
+from adhesis.solver.runtime.compile_log import hushed
+from adhesis.solver.runtime.disk_cache import installed_folder
+from adhesis.solver.runtime.jit import (
+    Compilation,
+    code_files,
+    kept_in_installation,
+    processor,
+    settings,
+    watch_compilation,
+)
+from adhesis.solver.sharp.method import SharpMethod
+
+COMPILED_METHODS = ("sharp", "grid")
+
+__all__ = [
+    "COMPILED_METHODS",
+    "Compilation",
+    "compiled_in",
+    "in_installation",
+    "processor",
+    "settings",
+    "warm",
+    "watch_compilation",
+]
+
+
+def warm(
+    methods: Iterable[str] = COMPILED_METHODS,
+    *,
+    tell: Callable[[Compilation], None] = lambda seen: None,
+    to_installation: bool = False,
+) -> Compilation:
+    """Compile what the methods need, or load it where it is compiled already.
+
+    That is done by small loops, so that nothing is compiled that is not called, and all is that is.
+
+    Parameters
+    ----------
+    methods : iterable of str
+        Of :data:`COMPILED_METHODS`.
+    tell : callable
+        Called each time the compiler begins a function.
+    to_installation : bool
+        Keep the code in the installation, if that can be written, for all its users and nodes.
+
+    Returns
+    -------
+    Compilation
+        How many functions were compiled now, and the time that it took.
+    """
+    with watch_compilation(tell) as seen, hushed(), _without_collecting():
+        for method in methods:
+            if to_installation:
+                with kept_in_installation():
+                    _small_loops(method)
+            else:
+                _small_loops(method)
+            _mark(method, to_installation)
+    return seen
+
+
+@contextmanager
+def _without_collecting() -> Iterator[None]:
+    """Spare the search for circles among the millions of objects of the compiler."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def compiled_in(method: str) -> Path | None:
+    """Folder in which all code of a method lies for this processor and these settings, or None."""
+    return code_files().find(_marker(method))
+
+
+def in_installation(folder: Path) -> bool:
+    """Whether a folder of compiled code is the installation's, not the user's."""
+    return folder.is_relative_to(installed_folder())
+
+
+def _marker(method: str) -> str:
+    """Name of the file that says that all is compiled; another one when more comes to be."""
+    made_by = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
+    return f"{method}-{made_by}.json"
+
+
+def _mark(method: str, to_installation: bool) -> None:
+    files = code_files(to_installation)
+    if files.read(_marker(method)) is None:
+        words = {"method": method, "processor": processor(), **settings()}
+        files.write(_marker(method), json.dumps(words, indent=1).encode())
+
+
+def small_problem(work_of_adhesion: float) -> Problem:
+    """A problem with few waves, whose loops take a moment."""
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=3, h_rms=1e-6)
+    return Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
+
+
+def _crowded() -> SharpMethod:
+    """A method that takes a dozen gaps for many, on a profile that has them."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=1, h_rms=1e-6)
+    method = SharpMethod(Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.004))
+    method.edges.many = 6
+    return method
+
+
+def _small_loops(method: str) -> None:
+    """Loops that call all compiled functions with all types of arguments that loops call them."""
+    for work_of_adhesion in (0.04, 0.0):
+        problem = small_problem(work_of_adhesion)
+        chosen = (
+            make_method("grid", problem, nodes_per_wave=8)
+            if method == "grid"
+            else make_method("sharp", problem)
+        )
+        states: list[ContactState] = []
+
+        def keep(_: Branch, state: ContactState, states: list[ContactState] = states) -> None:
+            states.append(state)
+
+        run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
+        if isinstance(chosen, SharpMethod) and work_of_adhesion > 0:
+            run_loop(_crowded(), max_penetration=0.5, load_steps=2)
+        state = max(states, key=lambda state: state.patches)
+        chosen.fields(state, chosen.nodes or 256)
+        chosen.openings(state)

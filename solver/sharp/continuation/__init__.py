@@ -1,0 +1,4 @@
+"""Continuation of stable branches: predictor, corrector, events, jumps.
+
+Import from its modules.
+"""

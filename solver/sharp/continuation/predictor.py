@@ -1,0 +1,147 @@
+"""How a branch goes on beyond two of its points: a predictor, and the fold that may lie ahead.
+
+A branch turns back in d where it folds, while the edge that leads goes on: d is a smooth function
+of how far it has gone, with an extremum at the fold, and so are all other edges. Two points with
+their rates give a cubic of each. Where the way on is long against the way between them, the rates
+alone are believed, which is a parabola: then edges move as a δ + 2b sqrt(δ), δ = |d - d_c|. If no
+edge leads, the rates give a parabola in d.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.gap.ends import outward
+
+_FAR = 4.0  # a course is not believed beyond so many times the way between its points
+_FAR_CUBIC = 5.0  # nor is a fold by the cubic beyond so many times the way of the edge that leads
+_FAR_EDGES = 1.5  # nor are cubics of the other edges
+_NEAR = 0.1  # share of the way to a fold that is left to the next point
+_BESIDE = 0.3  # least way that is left, in units of what a fold is located to
+_ACROSS = 0.2  # so far beyond the fold, in the same units, there is surely no equilibrium
+_BISECTIONS = 60
+
+
+class Course:
+    """The course of a branch through two points; beyond one point alone it is straight.
+
+    Parameters
+    ----------
+    point : Point
+        With the point before it, if that is known.
+
+    Attributes
+    ----------
+    fastest : float
+        Largest |dn/dd| of an edge at ``point``.
+    ahead : float
+        Distance in d of the fold beyond ``point``; inf if none is seen.
+    """
+
+    def __init__(self, point: Point) -> None:
+        self.point = point
+        self.way, self.ahead = 0.0, np.inf
+        # d as a polynomial of how far the leading edge goes on; both in units of their ways
+        self._way_by_lead: tuple[float, float, float] | None = None
+        self._fold = np.inf  # where that has its extremum
+        rate = point.rate
+        self._lead = lead = int(np.argmax(np.abs(rate)))
+        self.fastest = abs(float(rate[lead]))
+        earlier = point.before
+        if earlier is None or earlier.rate.shape != rate.shape or earlier.at == point.at:
+            return
+        self.way = way = point.at - earlier.at
+        self._earlier = earlier
+        gone = float(point.gaps.flat[lead] - earlier.gaps.flat[lead]) * (1 - 2 * (lead % 2))
+        self._gone = gone
+        slopes = gone / (way * float(earlier.rate[lead])), gone / (way * float(rate[lead]))
+        if min(slopes) > 0 and np.isfinite(slopes).all():
+            self._look_ahead(*slopes)
+
+    def _look_ahead(self, before: float, here: float) -> None:
+        """Find the fold from d's derivatives by the way of the leading edge at both points."""
+        square, cube = 2 * here + before - 3, here + before - 2
+        self._way_by_lead = here, square, cube
+        root = square * square - 3 * cube * here
+        if root >= 0 and np.sqrt(root) > square:
+            fold = here / (np.sqrt(root) - square)
+            if fold < _FAR_CUBIC:
+                self._fold = fold
+                self.ahead = abs(self.way) * fold * (here + fold * (square + fold * cube))
+                return
+        # by the derivatives alone
+        self._way_by_lead = here, (here - before) / 2, 0.0
+        if before > here and here * here < 2 * _FAR * (before - here):
+            self._fold = here / (before - here)
+            self.ahead = abs(self.way) * here * self._fold / 2
+
+    def _led(self, on: float, by: tuple[float, float, float]) -> float:
+        """How far the leading edge has gone where d has gone ``on``, both in units of ways."""
+        if on * abs(self.way) >= self.ahead:
+            return self._fold
+        here, square, cube = by
+        low, high = 0.0, min(self._fold, 2 * on / here)
+        while high < self._fold and high * (here + high * (square + high * cube)) < on:
+            low, high = high, 2 * high
+            if high > _FAR * 2 * on / here:
+                return low
+        lead = min(on / here, high)
+        for _ in range(_BISECTIONS):
+            value = lead * (here + lead * (square + lead * cube)) - on
+            if value > 0:
+                high = lead
+            else:
+                low = lead
+            slope = here + lead * (2 * square + 3 * lead * cube)
+            newton = lead - value / slope if slope > 0 else np.inf
+            if abs(newton - lead) < 1e-9 * high:
+                break
+            lead = newton if low < newton < high else 0.5 * (low + high)
+        return lead
+
+    def gaps(self, at: float) -> Array:
+        """Gaps that are expected at d = ``at``."""
+        point = self.point
+        on = at - point.at
+        rate = point.rate
+        motion = rate * on
+        if on * self.way > 0 and abs(on) < _FAR * abs(self.way):
+            earlier = self._earlier
+            if self._way_by_lead is not None:
+                led = self._led(on / self.way, self._way_by_lead)
+                here = rate * (self._gone / rate[self._lead])
+                before = earlier.rate * (self._gone / earlier.rate[self._lead])
+                if led < _FAR_EDGES:
+                    gone = outward(point.gaps) * (point.gaps - earlier.gaps).ravel()
+                    square, cube = 2 * here + before - 3 * gone, here + before - 2 * gone
+                    motion = led * (here + led * (square + led * cube))
+                else:
+                    motion = led * (here + led * (here - before) / 2)
+            else:
+                motion += (rate - earlier.rate) * on * on / (2 * self.way)
+        gaps: Array = point.gaps + (outward(point.gaps) * motion).reshape(-1, 2)
+        return gaps
+
+    def reach(self, most: float, finest: float) -> float:
+        """Step along which no edge is expected to move further than ``most``.
+
+        Towards a fold it leads near to it, and from next to it (``finest``) across.
+        """
+        straight: float = most / max(self.fastest, 1e-300)
+        if np.isinf(self.ahead):
+            return straight
+        if self.ahead < 0.8 * finest:
+            return self.across(finest)
+        most = most / abs(self._gone)
+        if most < self._fold and self._way_by_lead is not None:
+            here, square, cube = self._way_by_lead
+            straight = abs(self.way) * most * (here + most * (square + most * cube))
+        else:
+            straight = self.ahead
+        return float(min(straight, self.ahead - max(_NEAR * self.ahead, _BESIDE * finest)))
+
+    def across(self, finest: float) -> float:
+        """Step across the fold that is seen."""
+        return (1 + _NEAR) * self.ahead + _ACROSS * finest

@@ -1,0 +1,4 @@
+"""The elastic field of given contact edges, by a dense matrix or on a tree of gaps.
+
+Import from its modules.
+"""

@@ -1,0 +1,87 @@
+"""The coordinate of a gap in which its neighbours are far away.
+
+The half-space kernel dθ dθ'/(θ-θ')² keeps its form under every Möbius map. For a gap (l, r) between
+patches whose far sides are A < l and B > r, take
+
+    η = [ln((θ-A)/(B-θ)) - middle] / (2α),      η(l) = -1, η(r) = +1,
+
+in which it becomes α²/sinh²(α(η-η')) dη dη', while every other gap, and every periodic image, lies
+on the line Im η = π/(2α). However narrow the patches, α grows only as half the logarithm of gap
+over patch, and Chebyshev series in η converge as ρ^-M with ρ = τ + sqrt(1 + τ²), τ = π/(2α).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
+
+# Columns of the table of gaps.
+LEFT, RIGHT, LEFT_PATCH, RIGHT_PATCH, ALPHA = 0, 1, 2, 3, 4
+_COLUMNS = 5
+
+
+@compiled_for_both
+def map_gaps(gaps: Array) -> Array:
+    """Table of gaps, shape (L, 5): both ends, widths of the patches beside them, α.
+
+    ``gaps`` holds the ends in θ, shape (L, 2), increasing, within one period.
+    """
+    count = gaps.shape[0]
+    table = np.empty((count, _COLUMNS))
+    for k in range(count):
+        before = gaps[k - 1, 1] if k > 0 else gaps[count - 1, 1] - 2 * np.pi
+        after = gaps[k + 1, 0] if k + 1 < count else gaps[0, 0] + 2 * np.pi
+        length = gaps[k, 1] - gaps[k, 0]
+        left = gaps[k, 0] - before
+        right = after - gaps[k, 1]
+        table[k, LEFT] = gaps[k, 0]
+        table[k, RIGHT] = gaps[k, 1]
+        table[k, LEFT_PATCH] = left
+        table[k, RIGHT_PATCH] = right
+        table[k, ALPHA] = 0.25 * (np.log1p(length / left) + np.log1p(length / right))
+    return table
+
+
+@compiled
+def in_order(table: Array) -> bool:
+    """Whether every gap and patch has a length; not so where an edge is no number."""
+    for k in range(table.shape[0]):
+        # not written as <= : a length that is no number is a failure, too
+        length = table[k, RIGHT] - table[k, LEFT]
+        if not (length > 0 and table[k, LEFT_PATCH] > 0 and table[k, RIGHT_PATCH] > 0):
+            return False
+    return True
+
+
+@compiled
+def one_minus_plus(gap: Array, r: float, side: int) -> tuple[float, float]:
+    """(1 - η, 1 + η) at the distance r from the left (side 0) or right end, relatively exact."""
+    own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
+    other = gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH]
+    far = gap[RIGHT] - gap[LEFT] + other
+    near = np.log1p(r * (1 / own + 1 / far) / (1 - r / far)) / (2 * gap[ALPHA])
+    if side == 0:
+        return 2 - near, near
+    return near, 2 - near
+
+
+@compiled
+def theta_at(gap: Array, eta: float) -> tuple[float, float]:
+    """θ and dθ/dη at η."""
+    from_left = eta < 0
+    own = gap[LEFT_PATCH] if from_left else gap[RIGHT_PATCH]
+    other = gap[RIGHT_PATCH] if from_left else gap[LEFT_PATCH]
+    far = gap[RIGHT] - gap[LEFT] + other
+    grown = np.expm1(2 * gap[ALPHA] * (1 + eta if from_left else 1 - eta))
+    r = grown / (1 / own + (1 + grown) / far)  # distance from the nearer end
+    stretch = 2 * gap[ALPHA] / (1 / (own + r) + 1 / (far - r))
+    return (gap[LEFT] + r if from_left else gap[RIGHT] - r), stretch
+
+
+@compiled
+def convergence(gap: Array) -> float:
+    """Rate ln ρ of a gap: the error of M modes falls as ρ^-M."""
+    rate: float = np.arcsinh(np.pi / (2 * gap[ALPHA]))
+    return rate

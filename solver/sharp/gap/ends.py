@@ -1,0 +1,70 @@
+"""Gaps as an array of their ends: lengths, and what is left when gaps close or patches vanish.
+
+Gaps are an array of shape (L, 2) of θ = q0 x: left and right ends, ascending.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.model.profile import Array
+
+
+def widths(gaps: Array) -> tuple[Array, Array]:
+    """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
+    patch = np.empty(len(gaps))
+    patch[:-1] = gaps[1:, 0]
+    patch[-1] = gaps[0, 0] + 2 * np.pi
+    return gaps[:, 1] - gaps[:, 0], patch - gaps[:, 1]
+
+
+def outward(gaps: Array) -> Array:
+    """+1 at left gap ends, where contact grows to the right, -1 at right ones, shape (2L,)."""
+    sign = np.ones(2 * len(gaps))
+    sign[1::2] = -1.0
+    return sign
+
+
+def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:
+    """Drop the closed gaps: their patches merge."""
+    return gaps[keep]
+
+
+def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
+    """Drop patches, ``keep`` telling of the patch to the right of each gap: their gaps join."""
+    if not keep.any():
+        return np.empty((0, 2))
+    # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
+    lefts = gaps[np.roll(keep, 1), 0]
+    rights = gaps[keep, 1]
+    first = lefts[0]
+    rights = np.sort(np.where(rights <= first, rights + 2 * np.pi, rights))
+    return np.stack([lefts, rights], axis=1)
+
+
+def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
+    """Put patches of the given widths into gaps (no gaps at all: into the open surface)."""
+    if len(gaps) == 0:
+        order = np.argsort(centres)
+        left, right = (centres + widths / 2)[order], (centres - widths / 2)[order]
+        return np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1)
+    order = np.argsort(centres, kind="stable")
+    centres, widths = centres[order], widths[order]
+    place = np.searchsorted(gaps[:, 0], centres) - 1
+    inside = (place >= 0) & (centres < gaps[place, 1])
+    seeds = np.stack([centres - widths / 2, centres + widths / 2], axis=1)[inside]
+    ends = np.insert(gaps.ravel(), np.repeat(2 * place[inside] + 1, 2), seeds.ravel())
+    return np.asarray(ends.reshape(-1, 2))
+
+
+def without_small(gaps: Array, smallest: float) -> Array | None:
+    """Gaps without closed gaps or vanished patches, or None if all are as long as ``smallest``."""
+    length, patch = widths(gaps)
+    if length.min() < smallest and len(gaps) > 1:
+        keep = length >= smallest
+        keep[int(np.argmax(length))] = True  # the last gap never closes
+        return without_gaps(gaps, keep)
+    if patch.min() < smallest:
+        return without_patches(gaps, patch >= smallest)
+    return None

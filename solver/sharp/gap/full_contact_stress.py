@@ -1,0 +1,291 @@
+"""The full-contact stress as a source for gaps: compressed panels.
+
+Method ``sharp`` sees the rough profile only through the full-contact stress S(θ) = 2σ_full/E*,
+θ = q0 x. It is smooth on the scale of a shortest wave only, while what it is integrated with is
+smooth away from the ends of a gap. So S is compressed once, on a binary tree of panels: on each
+panel ∫ S f ≈ Σ_i ω_i f(x_i) at the p Gauss-Legendre nodes, exact when f is a polynomial of degree
+below p. Its moments over a gap: ``chebyshev_moments``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev, legendre
+from numpy.typing import NDArray
+
+from adhesis.solver.model.profile import Array, Profile
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.field.exterior import NOTHING, Outside
+
+# Nodes p of a panel, by the tolerance they serve. The finest panel is at most half a shortest wave
+# long: interpolation there leaves (π/2)^p/(p! 2^(p-1)) of the shortest wave's amplitude. A panel as
+# long as its distance from a singularity leaves 5.8^-p.
+_NODES = ((1e-5, 8), (1e-7, 10), (2e-9, 12), (0.0, 14))
+
+# Nodes of h' on a finest panel: interpolation leaves 2e-10 of the shortest wave's slope. The
+# length sqrt(1 + h'²) follows from h'; a series of its own would converge the more slowly the
+# steeper the profile. Its integral is taken by the rule of as many nodes over pieces of a panel.
+_TILT_NODES = 12
+_PIECES_BY_SLOPE = 4.0
+
+
+class Panels(NamedTuple):
+    """What the compiled code needs of a source; p nodes a panel.
+
+    Attributes
+    ----------
+    width : float
+        Length of a finest panel in θ.
+    finest : int
+        Number of finest panels; the shortest wave covers at least two.
+    x, w : array, shape (p,)
+        Gauss-Legendre rule of a panel.
+    stress, slope : array, shape (finest, p)
+        Chebyshev coefficients of S and S' on each finest panel.
+    tilt : array, shape (finest, 12)
+        Those of h'.
+    weights : array, shape (2, 2·finest, p)
+        ω for S and for S', of every panel of every level, the finest level first.
+    level_start : int array
+        Row of ``weights`` at which each level starts.
+    end_x, end_w : array
+        Gauss-Legendre rule on (0, 1) of an end piece (at most one shortest wave, in sqrt scale).
+    outside : Outside
+        The gaps outside the window whose gaps are solved; nothing if all are solved.
+    """
+
+    width: float
+    finest: int
+    x: Array
+    w: Array
+    stress: Array
+    slope: Array
+    tilt: Array
+    weights: Array
+    level_start: NDArray[np.int64]
+    end_x: Array
+    end_w: Array
+    outside: Outside
+
+
+@compiled
+def with_outside(of: Panels, outside: Outside) -> Panels:
+    """The same source for a window of gaps."""
+    return Panels(
+        of.width, of.finest, of.x, of.w, of.stress, of.slope, of.tilt, of.weights,
+        of.level_start, of.end_x, of.end_w, outside,
+    )  # fmt: skip
+
+
+class StressSource:
+    """Full-contact stress S = 2σ_full/E* and its derivative on a tree of panels over [0, 2π).
+
+    Parameters
+    ----------
+    profile : Profile
+    tolerance : float
+        Wanted accuracy of moments and values, relative to the stress of the shortest waves.
+
+    Attributes
+    ----------
+    top : int
+        Highest harmonic.
+    m2 : float
+        Mean square slope.
+    sharpest : float
+        Largest |h''|, in units of q0.
+    steepest : float
+        Largest |h'|.
+    highest : float
+        θ of the highest crest.
+    panels : Panels
+    """
+
+    def __init__(self, profile: Profile, tolerance: float = 0.0) -> None:
+        self.top = top = profile.highest_harmonic
+        p = next(nodes for limit, nodes in _NODES if tolerance >= limit)
+        count = 1 << int(np.ceil(np.log2(max(2 * top + 1, 16))))
+        width = 2 * np.pi / count
+        x, w = legendre.leggauss(p)
+        m = np.arange(profile.coefficients.size)
+        h = profile.coefficients * profile.q0
+        self.m2 = profile.m2
+        self.highest = profile.highest_point[0] * profile.q0
+        self.sharpest = float(np.abs(profile.curvatures(8 * top)).max()) / profile.q0
+        stress = _on_panels(m * h, x, count)  # symbol |q| of the half-space
+        slope = _on_panels(1j * m * m * h, x, count)
+        y, v = legendre.leggauss(_TILT_NODES)
+        tilt = _on_panels(1j * m * h, y, count) @ _to_chebyshev(y)
+
+        to_chebyshev = _to_chebyshev(x)
+        self.steepest = float(np.abs(profile.slopes(8 * top)).max())
+        pieces = int(np.ceil(1 + _PIECES_BY_SLOPE * self.steepest))
+        # rule on a finest panel, composed of equal pieces; nodes and weights from 0 to 1
+        start = np.arange(pieces)[:, None]
+        self._piece_x = ((start + (y + 1) / 2) / pieces).ravel()
+        self._piece_w = np.tile(v / (2 * pieces), pieces)
+        # ∫ sqrt(1 + h'²) dθ from 0 to the start of each finest panel
+        whole = _lengths(np.arange(count), np.ones(count), tilt, self._piece_x, self._piece_w)
+        self._measure_before = np.concatenate([[0.0], np.cumsum(whole * width)])
+
+        # ω of the finest level, then each parent from its two children: exact for polynomials.
+        to_left, to_right = (_lagrange(x, (x + side) / 2) for side in (-1.0, 1.0))
+        level = np.stack([stress, slope]) * (w * width / 2)
+        levels = [level]
+        while level.shape[1] > 1:
+            level = level[:, 0::2] @ to_left + level[:, 1::2] @ to_right
+            levels.append(level)
+        sizes = [k.shape[1] for k in levels]
+        t, end = legendre.leggauss(2 * p - 4)
+        self.panels = Panels(
+            width=width,
+            finest=count,
+            x=x,
+            w=w,
+            stress=np.ascontiguousarray(stress @ to_chebyshev),
+            slope=np.ascontiguousarray(slope @ to_chebyshev),
+            tilt=np.ascontiguousarray(tilt),
+            weights=np.ascontiguousarray(np.concatenate(levels, axis=1)),
+            level_start=np.cumsum([0, *sizes[:-1]]),
+            end_x=(t + 1) / 2,
+            end_w=end / 2,
+            outside=NOTHING,
+        )
+
+    def sample(self, theta: Array) -> Array:
+        """(S, S') at any angles, shape (len(theta), 2)."""
+        at = np.ascontiguousarray(theta)
+        width, stress, slope = self.panels.width, self.panels.stress, self.panels.slope
+        return np.stack([interpolate(at, width, stress), interpolate(at, width, slope)], axis=1)
+
+    def measure_between(self, left: Array, right: Array) -> float:
+        """Sum over the intervals of ∫ sqrt(1 + h'²) dθ from ``left`` to ``right``."""
+        return _measure_between(
+            left, right, self._measure_before, self.panels.tilt, self._piece_x, self._piece_w
+        )
+
+
+def _to_chebyshev(nodes: Array) -> Array:
+    """Matrix that turns rows of values at ``nodes`` into rows of Chebyshev coefficients."""
+    return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes, len(nodes) - 1)).T)
+
+
+def _on_panels(a: NDArray[np.complex128], x: Array, count: int) -> Array:
+    """Values of Σ a_m e^{imθ} at the nodes of the finest panels, shape (count, len(x))."""
+    m = np.arange(a.size)
+    out = np.empty((count, x.size))
+    for i, node in enumerate(x):
+        shifted = np.zeros(count // 2 + 1, dtype=np.complex128)
+        size = min(a.size, shifted.size)
+        shifted[:size] = (a * np.exp(1j * m * (np.pi / count) * (node + 1)))[:size]
+        out[:, i] = np.fft.irfft(shifted, count) * count
+    return out
+
+
+def _lagrange(nodes: Array, x: Array) -> Array:
+    """Lagrange polynomials of ``nodes`` at ``x``, shape (len(x), len(nodes))."""
+    degree = len(nodes) - 1
+    return np.asarray(
+        legendre.legvander(x, degree) @ np.linalg.inv(legendre.legvander(nodes, degree))
+    )
+
+
+@compiled
+def _clenshaw(coefficients: Array, x: float) -> float:
+    b1 = 0.0
+    b2 = 0.0
+    for j in range(coefficients.shape[0] - 1, 0, -1):
+        b1, b2 = 2 * x * b1 - b2 + coefficients[j], b1
+    total: float = x * b1 - b2 + coefficients[0]
+    return total
+
+
+@compiled
+def value_at(coefficients: Array, place: float) -> float:
+    """The piecewise series at θ = place · panel width."""
+    k = int(np.floor(place))
+    # the number of panels is a power of two
+    return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
+
+
+@compiled_for_both
+def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
+    """Values of a piecewise series at each angle, shape (len(theta),)."""
+    count = theta.shape[0]
+    out = np.empty(count)
+    last = coefficients.shape[0] - 1
+    for i in range(0, count - 1, 2):  # two recurrences side by side: each waits for its last term
+        place = theta[i] / width
+        other_place = theta[i + 1] / width
+        k = int(np.floor(place))
+        other_k = int(np.floor(other_place))
+        x = 2 * (place - k) - 1
+        y = 2 * (other_place - other_k) - 1
+        c = coefficients[k & last]
+        d = coefficients[other_k & last]
+        b1 = b2 = e1 = e2 = 0.0
+        for j in range(c.shape[0] - 1, 0, -1):
+            b1, b2 = 2 * x * b1 - b2 + c[j], b1
+            e1, e2 = 2 * y * e1 - e2 + d[j], e1
+        out[i] = x * b1 - b2 + c[0]
+        out[i + 1] = y * e1 - e2 + d[0]
+    if count % 2 == 1:
+        out[count - 1] = value_at(coefficients, theta[count - 1] / width)
+    return out
+
+
+@compiled
+def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
+    """sqrt(1 + h'²) and its θ-derivative at one angle."""
+    place = theta / panels.width
+    k = int(np.floor(place))
+    x = 2 * (place - k) - 1
+    c = panels.tilt[k & (panels.finest - 1)]
+    # d/dx of Σ c_j T_j = Σ j c_j U_{j-1}
+    u_prev = 0.0
+    u = 1.0
+    total = 0.0
+    for j in range(1, c.shape[0]):
+        total += j * c[j] * u
+        u, u_prev = 2 * x * u - u_prev, u
+    tilt = _clenshaw(c, x)
+    measure = np.sqrt(1 + tilt * tilt)
+    return measure, tilt / measure * total * 2 / panels.width
+
+
+@compiled
+def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, w: Array) -> Array:
+    """∫ sqrt(1 + h'²) over the first ``share`` of each panel, in panel widths."""
+    out = np.empty(panel.shape[0])
+    for i in range(panel.shape[0]):
+        total = 0.0
+        for j in range(nodes.shape[0]):
+            value = _clenshaw(tilt[panel[i]], 2 * share[i] * nodes[j] - 1)
+            total += w[j] * np.sqrt(1 + value * value)
+        out[i] = total * share[i]
+    return out
+
+
+@compiled
+def _measure_between(
+    left: Array, right: Array, before: Array, tilt: Array, nodes: Array, w: Array
+) -> float:
+    """As :meth:`StressSource.measure_between`; ``before`` is the measure before each panel."""
+    count = tilt.shape[0]
+    width = 2 * np.pi / count
+    panel = np.empty(2, dtype=np.int64)
+    share = np.empty(2)
+    total = 0.0
+    for i in range(left.shape[0]):
+        for end in range(2):
+            theta = left[i] if end == 0 else right[i]
+            turns = np.floor(theta / (2 * np.pi))
+            place = (theta - turns * 2 * np.pi) / width
+            panel[end] = min(max(int(place), 0), count - 1)
+            share[end] = min(max(place - panel[end], 0.0), 1.0)
+            total += (2 * end - 1) * (turns * before[count] + before[panel[end]])
+        part = _lengths(panel, share, tilt, nodes, w)
+        total += (part[1] - part[0]) * width
+    return total

@@ -1,0 +1,4 @@
+"""Nucleation of contact where surfaces touch inside a gap.
+
+Import from its modules.
+"""

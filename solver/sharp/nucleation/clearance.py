@@ -1,0 +1,206 @@
+"""How much of a gap's clearance can have been used up since it was looked at.
+
+The fine opening of a gap (``opening_series``) costs as much as many
+fields, and most gaps are far from touching. Inside a gap the surface is free: between two states
+with nearly the same edges its opening changes smoothly, so the nodes of the field tell by how much
+it has closed. Only beside an edge that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)),
+for which that a fourth of the shortest wave away is taken. A gap is looked at again when a good
+part of its clearance can be gone, or where nothing of this can be said.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.gap.quadrature import RULES, Kinds, Rules
+
+_NEAR = 0.3  # edges that moved by less than this, in λ_min, leave a gap comparable
+_SAFETY = 1.5  # on what the nodes tell
+_LEFT = 0.3  # share of a clearance that must surely be left
+_INSIDE = 0.12  # in λ_min: nearer to its ends no minimum appears in a gap that has none
+
+
+class Seen(NamedTuple):
+    """Gaps as they were when they were looked at.
+
+    Attributes
+    ----------
+    gaps : array, shape (L, 2)
+    kinds, offset : int array
+        Of the field's nodes.
+    theta, opening : array, shape (nodes,)
+        Nodes, and the opening of the lower modes there.
+    clearance : array, shape (L,)
+        Infinite where there is no minimum.
+    """
+
+    gaps: Array
+    kinds: Kinds
+    offset: Kinds
+    theta: Array
+    opening: Array
+    clearance: Array
+
+
+NOT_SEEN = Seen(
+    np.empty((0, 2)), np.empty(0, dtype=np.int64), np.zeros(1, dtype=np.int64), np.empty(0),
+    np.empty(0), np.empty(0),
+)  # fmt: skip
+
+
+class Clearances:
+    """What is known of the gaps since they were last looked at.
+
+    Parameters
+    ----------
+    wave : float
+        λ_min in θ.
+    critical : float
+        Critical opening C_c.
+
+    Attributes
+    ----------
+    seen : Seen
+        Set by whoever goes on from another state.
+    """
+
+    def __init__(self, wave: float, critical: float) -> None:
+        self._near, self._beside = _NEAR * wave, critical / np.sqrt(wave)
+        self.seen = NOT_SEEN
+
+    def left(self, field: GapField) -> tuple[Array, NDArray[np.int64]]:
+        """Clearance that is surely left in each gap, negative if it has to be looked at.
+
+        And the place of each gap among those seen, for :meth:`note`.
+        """
+        of = field.solution
+        left, place = clearance_left(
+            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, self.seen, self._near,
+            self._beside,
+        )  # fmt: skip
+        return left, place
+
+    def note(self, field: GapField, place: NDArray[np.int64], clearance: Array) -> None:
+        """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
+        of = field.solution
+        self.seen = noted(
+            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, self.seen, place, clearance
+        )
+
+
+@compiled
+def _low_opening(f: float, kind: int, node: int, rules: Rules) -> float:
+    eta = rules.eta[rules.start[kind] + node]
+    opening: float = f * np.sqrt(1 - eta * eta)
+    return opening
+
+
+@compiled
+def _to_any_minimum(seen: Seen, gap: int, nodes: int, inside: float) -> float:
+    """How far a gap without a minimum has to close before it can touch in one that appears.
+
+    That is its opening at the nodes further than ``inside`` from its ends; of a shorter gap the
+    largest opening.
+    """
+    least = np.inf
+    most = 0.0
+    for i in range(seen.offset[gap], seen.offset[gap] + nodes):
+        most = max(most, seen.opening[i])
+        if min(seen.theta[i] - seen.gaps[gap, 0], seen.gaps[gap, 1] - seen.theta[i]) > inside:
+            least = min(least, seen.opening[i])
+    return min(least, most)
+
+
+@compiled
+def clearance_left(
+    gaps: Array,
+    kinds: Kinds,
+    offset: Kinds,
+    theta: Array,
+    f: Array,
+    rules: Rules,
+    seen: Seen,
+    near: float,
+    beside: float,
+) -> tuple[Array, Kinds]:
+    """As :meth:`Clearances.left`; ``beside`` is the closing beside an edge for its motion."""
+    left = np.full(gaps.shape[0], -1.0)
+    place = np.full(gaps.shape[0], -1)
+    j = 0
+    for k in range(gaps.shape[0]):
+        while j < seen.gaps.shape[0] and seen.gaps[j, 0] < gaps[k, 0] - near:
+            j += 1
+        if j == seen.gaps.shape[0]:
+            break
+        begin = gaps[k, 0] - seen.gaps[j, 0]
+        end = gaps[k, 1] - seen.gaps[j, 1]
+        if abs(begin) > near or abs(end) > near or kinds[k] != seen.kinds[j]:
+            continue
+        closed = 0.0
+        m = rules.counts[kinds[k]]
+        comparable = True
+        for i in range(m):
+            at = seen.offset[j] + i
+            # the slope between the node's neighbours, or the gap's end
+            if i > 0:
+                before, low = seen.theta[at - 1], seen.opening[at - 1]
+            else:
+                before, low = seen.gaps[j, 0], 0.0
+            if i < m - 1:
+                after, high = seen.theta[at + 1], seen.opening[at + 1]
+            else:
+                after, high = seen.gaps[j, 1], 0.0
+            moved = theta[offset[k] + i] - seen.theta[at]
+            if abs(moved) > near:
+                comparable = False
+            was = seen.opening[at] + (high - low) / (after - before) * moved
+            closed = max(closed, was - _low_opening(f[offset[k] + i], kinds[k], i, rules))
+        if not comparable:
+            continue
+        grown = max(begin, 0.0) + max(-end, 0.0)
+        clearance = seen.clearance[j]
+        if clearance == np.inf:
+            clearance = _to_any_minimum(seen, j, m, _INSIDE / _NEAR * near)
+        rest = clearance - _SAFETY * closed - beside * grown
+        if rest > _LEFT * clearance:
+            left[k] = rest if seen.clearance[j] < np.inf else np.inf
+            place[k] = j
+    return left, place
+
+
+@compiled
+def noted(
+    gaps: Array,
+    kinds: Kinds,
+    offset: Kinds,
+    theta: Array,
+    f: Array,
+    rules: Rules,
+    seen: Seen,
+    place: Kinds,
+    clearance: Array,
+) -> Seen:
+    """As :meth:`Clearances.note`."""
+    new_gaps = gaps.copy()
+    new_theta = theta.copy()
+    new_opening = np.empty(theta.shape[0])
+    new_clearance = clearance.copy()
+    for k in range(gaps.shape[0]):
+        j = place[k]
+        if j >= 0:
+            new_gaps[k] = seen.gaps[j]
+            new_clearance[k] = seen.clearance[j]
+        for i in range(rules.counts[kinds[k]]):
+            at = offset[k] + i
+            if j >= 0:
+                new_theta[at] = seen.theta[seen.offset[j] + i]
+                new_opening[at] = seen.opening[seen.offset[j] + i]
+            else:
+                new_opening[at] = _low_opening(f[at], kinds[k], i, rules)
+    return Seen(new_gaps, kinds.copy(), offset.copy(), new_theta, new_opening, new_clearance)

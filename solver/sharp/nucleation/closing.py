@@ -1,0 +1,60 @@
+"""Where a gap that is clear at one point of a branch and overlaps at another touches between them.
+
+Several gaps may have closed on the way. Each closes smoothly, while the least of all clearances has
+a kink wherever another gap takes the lead: so each is interpolated by itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+
+_EDGE = 1e-4  # share of what is left within which of its ends no aim is taken
+
+
+class Closing:
+    """Clearances of the gaps that overlap at one end of a stretch of a branch.
+
+    Parameters
+    ----------
+    clear, hit : float
+        d where all of them are clear, and where all overlap.
+    before, after : array, shape (gaps,)
+        Their clearances there.
+    """
+
+    def __init__(self, clear: float, hit: float, before: Array, after: Array) -> None:
+        self._at = [clear, hit]
+        self._values = [before, after]
+
+    def note(self, at: float, values: Array) -> None:
+        """Take down the clearances at another place."""
+        self._at.append(at)
+        self._values.append(values)
+
+    def aim(self, clear: float, hit: float, wanted: float) -> float:
+        """Share of the way from ``clear`` to ``hit`` at which the first gap comes to ``wanted``.
+
+        Both are places that were taken down. A parabola goes through them and the nearest third.
+        """
+        low, high = self._at.index(clear), self._at.index(hit)
+        way = hit - clear
+        begin, end = self._values[low], self._values[high]
+        sound = (begin > wanted) & (end < wanted) & (begin < np.inf)
+        if not sound.any():
+            return 0.5
+        begin, end = begin[sound], end[sound]
+        slope = end - begin
+        bend = np.zeros(slope.shape)
+        others = [i for i in range(len(self._at)) if i not in (low, high)]
+        if others:
+            third = min(others, key=lambda i: abs(self._at[i] - 0.5 * (clear + hit)))
+            t = (self._at[third] - clear) / way
+            bend = (self._values[third][sound] - begin - slope * t) / (t * (t - 1))
+        # begin + slope t + bend t (t - 1) = wanted: between 0 and 1 there is one root
+        b, c = slope - bend, begin - wanted
+        root = np.sqrt(np.maximum(b * b - 4 * bend * c, 0.0))
+        share = 2 * c / (root - b)
+        first = float(np.where(np.isfinite(share), share, c / -slope).min())
+        return min(max(first, _EDGE), 1 - _EDGE)

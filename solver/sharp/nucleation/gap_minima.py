@@ -1,0 +1,122 @@
+"""Local minima of the openings, compiled: parabolas through the fine nodes, or the whole series."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.field.opening_series import SHAPE_NODES, fine_nodes_of, opened, sum_modes
+from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.gap.sine_transform import circle
+
+# A minimum below this (of what its curvature makes over a node's distance, or of what the parabola
+# through the nodes may be wrong by) is found from the whole series, by parabolas that get narrower
+# so many times.
+_CLOSE = 0.1
+_DOUBT = 3.0
+_NARROWER = 3
+_FLAT = 1e-100  # half the curvature, where none is seen
+
+
+@compiled
+def bottoms(theta: Array, opening: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Local minima where θ falls: place, value, half of κ, width, doubt; θ of the minima rises.
+
+    By the parabola through three nodes, Newton's form; ``width`` is the distance of the outer two,
+    ``doubt`` what the value may be wrong by, from the cubics through a fourth node on either side.
+    """
+    x, y = theta, opening
+    out = np.empty((5, y.shape[0] // 2 + 1))
+    count = 0
+    for i in range(y.shape[0] - 2, 0, -1):
+        if y[i] <= y[i + 1] and y[i] < y[i - 1]:
+            first = (y[i] - y[i + 1]) / (x[i] - x[i + 1])
+            second = (y[i - 1] - y[i]) / (x[i - 1] - x[i])
+            width = x[i - 1] - x[i + 1]
+            half = (second - first) / width
+            slope = first + half * (x[i] - x[i + 1])
+            cubic = 0.0
+            for j in (i - 2, i + 2):
+                if 0 <= j < y.shape[0]:
+                    beside = i - 1 if j < i else i + 1
+                    far = i + 1 if j < i else i - 1
+                    outer = (y[j] - y[beside]) / (x[j] - x[beside])
+                    inner = second if j < i else first
+                    other = (outer - inner) / (x[j] - x[i])
+                    cubic = max(cubic, abs((other - half) / (x[j] - x[far])))
+            out[0, count] = x[i] - slope / (2 * half)
+            out[1, count] = y[i] - slope * slope / (4 * half)
+            out[2, count] = half
+            out[3, count] = width
+            out[4, count] = 0.05 * cubic * width**3
+            count += 1
+    return out[0, :count], out[1, :count], out[2, :count], out[3, :count], out[4, :count]
+
+
+@compiled
+def _bottom(gap: Array, modes: Array, at: float, width: float) -> tuple[float, float, float]:
+    """Place, opening and half the curvature of a minimum, by parabolas that get narrower."""
+    half = 0.0
+    low = np.inf
+    x = np.empty(3)
+    for _ in range(_NARROWER):
+        width /= 8
+        x[0], x[1], x[2] = at - width, at, at + width
+        y = sum_modes(gap, x, modes)
+        half = (y[2] - 2 * y[1] + y[0]) / (2 * width**2)
+        slope = (y[2] - y[0]) / (2 * width)
+        if not half > 0:
+            return at, y[1], max(half, _FLAT)
+        step = min(max(-slope / (2 * half), -4 * width), 4 * width)
+        at += step
+        low = y[1] + slope * step + half * step**2
+    return at, low, half
+
+
+@compiled
+def bottoms_of(
+    gaps: Kinds,
+    table: Array,
+    kinds: Kinds,
+    offset: Kinds,
+    f: Array,
+    rules: Rules,
+    top: int,
+    panel: float,
+    stress: Array,
+) -> tuple[Array, Array, Array, Kinds]:
+    """Minima of the openings of some gaps of a field: place, value, κ, and in which gap each lies.
+
+    ``top``, ``panel`` and ``stress`` are those of the source; ``gaps`` rise.
+    """
+    out = np.empty((3, 64))
+    where = np.empty(64, dtype=np.int64)
+    found = 0
+    last = 0
+    cosine, sine = circle(4)
+    for k in gaps:
+        count = fine_nodes_of(table[k], top, SHAPE_NODES)
+        if count != last:
+            cosine, sine = circle(count + 1)
+            last = count
+        theta, _, opening, modes = opened(
+            table[k], count, kinds[k], f[offset[k] : offset[k + 1]], rules, panel, stress, cosine,
+            sine,
+        )  # fmt: skip
+        at, low, half, width, doubt = bottoms(theta, opening)
+        while found + at.shape[0] > where.shape[0]:
+            wider = np.empty((3, 2 * where.shape[0]))
+            wider[:, :found] = out[:, :found]
+            longer = np.empty(2 * where.shape[0], dtype=np.int64)
+            longer[:found] = where[:found]
+            out, where = wider, longer
+        for j in range(at.shape[0]):
+            if low[j] < max(_CLOSE * half[j] * width[j] ** 2, _DOUBT * doubt[j]):
+                at[j], low[j], half[j] = _bottom(table[k], modes, at[j], 0.5 * width[j])
+            out[0, found] = at[j]
+            out[1, found] = low[j]
+            out[2, found] = 2 * half[j]
+            where[found] = k
+            found += 1
+    return out[0, :found].copy(), out[1, :found].copy(), out[2, :found].copy(), where[:found].copy()

@@ -1,0 +1,268 @@
+"""Where the surfaces touch inside a gap, and the patch that is put there.
+
+Contact nucleates only where the opening has closed to zero. With adhesion a touching point grows at
+once, along a path on which the energy only falls, to its first equilibrium; on the parabola κx²/2
+that is (16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width is put
+at the touching point; the descent does the rest. Without adhesion a patch has no width at first
+touch: it is put when the overlap is large enough for the narrowest patch that is followed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import EQUAL_CRESTS, Array
+from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.gap.ends import with_patches
+from adhesis.solver.sharp.gap.quadrature import RULES, Kinds
+from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics, NoState
+from adhesis.solver.sharp.nucleation.clearance import Clearances
+from adhesis.solver.sharp.nucleation.closing import Closing
+from adhesis.solver.sharp.nucleation.gap_minima import bottoms_of
+
+_OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
+_MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
+_MOST_CLEAR = 2  # aims by a secant that are clear, one after the other, before a halving
+_HALVED = 5  # of many gaps, which are aimed at one by one, one in so many aims is a halving
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Local minimum of an opening: place, value and curvature κ, in units of 1/q0."""
+
+    theta: float
+    opening: float
+    curvature: float
+
+
+@dataclass(frozen=True, eq=False)
+class Minima:
+    """Local minima of the openings of all gaps: place, value and curvature, shape (minima,)."""
+
+    theta: Array
+    opening: Array
+    curvature: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """The point of a branch at which surfaces touch, where, and how late (in d) at most."""
+
+    point: Point
+    touches: list[Touch]
+    late: float
+
+
+@compiled
+def seed_width(curvature: float, surface: float, narrowest: float, widest: float) -> float:
+    """Width of the patch that is put where surfaces with the energy Γ touch with this curvature."""
+    first = (16 * surface / (np.pi * curvature**2)) ** (1 / 3)
+    width: float = min(max(0.5 * first, narrowest), widest)
+    return width
+
+
+@compiled
+def clearances(
+    opening: Array, curvature: Array, surface: float, narrowest: float, widest: float
+) -> Array:
+    """As :meth:`Nucleation.clearance`."""
+    out = np.empty(opening.shape[0])
+    for i in range(opening.shape[0]):
+        width = seed_width(curvature[i], surface, narrowest, widest)
+        out[i] = opening[i]
+        # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
+        # the surface follows it, 10 to 20 here.
+        if width <= narrowest:
+            out[i] += 4 * curvature[i] * width**2
+    return out
+
+
+class Nucleation:
+    """Finds touching points and puts seeds there."""
+
+    def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
+        self.problem, self.edges = problem, edges
+        self.clearances = Clearances(edges.wave, edges.critical)
+        surface = math.pi * edges.critical**2 / 8  # Γ
+        self._seed = surface, 3 * edges.smallest, edges.longest_step
+        self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
+        self.overlap = _OVERLAP * problem.profile.h_max * problem.profile.q0
+
+    def first_touch(self) -> tuple[float, list[Touch]]:
+        """Separation q0 s at which the first patches are put, and where.
+
+        That is at every crest as high as the highest.
+        """
+        profile = self.problem.profile
+        crests = profile.crests()
+        curvature = crests.curvature / profile.q0
+        theta = crests.position * profile.q0
+        highest = [Touch(float(a), 0.0, float(c)) for a, c in zip(theta, curvature, strict=True)]
+        overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
+        return profile.h_max * profile.q0 - overlap, highest
+
+    def minima(self, field: GapField, gaps: Kinds) -> tuple[Minima, Kinds]:
+        """Local minima of the opening inside some gaps, and in which of them each lies."""
+        self.edges.count.openings += len(gaps)
+        of, source = field.solution, field.source
+        theta, opening, curvature, where = bottoms_of(
+            gaps, of.table, of.kinds, of.offset, of.f, RULES, source.top, source.panels.width,
+            source.panels.stress,
+        )  # fmt: skip
+        return Minima(theta, opening, curvature), where
+
+    def clearance(self, opening: Array, curvature: Array) -> Array:
+        """Opening left at minima before a patch is put there; not positive when it is time."""
+        return clearances(opening, curvature, *self._seed)
+
+    def ready(self, minima: Minima) -> list[Touch]:
+        """Where to put patches: the place of largest overlap, and those that equal it."""
+        over = self.clearance(minima.opening, minima.curvature)
+        least = float(over.min(initial=np.inf))
+        if least > 0:
+            return []
+        # without adhesion patches come and go smoothly, in any order
+        equal = self.equal if self.edges.critical > 0 else np.inf
+        return [
+            Touch(float(minima.theta[i]), float(minima.opening[i]), float(minima.curvature[i]))
+            for i in np.flatnonzero(over <= min(least + equal, 0.0))
+        ]
+
+    def least(self, field: GapField) -> tuple[float, Minima]:
+        """Least clearance of a field, and the minima of the gaps that may be used up.
+
+        Only those are looked at; see ``clearance``.
+        """
+        left, place = self.clearances.left(field)
+        fresh = np.flatnonzero(place < 0)
+        minima, where = self.minima(field, fresh)
+        left[fresh] = np.inf
+        np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
+        self.clearances.note(field, place, left)
+        return float(left.min()), minima
+
+    def located(
+        self, trail: list[Point], resolution: float, clearance: float
+    ) -> tuple[Located | None, float]:
+        """First point of a trail at which surfaces touch inside a gap, with the touches.
+
+        Else None and the least clearance at the end of the trail. The trail starts at a point known
+        to be clear, by ``clearance`` at least; between its points the touch is located to
+        ``resolution`` (q0 s).
+        """
+        hit = trail[-1]
+        hit_value, hit_minima = self.least(hit.field)
+        if hit_value > 0:
+            return None, hit_value
+        clear_value = np.nan
+        # over the points of the trail, then within one step of it
+        low, high = 0, len(trail) - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            value, minima = self.least(trail[middle].field)
+            if value > 0:
+                low, clear_value = middle, value
+            else:
+                high, hit, hit_minima, hit_value = middle, trail[middle], minima, value
+        last = trail[low]
+        clear = last.at
+        # Of many gaps each aim is dear: those at both ends tell where to begin, and the least
+        # overlap is touch enough.
+        many = len(last.gaps) >= self.edges.many
+        if many and low == 0 and clearance > 0:
+            clear_value = clearance
+        closing, closed = self._closing(last, hit) if many else (None, None)
+        cleared = 0  # aims one after the other that were clear
+        for aims in range(1, _MOST_AIMS + 1):
+            near = many or abs(clear - hit.at) <= resolution
+            if hit_value == 0 or (near and hit_value > -0.5 * self.overlap):
+                break
+            share = 0.5
+            if closing is not None and aims % _HALVED:
+                share = closing.aim(clear, hit.at, -0.2 * self.overlap)
+            # The least clearance may be another gap's than the overlap: then a secant creeps.
+            elif closing is None and np.isfinite(clear_value) and cleared < _MOST_CLEAR:
+                # secant to half of the overlap that is allowed, kept off the ends
+                aimed = clear_value + 0.2 * self.overlap
+                share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
+            aim = clear + (hit.at - clear) * share
+            point = None
+            reach = CORRECTED * self.edges.wave
+            if many:
+                point = self.edges.equilibrium(last.towards(hit, aim), aim, reach)
+            for start in (last, hit) if share < 0.5 else (hit, last):
+                if point is None:
+                    point = self.edges.equilibrium(start.predicted(aim), aim, reach)
+            if point is None:
+                break
+            value, minima = self.least(point.field)
+            if closing is not None and closed is not None:
+                closing.note(aim, self._clearance_of(point.field, closed))
+            cleared = cleared + 1 if value > 0 else 0
+            if value > 0:
+                last, clear, clear_value = point, aim, value
+            else:
+                hit, hit_minima, hit_value = point, minima, value
+        if hit_value < -self.overlap and self.edges.critical > 0:
+            raise NoState("surfaces overlap, and no first touch is found", hit.at)
+        # the surfaces touched so much earlier as the overlap says
+        late = abs(clear - hit.at)
+        if clear_value > hit_value:
+            late *= -hit_value / (clear_value - hit_value)
+        return Located(hit, self.ready(hit_minima), late), 0.0
+
+    def _clearance_of(self, field: GapField, gaps: Kinds) -> Array:
+        """Clearance of each of some gaps."""
+        minima, where = self.minima(field, gaps)
+        out = np.full(len(field.gaps), np.inf)
+        np.minimum.at(out, where, self.clearance(minima.opening, minima.curvature))
+        return out[gaps]
+
+    def _closing(self, clear: Point, hit: Point) -> tuple[Closing | None, Kinds]:
+        """How the gaps close that are open at one point and overlap at another, and which."""
+        left, _ = self.clearances.left(hit.field)
+        closed = np.flatnonzero(left <= 0)
+        after = self._clearance_of(hit.field, closed)
+        closed, after = closed[after < 0], after[after < 0]
+        if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:
+            return None, closed
+        before = self._clearance_of(clear.field, closed)
+        return Closing(clear.at, hit.at, before, after), closed
+
+    def located_held(self, point: Point, clearance: float, end: float) -> Located | None:
+        """Where surfaces touch between a point with this clearance and ``end``, edges held."""
+        clear, low, hit = point.at, clearance, end
+        cleared = 0
+        field = self.edges.field(point.gaps, hit)
+        high, minima = self.least(field)
+        if high > -self.overlap:
+            return None
+        for _ in range(_MOST_AIMS):
+            if high >= -0.5 * self.overlap:
+                break
+            # Openings are linear in d: a secant to a fourth of the overlap that is allowed
+            share = min(max((low + 0.25 * self.overlap) / (low - high), 0.02), 0.98)
+            aim = clear + (hit - clear) * (share if cleared < _MOST_CLEAR else 0.5)
+            aimed = self.edges.field(point.gaps, aim)
+            value, there = self.least(aimed)
+            cleared = cleared + 1 if value > 0 else 0
+            if value > 0:
+                clear, low = aim, value
+            else:
+                hit, high, field, minima = aim, value, aimed, there
+        held = Point(hit, field, point.rate, float("nan"))
+        return Located(held, self.ready(minima), abs(end - point.at))
+
+    def seeded(self, gaps: Array, touches: list[Touch]) -> Array:
+        """Edges with a seed at each touch."""
+        return with_patches(
+            gaps,
+            np.array([t.theta for t in touches]),
+            np.array([seed_width(t.curvature, *self._seed) for t in touches]),
+        )

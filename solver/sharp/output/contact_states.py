@@ -1,0 +1,202 @@
+"""Contact states of method ``sharp``: energies, stress and edges in SI units, from a gap field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from adhesis.solver.method import ContactState
+from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.counters import Counters
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.opening_series import work_of_gaps
+from adhesis.solver.sharp.field.solution import Hold
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN, Seen
+
+
+@dataclass
+class Trace:
+    """States and jumps of a path, in order, as they are found.
+
+    ``misplaced`` is the work, in J/m² of nominal area, by which the loss may be wrong because jumps
+    were not found at their exact places.
+    """
+
+    states: list[ContactState] = field(default_factory=list)
+    jumps: list[Jump] = field(default_factory=list)
+    misplaced: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What a state remembers, so that a path goes on from it whatever was followed in between.
+
+    Attributes
+    ----------
+    gaps : array, shape (L, 2)
+        The ends of its gaps.
+    clearance : float
+        Of them (``Point.clearance``).
+    course : tuple of float, array, float, optional
+        Where a path stopped at it: d, dn/dd of every edge and dY/dd, as in ``Point``.
+    seen : Seen
+        The gaps as they were when they were last looked at.
+    """
+
+    gaps: Array
+    clearance: float
+    course: tuple[float, Array, float] | None = None
+    seen: Seen = NOT_SEEN
+
+
+def hold_of(problem: Problem) -> Hold:
+    """The control of a problem in the units of the field."""
+    if problem.control.is_load:
+        return Hold(0.0, 1.0)
+    give = 0.5 * problem.half_space.modulus * problem.profile.q0 / problem.control.stiffness
+    return Hold(1.0, give)
+
+
+class States:
+    """Makes contact states of one problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    source : StressSource
+    count : Counters
+    """
+
+    def __init__(self, problem: Problem, source: StressSource, count: Counters) -> None:
+        self.problem, self.source, self.count = problem, source, count
+        profile = problem.profile
+        self.q0 = profile.q0
+        self.period = profile.period
+        self._half = problem.half_space.modulus / 2
+        m = np.arange(profile.coefficients.size)
+        h = np.abs(profile.coefficients * self.q0) ** 2
+        self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
+
+    def at(self, prescribed: float) -> float:
+        """What is prescribed, in the units of the field: of a separation or u_tot q0 times it."""
+        if self.problem.control.is_load:
+            return prescribed / self._half
+        return prescribed * self.q0
+
+    def prescribed(self, at: float) -> float:
+        """What d = ``at`` is in m, under a load in Pa."""
+        return at * self._half if self.problem.control.is_load else at / self.q0
+
+    def place(self, state: ContactState) -> float:
+        """What is prescribed in a state, in the units of the field."""
+        return self.at(self.problem.prescribed_in(state))
+
+    def detached(self, separation: float) -> ContactState:
+        """State without contact at q0 s = ``separation``."""
+        return ContactState(separation / self.q0, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+
+    def overlaps_when_detached(self, at: float) -> bool:
+        """Whether no state without contact exists at d = ``at``: it would lie below s = h_max."""
+        profile, control = self.problem.profile, self.problem.control
+        return not control.is_load and at < profile.h_max * self.q0 * (1 - 1e-12)
+
+    @property
+    def _per_prescribed(self) -> float:
+        """dY/dx in SI units where dY/dd is 1."""
+        per = self._half * self.q0
+        return 1 / per if self.problem.control.is_load else per
+
+    def after_loss(self, before: ContactState, at: float) -> ContactState:
+        """State without contact that ``before`` leaves behind at d = ``at``.
+
+        Under a load nothing holds it: the loop is closed at the separation of the loss.
+        """
+        if self.problem.control.is_load:
+            return self.detached(before.separation * self.q0)
+        return self.detached(at)
+
+    def _hold_energy(self, separation: float, mean_stress: float) -> float:
+        profile, control = self.problem.profile, self.problem.control
+        return control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
+
+    def of_point(self, point: Point, separation: float | None = None) -> ContactState:
+        """State of a point of a branch; ``separation`` (m) where it is known without rounding."""
+        return self.of_field(point.field, point.slope, separation, point.clearance)
+
+    def of_field(
+        self,
+        gap_field: GapField,
+        slope: float = float("nan"),
+        separation: float | None = None,
+        clearance: float = 0.0,
+    ) -> ContactState:
+        """State of a field with dY/dd = ``slope``; ``separation`` (m) as in :meth:`of_point`."""
+        self.count.energies += 1
+        half = self._half
+        at = gap_field.separation
+        if separation is None:
+            separation = at / self.q0
+        mean_stress = gap_field.pressure * half
+        gaps = gap_field.gaps
+        left = np.append(gaps[-1, 1] - 2 * np.pi, gaps[:-1, 1])  # of the patch before each gap
+        right = gaps[:, 0]
+        measure = self.source.measure_between(left, right)
+        turn = np.floor(left / (2 * np.pi)) * 2 * np.pi
+        patches = np.stack([left - turn, right - turn], axis=1) / self.q0
+        elastic = (
+            self._full_energy + 0.5 * work_of_gaps(gap_field) - np.pi * at * gap_field.pressure
+        )
+        return ContactState(
+            separation=separation,
+            edges=patches[np.argsort(patches[:, 0])],
+            mean_stress=mean_stress,
+            elastic_energy=elastic * half / self.q0**2,
+            adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
+            contact_fraction=float((right - left).sum() / (2 * np.pi)),
+            stiffness=slope * self._per_prescribed,
+            hold_energy=self._hold_energy(separation, mean_stress),
+            internal=Memory(gaps, clearance),
+        )
+
+    def shifted(self, state: ContactState, gap_field: GapField, at: float) -> ContactState:
+        """State at d = ``at`` with the edges of ``state``: p is linear in s, U quadratic."""
+        way = at - gap_field.prescribed
+        pressure = gap_field.pressure + gap_field.pressure_by_prescribed * way
+        apart = at
+        if not self.problem.control.is_fixed:
+            apart = gap_field.separation + gap_field.separation_by_prescribed * way
+        work = -np.pi * (apart - gap_field.separation) * (gap_field.pressure + pressure)
+        separation, mean_stress = apart / self.q0, pressure * self._half
+        return replace(
+            state,
+            separation=separation,
+            mean_stress=mean_stress,
+            elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
+            stiffness=float("nan"),
+            hold_energy=self._hold_energy(separation, mean_stress),
+            internal=Memory(gap_field.gaps, 0.0),
+        )
+
+    def work(self, before: ContactState, after: ContactState, way: float) -> float:
+        """|Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        conjugate = [control.conjugate(s.separation, s.mean_stress, h_max) for s in (before, after)]
+        unit = self._half if control.is_load else 1 / self.q0
+        return abs(conjugate[0] - conjugate[1]) * way * unit
+
+    def jump(
+        self, before: ContactState, after: ContactState, branch: Branch, other: ContactState
+    ) -> Jump:
+        """Jump between two states; ``other`` is where another rule of descent would have led."""
+        raced = other is not after
+        at_stake = abs(other.potential - after.potential) / self.period
+        jump = Jump.between(before, after, branch, self.period, raced=raced, at_stake=at_stake)
+        if self.problem.control.is_load and not after.patches:
+            # The load's own work is not counted, which may leave less than nothing.
+            jump = replace(jump, energy_drop=before.energy / self.period)
+        return jump
