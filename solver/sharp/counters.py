@@ -1,4 +1,4 @@
-"""What the work of method ``sharp`` cost, counted."""
+"""Counters of the work of method ``sharp``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Counters:
-    """What the work cost: field solutions, derivative solutions, fine openings and energies."""
+    """Numbers of field and derivative solutions, energies, fine openings and steps."""
 
     fields: int = 0
     derivatives: int = 0
@@ -15,3 +15,15 @@ class Counters:
     openings: int = 0
     newton_steps: int = 0
     descent_steps: int = 0
+
+    def newton(self, steps: int) -> None:
+        """Count the steps of a Newton iteration."""
+        self.newton_steps += steps
+        self.fields += steps
+        self.derivatives += steps
+
+    def descent(self, fields: int, tangents: int) -> None:
+        """Count the steps of a descent, of which some had a tangent of their own."""
+        self.descent_steps += fields
+        self.fields += fields
+        self.derivatives += tangents

@@ -1,112 +1,39 @@
-"""Moving real-valued edges: equilibrium by Newton, stability, and descent along a jump.
-
-The unknowns are the gap ends θ_e. An edge is in equilibrium where its opening C_e equals the
-critical one, C_c = 4 sqrt(q0 γ sqrt(1+h'²) / (π E*)) (Griffith); contact advances where C_e < C_c.
-With n_e the outward motion of the contact at edge e, the energy of the edges is stable where the
-matrix ∂(C_e - C_c)/∂n_f is positive definite (scaled by sqrt(C_e/C_f) it is symmetric: it is the
-Hessian of the energy divided by C).
-"""
+"""Mechanics of the contact edges of one problem: the choice between few and many gaps."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
-from adhesis.solver.method import PathError
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.descent.gradient_flow import LOST, MET, NARROW, RESTING, descend
+from adhesis.solver.sharp.descent.gradient_flow import LOST, MET, NARROW, RESTING
 from adhesis.solver.sharp.descent.local_descent import Start
-from adhesis.solver.sharp.descent.windowed_descent import descend_many
+from adhesis.solver.sharp.descent.trajectory import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.edge_elimination import between_edges
-from adhesis.solver.sharp.equilibrium.griffith import Law, imbalance, narrowest
-from adhesis.solver.sharp.equilibrium.hierarchical_newton import equilibrium_many
+from adhesis.solver.sharp.equilibrium.griffith import imbalance, narrowest
 from adhesis.solver.sharp.equilibrium.linear_exterior import About, known_about
-from adhesis.solver.sharp.equilibrium.newton import equilibrium
+from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many_plain
-from adhesis.solver.sharp.field.solution import FIXED, Hold, Solution
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.field.solution import FIXED, Hold
 from adhesis.solver.sharp.gap.ends import outward, widths, without_small
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import RULES
+from adhesis.solver.sharp.system.dense import DenseSystem
+from adhesis.solver.sharp.system.edge_problem import EdgeProblem
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Kinds
+from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
+from adhesis.solver.sharp.tolerances import (
+    DESCENT_LIMIT,
+    HIERARCHICAL_FROM,
+    LAST_GAP,
+    RESTS,
+    SAME_REST,
+)
 
-MANY = 30  # from so many gaps on, windows and the tree of gaps replace dense matrices
-CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min
-_NEAR = 1e-3  # descent steps shorter than this (in λ_min) are left to Newton's iteration
-_DESCENT_LIMIT = 100_000
-_RESTS = 20  # how often a descent may come to rest without a minimum that Newton's iteration finds
-_FAINT = 10.0  # forces this small, in units of the field's tolerance, are its error
 _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
-_ALIKE = 0.01  # edges of two descents that come to rest so near to each other, in λ_min, have met
 
 
-class Stage(NamedTuple):
-    """Part of a descent with one set of gaps.
-
-    Attributes
-    ----------
-    way : array, shape (2L,)
-        Outward motion of every edge.
-    taken : array, shape (2L, 2L)
-        Force, as C², that the motion of each edge (columns) took from every edge (rows).
-    """
-
-    way: Array
-    taken: Array
-
-
-@dataclass
-class Track:
-    """Edges that a descent went through, for another one to be compared with.
-
-    Attributes
-    ----------
-    ways : list of arrays, shape (n, 2L)
-        One for every set of gaps on the way.
-    astray, met : bool
-        Whether the other descent has left the track, and come back to it.
-    rest : array, optional
-        Gaps of a window in which the descent first came to rest.
-    stages : list of Stage
-        What the edges did, one for every set of gaps on the way.
-    whole : bool
-        Whether the stages are known.
-    """
-
-    ways: list[Array] = field(default_factory=list)
-    astray: bool = False
-    met: bool = False
-    rest: Array | None = None
-    stages: list[Stage] = field(default_factory=list)
-    whole: bool = True
-
-    def of(self, edges: int) -> Array:
-        """The track where there are so many edges."""
-        return np.concatenate(
-            [np.empty((0, edges)), *(w for w in self.ways if w.shape[1] == edges)]
-        )
-
-
-class FullContact(Exception):
-    """The last gap of the period closes: no state of gaps is left."""
-
-
-class NoState(PathError):
-    """The path has no state at d = ``at``; the text is the reason."""
-
-    def __init__(self, reason: str, at: float) -> None:
-        super().__init__(reason)
-        self.at = at
-
-
-class EdgeMechanics:
-    """Openings, equilibrium and stability of the edges of one problem, in units of 1/q0.
+class EdgeMechanics(EdgeProblem):
+    """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
     Parameters
     ----------
@@ -116,122 +43,94 @@ class EdgeMechanics:
     tolerance : float
         Relative accuracy of the field.
     hold : Hold
-        What is prescribed.
+        Prescribed quantity.
 
     Attributes
     ----------
     many : int
-        From so many gaps on they are solved on a tree and moved in windows.
-    lost : int
-        Edge that led away where :meth:`equilibrium` of many gaps last found none; -1 if unknown.
+        From so many gaps on the hierarchical system takes the place of the dense one.
     """
 
     def __init__(
         self, source: StressSource, critical: float, tolerance: float, hold: Hold = FIXED
     ) -> None:
-        self.source, self.critical, self.tolerance = source, critical, tolerance
-        self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
-        self.settled = 1e-7 * self.wave  # a correction this small ends Newton's iteration
-        # How far an equilibrium may move with the error of the field.
-        self.coarse = max(self.settled, 10 * tolerance * self.wave)
-        # Steps above 0.1 λ_min leap over pinned minima; an edge that runs alone takes twice this.
-        self.longest_step = 0.05 * self.wave
-        # Narrower patches and gaps are gone: far below the width at which a patch on the sharpest
-        # crest first comes to rest, (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8.
-        seed = (2 * critical**2 / source.sharpest**2) ** (1 / 3)
-        self.smallest = 0.005 * self.wave
-        if critical > 0:
-            self.smallest = min(self.smallest, 0.05 * seed)
-        # an opening this far below zero is an overlap that descent cannot weigh
-        rough = np.sqrt(source.m2 * self.wave)
-        self.law = Law(
-            critical=float(critical),
-            digits=float(-np.log(tolerance)),
-            settled=self.settled,
-            coarse=self.coarse,
-            near=_NEAR * self.wave,
-            longest=self.longest_step,
-            smallest=float(self.smallest),
-            overlapping=float(0.1 * max(critical, rough)),
-            hold=hold,
-            faint=max(_FAINT * tolerance, 1e-12) * float(critical) ** 2,
-            origin=source.highest,
-        )
-        self.many = MANY
-        self.lost = -1
-        self.count = Counters()
+        super().__init__(source, critical, tolerance, hold)
+        self.many = HIERARCHICAL_FROM
+        self._dense, self._hierarchical = DenseSystem(self), HierarchicalSystem(self)
+
+    def system(self, gaps: Array) -> EdgeSystem:
+        """Return the system of edges by which these gaps are solved."""
+        return self._dense if len(gaps) < self.many else self._hierarchical
+
+    def uses_windows(self, gaps: Array) -> bool:
+        """Whether these gaps are followed in windows."""
+        return self.system(gaps).uses_windows
 
     def field(self, gaps: Array, prescribed: float, *, share: float = 1.0) -> GapField:
         """Solve the field of these gaps, to a ``share`` of the tolerance."""
         self.count.fields += 1
-        solution = None
-        if len(gaps) >= self.many:
-            digits = self.law.digits - math.log(share)
-            kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
-            solution = Solution(
-                *solve_many_plain(
-                    gaps, prescribed, self.law.hold, kinds, digits, 2, RULES, self.source.panels
-                )
-            )
-        tolerance = share * self.tolerance
-        return GapField(self.source, gaps, prescribed, tolerance, self.law.hold, solution)
+        solution = self.system(gaps).solution(gaps, prescribed, share)
+        return GapField(
+            self.source, gaps, prescribed, share * self.tolerance, self.law.hold, solution
+        )
 
-    def stiffness(self, point: Point, edges: NDArray[np.int64]) -> Array:
-        """∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
+    def stiffness(self, point: Point, edges: Kinds) -> Array:
+        """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
 
         The diagonal is not given for many gaps.
         """
-        gaps = point.gaps
-        if len(gaps) < self.many:
-            by_edge = point.field.derivatives[0][np.ix_(edges, edges)]
-        else:
-            of = point.field.solution
-            by_edge = between_edges(
-                gaps, point.at, self.law.hold, of.kinds, self.law.digits, edges, RULES,
-                self.source.panels,
-            )  # fmt: skip
-        return np.asarray(by_edge * outward(gaps)[edges])
+        by_edge = self.system(point.gaps).stiffness(point, edges)
+        return np.asarray(by_edge * outward(point.gaps)[edges])
 
     def equilibrium(
         self,
         gaps: Array,
         prescribed: float,
         reach: float,
-        kinds: NDArray[np.int64] = _ANY,
+        kinds: Kinds = _ANY,
         *,
         patient: bool = True,
     ) -> Point | None:
-        """Stable equilibrium near these gaps, or None.
+        """Return the stable equilibrium near these gaps, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
         equilibrium is not stable. ``kinds`` are the least kinds of the gaps. If not ``patient``,
         gaps that are nearly in equilibrium are taken as they are.
         """
+        return self.correct(gaps, prescribed, reach, kinds, patient=patient)[0]
+
+    def correct(
+        self,
+        gaps: Array,
+        prescribed: float,
+        reach: float,
+        kinds: Kinds = _ANY,
+        *,
+        patient: bool = True,
+    ) -> tuple[Point | None, int]:
+        """Return the equilibrium as :meth:`equilibrium` does, and the edge that moved away instead.
+
+        That is -1 where one is found, or where no single edge is known.
+        """
         if not narrowest(gaps) > 0:
-            return None
+            return None, -1
+        system = self.system(gaps)
         try:
-            newton = equilibrium if len(gaps) < self.many else equilibrium_many
-            found, at, solution, rate, slope, steps = newton(
-                gaps, prescribed, max(reach, self.settled), kinds, patient, self.law, RULES,
-                self.source.panels,
-            )  # fmt: skip
+            result = system.equilibrium(
+                gaps, prescribed, max(reach, self.settled), kinds, patient=patient
+            )
         except np.linalg.LinAlgError:
-            return None
-        self.count.newton_steps += steps
-        self.count.fields += steps
-        self.count.derivatives += steps
-        if not found:
-            self.lost = -1
-            if len(gaps) >= self.many and np.isfinite(rate).all():
-                self.lost = int(np.argmax(np.abs(rate)))
-            return None
-        about = solution if isinstance(solution, About) else None
-        of = about.of if about else Solution(*solution)
-        field = GapField(self.source, at, prescribed, self.tolerance, self.law.hold, of)
-        return Point(prescribed, field, rate, slope, about=about)
+            return None, -1
+        if not result.found:
+            return None, result.lost_edge
+        field = GapField(
+            self.source, result.gaps, prescribed, self.tolerance, self.law.hold, result.solution
+        )
+        about = result.linearisation
+        return Point(prescribed, field, result.rate, result.slope, about=about), -1
 
     def about(self, point: Point) -> About:
-        """What windows on a point of many gaps are opened with."""
+        """Linearise a point of many gaps, for the windows that are set up on it."""
         if point.about is not None:
             return point.about
         self.count.fields += 1
@@ -242,32 +141,11 @@ class EdgeMechanics:
         return known
 
     def start(self, point: Point | None) -> Start | None:
-        """``point`` as the start of a descent in a window; None for few gaps."""
-        if point is None or len(point.gaps) < self.many:
+        """Return ``point`` as the start of a descent in a window; None for few gaps."""
+        if point is None or not self.uses_windows(point.gaps):
             return None
         leads = int(np.argmax(np.abs(point.rate))) // 2
         return Start(point.gaps, self.about(point), leads)
-
-    def _begun(
-        self, start: Start, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
-        track: Track,
-    ) -> Point | Array | None:  # fmt: skip
-        """As :meth:`relax`, in a window on a known state; gaps to go on from if that is no end."""
-        rest = start.descend(
-            gaps, prescribed, self.law, self.source.panels, self.count, self.smallest,
-            equal_speeds=equal_speeds,
-        )  # fmt: skip
-        if rest is None:
-            return None
-        if rest.ended == RESTING:
-            if not equal_speeds:
-                track.rest = rest.local
-            elif track.rest is not None and track.rest.shape == rest.local.shape:
-                track.met = bool(np.abs(track.rest - rest.local).max() < _ALIKE * self.wave)
-            point = None if track.met else self.equilibrium(rest.gaps, prescribed, reach)
-            if point is not None:
-                return point
-        return rest.gaps
 
     def relax(
         self,
@@ -279,9 +157,9 @@ class EdgeMechanics:
         track: Track | None = None,
         start: Start | None = None,
     ) -> Point | Array:
-        """Descend in energy, what is prescribed being fixed, to the next minimum.
+        """Descend in energy at a prescribed value to the next minimum.
 
-        By linear kinetics, which leaves its ``track``; or with ``equal_speeds`` by the rule it is
+        By linear kinetics, which extends the ``track``; or with ``equal_speeds`` by the rule it is
         compared with, until that has met the track. From a ``start`` in a window.
 
         Returns
@@ -299,15 +177,9 @@ class EdgeMechanics:
         """
         # Without adhesion the minimum is unique, and the energy's slope vanishes there twice.
         equal_speeds = equal_speeds or self.critical == 0
-        law = self.law
-        left = _DESCENT_LIMIT
-        kinds = _ANY
-        rests = 0
         track = track or Track()
-        other = track.of(gaps.size if equal_speeds else 0)
-        if start is not None and len(gaps) >= self.many:
-            track.whole = False
-            begun = self._begun(start, gaps, prescribed, reach, equal_speeds, track)
+        if start is not None and self.uses_windows(gaps):
+            begun = self._relax_in_window(start, gaps, prescribed, reach, equal_speeds, track)
             if isinstance(begun, Point):
                 return begun
             if track.met:
@@ -317,58 +189,83 @@ class EdgeMechanics:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
-        while left > 0:
-            panels = self.source.panels
-            if len(gaps) < self.many:
-                begin = gaps
-                gaps, ended, fields, tangents, kinds, way, track.astray, taken = descend(
-                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels, other,
-                    track.astray,
-                )  # fmt: skip
-                if not equal_speeds:
-                    track.ways.append(way)
-                    moved = outward(gaps) * (gaps - begin).ravel()
-                    track.stages.append(Stage(moved, taken))
-            else:
-                track.whole = False
-                gaps, ended, fields, tangents, kinds = descend_many(
-                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels
-                )
-            self.count.fields += fields
-            self.count.descent_steps += fields
-            self.count.derivatives += tangents
-            left -= fields
-            if ended == MET:
+        return self._relax(gaps, prescribed, reach, equal_speeds, track)
+
+    def _relax_in_window(
+        self, start: Start, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
+        track: Track,
+    ) -> Point | Array | None:  # fmt: skip
+        """Descend in a window on a known state; return gaps to go on from if that is no end."""
+        track.whole = False
+        rest = start.descend(
+            gaps, prescribed, self.law, self.source.panels, self.count, self.smallest,
+            equal_speeds=equal_speeds,
+        )  # fmt: skip
+        if rest is None:
+            return None
+        if rest.ended == RESTING:
+            if not equal_speeds:
+                track.rest = rest.local
+            elif track.rest is not None and track.rest.shape == rest.local.shape:
+                track.met = bool(np.abs(track.rest - rest.local).max() < SAME_REST * self.wave)
+            point = None if track.met else self.equilibrium(rest.gaps, prescribed, reach)
+            if point is not None:
+                return point
+        return rest.gaps
+
+    def _relax(
+        self, gaps: Array, prescribed: float, reach: float, equal_speeds: bool, track: Track
+    ) -> Point | Array:
+        """Descend with all gaps."""
+        system = self.system(gaps)
+        left, kinds, rests, smallest = DESCENT_LIMIT, _ANY, 0, self.law.smallest
+        while left > 0 and rests <= 2 * RESTS:
+            end = system.descend(
+                gaps, prescribed, left, kinds, smallest, track, equal_speeds=equal_speeds
+            )
+            gaps, kinds = end.gaps, end.kinds
+            left -= end.fields
+            if end.ended == MET:
                 track.met = True
                 return np.empty((0, 2))
-            if ended == LOST:
+            if end.ended == LOST:
                 raise NoState("there is no field of these edges", prescribed)
-            if ended == NARROW:
+            if end.ended == NARROW:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
-                if len(gaps) == 1:
-                    length, _ = widths(gaps)
-                    if length[0] < self.smallest and law.hold.give > 0:
-                        raise FullContact
-                    # at fixed separation the last gap never closes, however narrow it gets
-                    law = law._replace(smallest=min(law.smallest, 0.05 * float(length[0])))
-            if ended == RESTING:
+                smallest = self._smallest_of_last_gap(gaps, smallest)
+            if end.ended == RESTING:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1
-                patient = rests <= _RESTS
+                patient = rests <= RESTS
                 point = self.equilibrium(gaps, prescribed, reach, kinds, patient=patient)
                 if point is not None:
                     return point
-                if rests > 2 * _RESTS:
-                    break
-                if not patient:
-                    gaps = self._pushed_on(gaps, prescribed, rests - _RESTS)
+                if not patient and rests <= 2 * RESTS:
+                    gaps = self._pushed_on(gaps, prescribed, rests - RESTS)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
+    def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
+        """Return the length below which the last gap is closed.
+
+        At fixed separation it never closes, however narrow it gets.
+
+        Raises
+        ------
+        FullContact
+            If it closes, where the separation is not fixed.
+        """
+        if len(gaps) > 1:
+            return smallest
+        length, _ = widths(gaps)
+        if length[0] < self.smallest and self.law.hold.give > 0:
+            raise FullContact
+        return min(smallest, LAST_GAP * float(length[0]))
+
     def _pushed_on(self, gaps: Array, prescribed: float, times: int) -> Array:
-        """Gaps whose most unbalanced edge has gone on, ``times`` half a longest step.
+        """Move the most unbalanced edge on by ``times`` half a longest step.
 
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no
         minimum: the flow stands still there. A minimum draws the edge back.

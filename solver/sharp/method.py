@@ -25,34 +25,36 @@ from adhesis.solver.method import (
 )
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Profile
+from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.runtime.threads import on_one_thread, one_at_a_time
-from adhesis.solver.sharp.continuation.branch import Follower, Resolution, Target
+from adhesis.solver.sharp.continuation.branch import Target
+from adhesis.solver.sharp.continuation.follower import Follower
+from adhesis.solver.sharp.continuation.history import History
 from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics, FullContact, NoState
-from adhesis.solver.sharp.nucleation.nucleation import Nucleation
-from adhesis.solver.sharp.output.contact_states import States, Trace, hold_of
+from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
+from adhesis.solver.sharp.output.contact_states import States, hold_of
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
-
-_RESOLUTION = 0.05  # resolution of a jump's separation, in units of accuracy·h_max
-_NOISE = 1e-13  # of h_max: no jump is located more finely
-# Least error of a drop that the error of the field makes, in units of the accuracy; folds that the
-# field's error displaces by more count with that (Follower._displaced).
-_FIELD_SHARE = 0.05
-_FIELD_ACCURACY = 1e-2  # accuracy of the field in units of the accuracy of the loss
-_LEAST_TOLERANCE = 1e-14
-_PLACING = 3e-3  # error of the field at most, in units of the openings that roughness makes
-# A jump may be late by a work of this share of its drop (in units of the accuracy), a jump whose
-# drop is negligible beside the work of adhesion by that share of the latter.
-_LATE = 0.5
-_LEAST_DROP = 2e-3
-# Nearer to a fold than this (in units of the field's accuracy, times h_max) the field's error hides
-# whether there is a minimum.
-_FINEST = 0.5
-_FINER_UNDER_LOAD = 1e-2
-_BEND = 1.5e-4  # largest relative error of the trapezoidal rule over one step
+from adhesis.solver.sharp.tolerances import (
+    CORRECTED,
+    FIELD_ACCURACY,
+    FIELD_RESOLVES,
+    FIELD_SHARE,
+    FINER_UNDER_LOAD,
+    JUMP_RESOLUTION,
+    LARGEST_FIELD_TOLERANCE,
+    LATE_DROP,
+    LEAST_DROP,
+    LEAST_FIELD_TOLERANCE,
+    LEAST_JUMP_RESOLUTION,
+    PLACED_BY_PROFILE,
+    TRAPEZOID,
+)
 
 
 @dataclass(frozen=True)
@@ -129,25 +131,25 @@ class SharpMethod(Method):
         weak = _weakness(profile, critical)
         # Under a load s goes like a square root before a fold, and where contact is lost it counts.
         load = problem.control.is_load
-        finer = _FINER_UNDER_LOAD if load else 1.0
-        tolerance = _FIELD_ACCURACY * accuracy * weak**2 * finer
-        tolerance = float(np.clip(tolerance, _LEAST_TOLERANCE, 1e-5))
+        finer = FINER_UNDER_LOAD if load else 1.0
+        tolerance = FIELD_ACCURACY * accuracy * weak**2 * finer
+        tolerance = float(np.clip(tolerance, LEAST_FIELD_TOLERANCE, LARGEST_FIELD_TOLERANCE))
         # The profile alone holds a last gap in its place, by openings so much smaller than C_c.
         strength = _strength(profile, critical)
         if strength > 0:
-            tolerance = max(min(tolerance, _PLACING / strength), _LEAST_TOLERANCE)
+            tolerance = max(min(tolerance, PLACED_BY_PROFILE / strength), LEAST_FIELD_TOLERANCE)
         source = StressSource(profile, tolerance)
         self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
         self.states = States(problem, source, self.edges.count)
-        finest = max(_FINEST * tolerance, _NOISE)
+        finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)
         self.resolution = Resolution(
-            jump=max(_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
-            bend=float(_BEND * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**1.25),
-            scale=h_max,
+            jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
+            bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**1.25),
+            h_max=h_max,
             finest=finest * h_max,
-            late=_LATE * accuracy,
-            least_drop=_LEAST_DROP * problem.work_of_adhesion,
-            field_share=_FIELD_SHARE * accuracy,
+            late=LATE_DROP * accuracy,
+            least_drop=LEAST_DROP * problem.work_of_adhesion,
+            field_share=FIELD_SHARE * accuracy,
         )
         self.nucleation = Nucleation(problem, self.edges)
         self.jumps = Jumps(self.edges, self.nucleation, self.states)
@@ -163,7 +165,7 @@ class SharpMethod(Method):
             chosen=self.chosen,
             accuracy=self.accuracy,
             field_tolerance=self.edges.tolerance,
-            jump_resolution=self.resolution.jump / self.resolution.scale,
+            jump_resolution=self.resolution.jump / self.resolution.h_max,
             **asdict(self.edges.count),
         )
 
@@ -194,7 +196,7 @@ class SharpMethod(Method):
         try:
             if self.problem.work_of_adhesion == 0:
                 return self._follow_reversibly(state, target)
-            trace = self._trace(state, target)
+            history = self._history(state, target)
         except FullContact:
             raise PathError(self.problem.full_contact(prescribed)) from None
         except NoState as failed:
@@ -203,16 +205,16 @@ class SharpMethod(Method):
                 f"method 'sharp' finds no state at {place}: {failed}; the method 'grid', another "
                 "accuracy or other load steps may get past it"
             ) from failed
-        return Path(tuple(trace.states), tuple(trace.jumps), self._error(trace))
+        return Path(tuple(history.states), tuple(history.jumps), self._error(history))
 
-    def _error(self, trace: Trace) -> float:
+    def _error(self, history: History) -> float:
         """Estimate the error of the loss, in J/m²: jumps not at their places, and the field's."""
-        drops = sum(abs(jump.energy_drop) for jump in trace.jumps)
-        return trace.misplaced + self.resolution.field_share * drops
+        drops = sum(abs(jump.energy_drop) for jump in history.jumps)
+        return history.misplaced + self.resolution.field_share * drops
 
-    def _trace(self, state: ContactState, target: Target) -> Trace:
+    def _history(self, state: ContactState, target: Target) -> History:
         """States and jumps from ``state`` to the target."""
-        trace = Trace()
+        history = History()
         control = self.problem.control
         at = self.states.place(state)
         # the separation of a state at the target, where it is known without rounding
@@ -223,12 +225,12 @@ class SharpMethod(Method):
             first = 0.0 if control.is_load else touch
             if target.branch == "unloading" or target.at > first:
                 apart = state.separation if control.is_load else target.prescribed
-                trace.states.append(self.detached(apart))
-                return trace
+                history.states.append(self.detached(apart))
+                return history
             at = first
             before = self.states.detached(touch)
-            trace.states.append(before)
-            point = self.jumps.run(trace, before, np.empty((0, 2)), at, target.branch, highest)
+            history.states.append(before)
+            point = self._jump(history, before, np.empty((0, 2)), at, target, highest)
         else:
             gaps = state.internal.gaps
             if point is None:
@@ -239,17 +241,31 @@ class SharpMethod(Method):
                 at = point.at  # but for rounding the place of the state
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, at))
-                trace.states.append(before)
-                point = self.jumps.run(trace, before, gaps, at, target.branch)
+                history.states.append(before)
+                point = self._jump(history, before, gaps, at, target)
             elif at == target.at:
-                trace.states.append(self.states.of_point(point, exact))
+                history.states.append(self.states.of_point(point, exact))
         while point is not None and at != target.at:
-            at, point = self.follower.run(trace, point, target)
+            at, point = self.follower.run(history, point, target)
         if point is None and at != target.at and not control.is_load:
             if self.edges.critical > 0 and self.states.overlaps_when_detached(min(at, target.at)):
                 raise NoState("contact is lost where surfaces overlap", at)
-            trace.states.append(self.detached(target.prescribed))
-        return trace
+            history.states.append(self.detached(target.prescribed))
+        return history
+
+    def _jump(
+        self,
+        history: History,
+        before: ContactState,
+        gaps: Array,
+        at: float,
+        target: Target,
+        touches: list[Touch] | None = None,
+    ) -> Point | None:
+        """Jump from a state that no branch led to; return the point after it."""
+        jump = self.jumps.compute(before, gaps, at, target.branch, touches)
+        history.commit(jump)
+        return jump.point
 
     def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
         """Without adhesion the state is unique, and nothing jumps.
@@ -259,7 +275,7 @@ class SharpMethod(Method):
         """
         place = self.problem.prescribed_in
         if target.branch == "loading":
-            states = self._trace(state, target).states
+            states = self._history(state, target).states
             self._loaded += states
             return Path(tuple(states), ())
         lighter = [s for s in self._loaded if place(s) >= target.prescribed]
@@ -270,6 +286,6 @@ class SharpMethod(Method):
         )
         start = min(lighter, key=place, default=first)
         if place(start) > target.prescribed:
-            start = self._trace(start, replace(target, branch="loading")).states[-1]
+            start = self._history(start, replace(target, branch="loading")).states[-1]
         back.reverse()  # states at one place come in the order opposite to loading
         return Path((*sorted(back, key=place), start), ())

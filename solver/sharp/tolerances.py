@@ -9,14 +9,177 @@ from __future__ import annotations
 
 # ---------------------------------------------------------------- field of given edges
 
+HIERARCHICAL_FROM = 30
+"""Number of gaps from which on the tree of clusters and windows replace dense matrices.
+
+Measured: a loop of 20 gaps is 8 to 45 % slower with the tree (benchmarks/windows.py).
+"""
+
 # ---------------------------------------------------------------- equilibrium of the edges
+
+SETTLED = 1e-7
+"""λ_min. A correction this small ends Newton's iteration."""
+COARSE_FIELD = 10.0
+"""λ_min per relative error of the field: how far an equilibrium may move with that error."""
+CORRECTED = 0.05
+"""λ_min. Longest correction of an equilibrium that is searched nearby."""
+SMALLEST_LENGTH = 0.005
+"""λ_min. Narrower patches and gaps are removed."""
+SMALLEST_OF_SEED = 0.05
+"""Likewise, of the width at which a patch on the sharpest crest first comes to rest."""
+LAST_GAP = 0.05
+"""Share of its length to which the last gap of a period may still shrink."""
+OVERLAPPING = 0.1
+"""An opening this far below zero, of C_c or of the openings that roughness makes, is an overlap
+that descent cannot weigh."""
+FAINT_FORCE = 10.0
+"""C_c² per relative error of the field: forces this small are that error."""
+LEAST_FAINT_FORCE = 1e-12
+"""C_c². Forces this small are rounding."""
 
 # ---------------------------------------------------------------- windows of few gaps among many
 
+WINDOW_HALF_WIDTH = 3
+"""Gaps of a window on each side of the edge that it is set up around."""
+WINDOW_LEAD_MOTION = 0.15
+"""λ_min. A motion of this length ends the stretch of an edge as a fold does."""
+EXTERIOR_MOTION = 0.05
+"""λ_min. Motion of the exterior edges up to which their response is taken as linear."""
+EXTERIOR_BEFORE_FOLD = 0.5
+"""Share of the distance to its own fold that an exterior edge may cover."""
+EXTERIOR_LEAST_SPAN = 0.1
+"""Least share of the span that the motion of the exterior allows, whatever its folds."""
+EXTERIOR_BEND = 0.5
+"""Share of its straight motion by which an exterior edge is predicted to bend at most."""
+EXTERIOR_MISSED = 0.02
+"""λ_min. An exterior edge found further than this from its prediction has lost the branch."""
+
 # ---------------------------------------------------------------- descent in energy
+
+LONGEST_STEP = 0.05
+"""λ_min. Longest step of a running edge, of one that runs alone twice this: steps above 0.1 leap
+over pinned minima."""
+DESCENT_HANDS_OVER = 1e-3
+"""λ_min. Shorter descent steps are left to Newton's iteration."""
+DESCENT_LIMIT = 100_000
+"""Steps of one descent."""
+RESTS = 20
+"""How often a descent may come to rest without a minimum that Newton's iteration finds."""
+SAME_REST = 0.01
+"""λ_min. Two descents in one window that come to rest this near to each other have met."""
+MOST_NUCLEATIONS = 10_000
+"""Nucleations in one jump; more are an endless loop."""
+RAN = 0.05
+"""λ_min. An edge that moved further than this in a descent has run."""
+HELD_BACK = 0.03
+"""C_c². Runners that take less force than this from each other do not race."""
+OTHER_MINIMUM = 0.01
+"""λ_min. Edges this far apart are those of different minima."""
 
 # ---------------------------------------------------------------- nucleation
 
+FASTEST_CLOSING = 4.0
+"""A gap closes locally at most so many times faster than gaps on average."""
+CLOSING_OF_MANY = 1.0
+"""Likewise for many gaps: a search costs more than to return to a touch that was passed."""
+CLOSING_BY_MOTION = 4.0
+"""The motion of one gap's edges counts so many times where it may close others, of many gaps."""
+OVERLAP = 1e-6
+"""h_max. Smaller overlaps may remain in a state."""
+TOUCH_TRIALS = 60
+"""Trials to locate a touch; a bisection would exhaust the digits."""
+CLEAR_TRIALS = 2
+"""Trials by the secant that find no overlap, one after the other, before a bisection."""
+BISECTION_EVERY = 5
+"""Of many gaps, which are interpolated one by one, one in so many trials is a bisection."""
+TRIAL_FROM_END = 1e-4
+"""Share of an interval within which of its ends no trial is made."""
+COMPARABLE = 0.3
+"""λ_min. Edges that moved by less than this leave a gap comparable to what was searched."""
+CLOSING_SAFETY = 1.5
+"""Safety factor on the closing that the nodes of the field show."""
+CLEARANCE_LEFT = 0.3
+"""Share of a clearance that must surely be left, else the gap is searched again."""
+NO_MINIMUM_WITHIN = 0.12
+"""λ_min. Nearer to the ends of a gap no minimum appears in a gap that has none."""
+MINIMUM_IS_LOW = 0.1
+"""Of the parabola's rise over its half-width: lower minima are located more finely."""
+MINIMUM_DOUBT = 3.0
+"""So many estimated errors above zero a minimum is surely open."""
+MINIMUM_REFINEMENTS = 3
+"""Parabolas by which a low minimum is located, each an eighth as wide as the one before."""
+NO_CURVATURE = 1e-100
+"""Half the curvature of a minimum where none is seen."""
+
 # ---------------------------------------------------------------- continuation of a branch
 
+FIRST_MOTION = 0.05
+"""λ_min. Longest predicted motion of an edge in the first step after a jump, which is straight."""
+PREDICTED_MOTION = 0.15
+"""λ_min. Longest predicted motion of an edge in one step."""
+SAME_BRANCH = 1e-3
+"""λ_min. Edges that a descent moves by less than this have not left their branch."""
+STEP_GROWTH = 2.0
+"""Largest growth of the step after an accepted one."""
+STEP_REDUCTION = 0.25
+"""Reduction of the step where no equilibrium is found."""
+FOLD_RESOLVED = 0.999
+"""Of the resolution of a jump: the shortest step, rounding apart."""
+PREDICTION_TRUSTED = 4.0
+"""Distances between its points beyond which a predictor is not trusted."""
+CUBIC_TRUSTED = 5.0
+"""Likewise for a fold of the cubic, in motions of the leading edge."""
+CUBIC_OF_OTHERS_TRUSTED = 1.5
+"""Likewise for the cubics of the other edges."""
+LEFT_BEFORE_FOLD = 0.1
+"""Share of the distance to a fold that is left to the next step."""
+LEAST_LEFT_BEFORE_FOLD = 0.3
+"""Likewise at least, of the resolution of a jump."""
+BEYOND_FOLD = 0.2
+"""Of the resolution of a jump: so far beyond a fold there is surely no equilibrium."""
+PREDICTOR_ITERATIONS = 60
+"""Bisections that invert the cubic of the leading edge; more would exhaust the digits."""
+TRAPEZOID_FAR = 4.0
+"""Of the allowed error of the trapezoidal rule: a step with more is halved."""
+QUIET_STRESS = 0.05
+"""σ~. Smaller mean stresses do not tighten the trapezoidal rule."""
+FOLD_BELIEVED = 4.0
+"""A fold of an exterior edge is not trusted beyond so many times the distance of the two rates that
+predict it."""
+
 # ---------------------------------------------------------------- error of the loss
+
+JUMP_RESOLUTION = 0.05
+"""accuracy·h_max. Separation to which jumps are located at first."""
+LEAST_JUMP_RESOLUTION = 1e-13
+"""h_max. No jump is located more finely: this is rounding."""
+FIELD_RESOLVES = 0.5
+"""h_max per relative error of the field: nearer to a fold that error hides whether there is a
+minimum."""
+FINER_UNDER_LOAD = 1e-2
+"""Factor on the field's tolerance under a load: before a fold s goes like a square root, and where
+contact is lost it counts."""
+FIELD_ACCURACY = 1e-2
+"""Accuracy of the loss: relative accuracy of the field."""
+LEAST_FIELD_TOLERANCE = 1e-14
+"""Smallest relative tolerance of the field: rounding."""
+LARGEST_FIELD_TOLERANCE = 1e-5
+"""Largest relative tolerance of the field."""
+PLACED_BY_PROFILE = 3e-3
+"""Largest error of the field in units of the openings that roughness makes, which alone hold the
+last gap in its place."""
+FIELD_SHARE = 0.05
+"""Accuracy of the loss: least error of a drop that the error of the field makes; folds that the
+field's error displaces by more count with that."""
+LATE_DROP = 0.5
+"""Accuracy of the loss: a jump may be late by a work of this share of its drop."""
+LEAST_DROP = 2e-3
+"""γ. Drops below this are taken as this when the lateness of a jump is judged."""
+LATE_REFINEMENT = 0.5
+"""Of the allowed lateness: what a fold that was found too late is located to."""
+LEAST_REFINEMENT = 1e-3
+"""Largest factor by which a fold's location is refined at once."""
+FINER_FIELD = 1e-2
+"""Tolerance, over that of the path, of the field that shows the error of the path's."""
+TRAPEZOID = 1.5e-4
+"""Largest relative error of the trapezoidal rule over one step at accuracy 1e-3."""

@@ -27,7 +27,8 @@ from adhesis.solver.method import Method, PathError
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.runtime import threads as one_thread
 from adhesis.solver.runtime.threads import on_one_thread
-from adhesis.solver.sharp.mechanics import EdgeMechanics, NoState
+from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 
 WAVE = single_wave(1e-6, 1e-3)

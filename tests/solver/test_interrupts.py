@@ -28,8 +28,8 @@ from adhesis.solver.precompile import COMPILED_METHODS, _small_loops, small_prob
 from adhesis.solver.registry import make_method
 from adhesis.solver.runtime import jit as compiled
 from adhesis.solver.runtime.uninterrupted import uninterrupted
+from adhesis.solver.sharp.descent.trajectory import Stage
 from adhesis.solver.sharp.field.solution import Hold
-from adhesis.solver.sharp.mechanics import Stage
 from tools.interrupted import Interrupt, interrupted
 
 KERNELS = 20  # at least so many are called from Python

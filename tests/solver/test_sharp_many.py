@@ -29,8 +29,9 @@ from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
-from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics
+from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.sharp.tolerances import CORRECTED
 from tests.support import next_to_a_fold
 
 

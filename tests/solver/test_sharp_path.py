@@ -16,8 +16,8 @@ from adhesis import (
 )
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp.continuation import branch as follow
-from adhesis.solver.sharp.continuation.predictor import Course
+from adhesis.solver.sharp.continuation import branch as stable_branch
+from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.explicit_solution import explicit_openings
 
@@ -259,26 +259,26 @@ def test_a_step_across_a_fold_that_is_none_is_taken_once(monkeypatch):
     """
     method = SharpMethod(Problem(single_wave(1e-6, PERIOD), SOLID, 0.01), accuracy=0.03)
     finest = method.follower.resolution.jump
-    real = follow.advance
+    real = stable_branch.correct
     calls, feigned = [], []
 
-    def advance(edges, course, at, windows):
-        calls.append(course)
+    def correct(edges, predictor, at):
+        calls.append(predictor)
         assert len(calls) < 2000, "the same step is taken for ever"
-        if not feigned and course.way and course.ahead > 20 * finest:
-            feigned.append(course)
-        if course in feigned:
-            course.ahead = 1.5 * finest
-            if not 1 < abs(at - course.point.at) / course.ahead < 1.5:
+        if not feigned and predictor.way and predictor.fold_distance > 20 * finest:
+            feigned.append(predictor)
+        if predictor in feigned:
+            predictor.fold_distance = 1.5 * finest
+            if not 1 < abs(at - predictor.point.at) / predictor.fold_distance < 1.5:
                 return None
-            course = Course(course.point)
-        return real(edges, course, at, windows)
+            predictor = Predictor(predictor.point)
+        return real(edges, predictor, at)
 
-    def bends(follower, shown, point):
+    def bends(branch, output, point):
         return 5.0 if calls[-1] in feigned else 0.0
 
-    monkeypatch.setattr(follow, "advance", advance)
-    monkeypatch.setattr(follow.Follower, "_trapezoid_error", bends)
+    monkeypatch.setattr(stable_branch, "correct", correct)
+    monkeypatch.setattr(stable_branch.Branch, "_trapezoid_error", bends)
     result = run_loop(method, max_penetration=0.5, load_steps=10)
     assert feigned
     assert result.pull_off_penetration < 0

@@ -1,4 +1,4 @@
-"""A jump: descent in energy at fixed separation, and what touches afterwards."""
+"""A jump: descent in energy at a prescribed value, and nucleation afterwards."""
 
 from __future__ import annotations
 
@@ -6,22 +6,20 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.continuation.history import ComputedJump
+from adhesis.solver.sharp.continuation.races import RaceCheck
 from adhesis.solver.sharp.descent.local_descent import Start
+from adhesis.solver.sharp.descent.trajectory import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics, FullContact, NoState, Track
+from adhesis.solver.sharp.errors import FullContact, NoState
+from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.output.contact_states import States, Trace
-
-_MOST_TOUCHES = 10_000  # nucleations in one jump; more is a bug
-_RAN = 0.05  # an edge that went further than this, in λ_min, ran
-_HELD_BACK = 0.03  # runners that take less than this share of C_c² from each other do not race
-_ELSEWHERE = 0.01  # edges this far apart, in λ_min, are those of different minima
+from adhesis.solver.sharp.output.contact_states import States
+from adhesis.solver.sharp.tolerances import CORRECTED, MOST_NUCLEATIONS, OTHER_MINIMUM
 
 Rival = Point | None | FullContact
 """Where equal speeds led: a minimum, no contact, or full contact (under a load)."""
@@ -39,23 +37,21 @@ class Jumps:
 
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
+        self.races = RaceCheck(edges)
 
-    def run(
+    def compute(
         self,
-        trace: Trace,
         before: ContactState,
         start: Array,
         at: float,
         branch: Branch,
         touches: list[Touch] | None = None,
         known: Point | None = None,
-    ) -> Point | None:
-        """Descend at q0 s = ``at`` from the gaps ``start``; adds the jump and the state after it.
+    ) -> ComputedJump:
+        """Descend at d = ``at`` from the gaps ``start`` to the next state in which nothing touches.
 
-        The gaps are those of a ``known`` equilibrium, or nearly.
-
-        Returns the minimum as it was found: next to a fold it may not be found again from its own
-        edges. None if no contact is left.
+        The gaps are those of a ``known`` equilibrium, or nearly. The point of the result is the
+        minimum as it was found: next to a fold it may not be found again from its own edges.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals, known)
@@ -74,11 +70,10 @@ class Jumps:
             else:
                 if not self._alike(rival, point):
                     other = self._after(before, rival, at)
-        trace.jumps.append(self.states.jump(before, after, branch, other))
-        trace.states.append(after)
-        if known is not None and point is not None and len(point.gaps) >= self.edges.many:
+        jump = self.states.jump(before, after, branch, other)
+        if known is not None and point is not None and self.edges.uses_windows(point.gaps):
             point = point.heir(known, CORRECTED * self.edges.wave)
-        return point
+        return ComputedJump(at, (after,), jump, point)
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
         """State that a descent led to."""
@@ -114,7 +109,7 @@ class Jumps:
         """
         # without adhesion patches narrower than the least are left out, and overlap so much
         adhesive = self.edges.critical > 0
-        for _ in range(_MOST_TOUCHES):
+        for _ in range(MOST_NUCLEATIONS):
             if point is None:
                 if not (adhesive and self.states.overlaps_when_detached(at)):
                     return None
@@ -137,7 +132,7 @@ class Jumps:
         if one is None or other is None:
             return one is other
         here, there = one.field.gaps, other.field.gaps
-        apart = max(_ELSEWHERE * self.edges.wave, 10 * self.edges.coarse)
+        apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.coarse)
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
     def _same(self, one: Array, other: Array) -> bool:
@@ -162,7 +157,7 @@ class Jumps:
         track = Track()
         start = self.edges.start(known)
         point = self._relax(gaps, at, track=track, start=start)
-        if not rivals and self._may_have_raced(gaps, point, track):
+        if not rivals and self.races.may_occur(gaps, point, track):
             try:
                 rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
             except FullContact as full:
@@ -190,39 +185,3 @@ class Jumps:
                 return found
             gaps, start = found, None
         return None
-
-    def _may_have_raced(self, start: Array, end: Point | None, track: Track) -> bool:
-        """Whether the order in which edges ran from ``start`` can have decided where they ended.
-
-        It can where they hold each other back: edges that only help each other on reach the same
-        minimum in any order. So the force is asked for that the runners took from each other: to
-        first order in their ways and with the tangent at the end or, where patches or gaps went,
-        along the ``track``, for every set of gaps on it. Of many gaps that is not known.
-        """
-        if end is None and len(start) == 1:
-            return False
-        if end is None or end.field.gaps.shape != start.shape:
-            return not track.whole or any(
-                self._hold_back(stage.way, stage.taken) for stage in track.stages
-            )
-        gaps = end.field.gaps
-        way = outward(gaps) * (gaps - start).ravel()
-        runners = self._runners(way)
-        if len(runners) < 2:
-            return False
-        opening = end.field.solution.opening[runners]
-        stiffness = opening[:, None] * self.edges.stiffness(end, runners)
-        return self._hold_back(way[runners], (stiffness + stiffness.T) * way[runners])
-
-    def _runners(self, way: Array) -> NDArray[np.int64]:
-        return np.flatnonzero(np.abs(way) > _RAN * self.edges.wave)
-
-    def _hold_back(self, way: Array, taken: Array) -> bool:
-        """Whether the motion of runners (columns) took so much force from others (rows)."""
-        runners = self._runners(way)
-        if len(runners) < 2:
-            return False
-        taken = taken[np.ix_(runners, runners)] * np.sign(way[runners])[:, None]
-        np.fill_diagonal(taken, 0.0)
-        held_back = np.maximum(taken, 0.0).sum(axis=1)
-        return bool(held_back.max() > _HELD_BACK * self.edges.critical**2)

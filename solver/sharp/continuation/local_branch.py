@@ -1,23 +1,21 @@
-"""A stretch of a branch on which few edges move: a window follows, the rest responds linearly.
+"""Continuation in a window: a few gaps are followed while all others respond linearly.
 
 Towards a fold the edges around one place move ever faster while all others hardly do. They are
-followed in a window (``exterior``), at the cost of a field of a few
-gaps, as long as the others stay near the state about which they are linear. A point found so is
-confirmed, that is solved with all gaps, before a state, a touch or a jump is told from it: an edge
-elsewhere may have passed a fold of its own, which no linear response shows. Then there is no such
-equilibrium, and the way from the last confirmed point on is gone once more: in a window around the
-edge that was lost and, if that leads astray, too, with all gaps.
+followed in a window of a few gaps as long as the edges of the exterior stay near the state about
+which their response is linear. A point found so is solved with all gaps before a state, a touch or
+a jump is derived from it: an edge of the exterior may have passed a fold of its own, which no
+linear response shows. Then there is no such equilibrium (:class:`LostTrack`), and the branch
+returns to its last solved point.
 """
 
 from __future__ import annotations
 
-from copy import copy
 from functools import cached_property
 
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.continuation.predictor import Course
+from adhesis.solver.sharp.continuation.events import LostTrack
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
 from adhesis.solver.sharp.equilibrium.window import Window
@@ -25,28 +23,22 @@ from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import RULES
-from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics
-
-_HALF_WIDTH = 3  # gaps of a window on each side of the edge that leads
-_MOVING = 0.15  # motion of an edge, in λ_min, that ends a stretch as a fold does
-_BEFORE_FOLD = 0.5  # share of the way to its fold that an edge outside may go
-_LEAST_SPAN = 0.1  # of the way that the motion of the edges outside allows, whatever their folds
-_STILL = 0.05  # so far, in λ_min, edges outside move while they are taken as linear
-_FAR = 4.0  # a fold is not believed beyond so many times the way that tells of it
-_BEND = 0.5  # of its straight motion that of an edge outside is expected to bend by at most
-_AWAY = 0.02  # further from where it was expected, in λ_min, no edge outside is found
-
-
-class Astray(Exception):
-    """No equilibrium of all edges is where a window led to; because of this edge (-1: unknown)."""
-
-    def __init__(self, edge: int) -> None:
-        super().__init__()
-        self.edge = edge
+from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.tolerances import (
+    CORRECTED,
+    EXTERIOR_BEFORE_FOLD,
+    EXTERIOR_BEND,
+    EXTERIOR_LEAST_SPAN,
+    EXTERIOR_MISSED,
+    EXTERIOR_MOTION,
+    FOLD_BELIEVED,
+    WINDOW_HALF_WIDTH,
+    WINDOW_LEAD_MOTION,
+)
 
 
-class Stretch:
-    """The window around the edge of a point that comes to its fold first, or is fastest.
+class LocalBranch:
+    """A window around the edge of a point that reaches its fold first, or is fastest.
 
     Parameters
     ----------
@@ -54,32 +46,36 @@ class Stretch:
     start : Point
         Solved with all gaps.
     lead : int, optional
-        The edge, if another one is to lead.
+        Edge to put the window around, if not that one.
+
+    Attributes
+    ----------
+    inside : int array
+        Gaps of the window.
+    span : float
+        Distance in d from ``start`` over which the exterior is taken as linear.
     """
 
     def __init__(self, edges: EdgeMechanics, start: Point, lead: int | None = None) -> None:
-        # A copy that knows no stretch: points hold theirs, and a circle would not be let go.
-        self.edges, self.start = edges, copy(start)
-        self.start.__dict__.pop("stretch", None)
+        self.edges, self.start = edges, start
         count = len(start.gaps)
         rates = np.abs(start.rate)
-        folds = self._folds
+        folds = self._fold_distances
         if lead is None:
-            lead = int(np.argmin(np.fmin(_MOVING * edges.wave / rates, folds)))
-        half = min(_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
-        self.first = (lead // 2 - half) % count
-        self.inside = (self.first + np.arange(2 * half + 1)) % count
+            lead = int(np.argmin(np.fmin(WINDOW_LEAD_MOTION * edges.wave / rates, folds)))
+        half = min(WINDOW_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
+        self._first = (lead // 2 - half) % count
+        self.inside = (self._first + np.arange(2 * half + 1)) % count
         out = np.ones(count, dtype=np.bool_)
         out[self.inside] = False
-        self.others = np.flatnonzero(out)
-        still = _STILL * edges.wave / rates.reshape(-1, 2)[self.others].max()
-        # how far the edges outside are near enough to their first state
-        before_fold = _BEFORE_FOLD * folds.reshape(-1, 2)[self.others].min()
-        self.span = float(min(still, max(before_fold, _LEAST_SPAN * still)))
+        self._outside = np.flatnonzero(out)
+        linear = EXTERIOR_MOTION * edges.wave / rates.reshape(-1, 2)[self._outside].max()
+        before_fold = EXTERIOR_BEFORE_FOLD * folds.reshape(-1, 2)[self._outside].min()
+        self.span = float(min(linear, max(before_fold, EXTERIOR_LEAST_SPAN * linear)))
 
     @cached_property
-    def _folds(self) -> Array:
-        """Distance in d of the fold that the past of each edge tells of; inf for none."""
+    def _fold_distances(self) -> Array:
+        """Distance in d of the fold that the earlier rate of each edge predicts; inf for none."""
         start = self.start
         out = np.full(start.rate.shape, np.inf)
         if start.past is not None:
@@ -90,11 +86,11 @@ class Stretch:
             out[rising] = way[rising] * share / (1 - share)
         return out
 
-    def _bent(self, at: float) -> Array:
-        """What the motion of the edges outside is more than straight, by their past.
+    def _curvature(self, at: float) -> Array:
+        """Predict by how much the exterior edges leave their tangent, from their earlier rates.
 
-        As ``predictor.Course`` has it: towards a fold like a
-        root, else a parabola.
+        Towards a fold the motion is that of a square root, else a parabola, as in
+        ``predictor.Predictor``.
         """
         start = self.start
         out = np.zeros(start.rate.shape)
@@ -104,50 +100,48 @@ class Stretch:
             known = way * on > 0
             change = (start.rate - start.past.rate)[known]
             bend = change * on * on / (2 * way[known])
-            fold, way = self._folds[known], np.abs(way[known])
-            near = fold < _FAR * way
+            fold, way = self._fold_distances[known], np.abs(way[known])
+            near = fold < FOLD_BELIEVED * way
             root, first = np.sqrt(fold[near]), np.sqrt(fold[near] + way[near])
             last = np.sqrt(np.maximum(fold[near] - abs(on), 0.0))
             b = change[near] / (1 / root - 1 / first)
             bend[near] = np.sign(on) * b * (2 * (root - last) - abs(on) / root)
-            most = _BEND * np.abs(start.rate[known] * on)
+            most = EXTERIOR_BEND * np.abs(start.rate[known] * on)
             out[known] = np.clip(bend, -most, most)
         return (outward(start.gaps) * out).reshape(-1, 2)
 
     def expected(self, local: Array, at: float) -> Array:
-        """All gaps at d = ``at`` where those of the window are ``local``."""
+        """Return all gaps at d = ``at`` where those of the window are ``local``."""
         gaps = self.window.everywhere(local, self.window.kinds, at)
-        gaps[self.others] += self._bent(at)[self.others]
+        gaps[self._outside] += self._curvature(at)[self._outside]
         return gaps
 
-    def goes_on(self, point: Point) -> Point:
-        """Go on from another point that is solved with all gaps."""
+    def continued_at(self, point: Point) -> Point:
+        """Note a further point of the branch that is solved with all gaps; return it with rates."""
         rates = np.abs(point.rate).reshape(-1, 2).max(axis=1)
-        still = _STILL * self.edges.wave / float(rates[self.others].max())
-        self.span = min(self.span, still)
-        point = point.after(self.start)
-        point.__dict__["stretch"] = self
-        return point
+        linear = EXTERIOR_MOTION * self.edges.wave / float(rates[self._outside].max())
+        self.span = min(self.span, linear)
+        return point.after(self.start)
 
-    def begins(self, point: Point) -> bool:
+    def begins_at(self, point: Point) -> bool:
         """Whether it begins at this point."""
         return not isinstance(point, LocalPoint) and self.start.field is point.field
 
-    def holds(self, at: float) -> bool:
-        """Whether the edges outside are still near their first state at ``at``."""
+    def is_valid(self, at: float) -> bool:
+        """Whether the exterior is still linear at d = ``at``."""
         return abs(at - self.start.at) <= self.span
 
     @cached_property
     def window(self) -> Window:
-        """The window."""
+        """Return the window; it is set up when it is first used."""
         edges, start = self.edges, self.start
         return Window(
-            start.gaps, edges.about(start), self.first, len(self.inside), edges.law,
+            start.gaps, edges.about(start), self._first, len(self.inside), edges.law,
             edges.source.panels,
         )  # fmt: skip
 
     def equilibrium(self, gaps: Array, at: float, reach: float) -> LocalPoint | None:
-        """Stable equilibrium at d = ``at`` near these gaps, those outside on their way."""
+        """Return the stable equilibrium of the window at d = ``at`` near these gaps, or None."""
         window = self.window
         turn = window.gaps[:-1] - self.start.gaps[self.inside]  # whole periods
         local = window.gaps.copy()
@@ -168,7 +162,7 @@ class Stretch:
         edges.count.derivatives += steps
         if not found:
             return None
-        # the others along their first tangent
+        # the exterior along its first tangent
         gaps = self.start.predicted(at)
         gaps[self.inside] = local[:-1] - np.round(turn / (2 * np.pi)) * 2 * np.pi
         rates = self.start.rate.copy().reshape(-1, 2)
@@ -178,11 +172,19 @@ class Stretch:
 
 
 class LocalPoint(Point):
-    """A point of a stretch; its field is solved, and its edges corrected, when it is asked for."""
+    """A point found in a window; it is solved with all gaps when its field is asked for.
+
+    Attributes
+    ----------
+    branch : LocalBranch
+        On which it was found.
+    """
+
+    branch: LocalBranch
 
     def __init__(
         self,
-        stretch: Stretch,
+        branch: LocalBranch,
         at: float,
         gaps: Array,
         local: Array,
@@ -191,105 +193,76 @@ class LocalPoint(Point):
         pressure: float,
         separation: float,
     ) -> None:
+        # Point is frozen
         self.__dict__.update(
-            stretch=stretch, at=at, _gaps=gaps, _local=local, rate=rate, slope=slope,
+            branch=branch, at=at, _gaps=gaps, _local=local, rate=rate, slope=slope,
             _pressure=pressure, _separation=separation,
         )  # fmt: skip
 
     @property
     def gaps(self) -> Array:
-        """Gaps, those outside the window along their tangent."""
+        """Gaps, those of the exterior along their tangent."""
         gaps: Array = self.__dict__["_gaps"]
         return gaps
 
     @property
     def pressure(self) -> float:
-        """2p̄/E* with the linear response of the outside."""
+        """2p̄/E* with the linear response of the exterior."""
         return float(self.__dict__["_pressure"])
 
     @property
     def separation(self) -> float:
-        """q0 s, likewise."""
+        """Separation q0 s, likewise."""
         return float(self.__dict__["_separation"])
 
     @cached_property
     def _expected(self) -> Array:
-        """Gaps, those outside the window as they follow it."""
-        stretch: Stretch = self.__dict__["stretch"]
-        return stretch.expected(self.__dict__["_local"], self.at)
+        """Gaps, those of the exterior as they respond to the window."""
+        return self.branch.expected(self.__dict__["_local"], self.at)
 
     @cached_property
-    def _full(self) -> tuple[Point | None, int]:
-        """The equilibrium of all edges, or None and the edge that is lost."""
-        edges: EdgeMechanics = self.__dict__["stretch"].edges
-        found = edges.equilibrium(self._expected, self.at, CORRECTED * edges.wave)
-        return found, -1 if found else edges.lost
+    def _solved(self) -> tuple[Point | None, int]:
+        """Equilibrium of all edges, or None and the edge that has lost its own."""
+        edges = self.branch.edges
+        return edges.correct(self._expected, self.at, CORRECTED * edges.wave)
 
     def confirmed(self) -> Point:
-        """The equilibrium of all edges.
+        """Return the equilibrium of all edges.
 
         Raises
         ------
-        Astray
+        LostTrack
             If there is none here.
         """
-        stretch: Stretch = self.__dict__["stretch"]
-        full, lost = self._full
-        if full is None:
-            raise Astray(lost)
-        away = np.abs(full.gaps - self._expected)
-        away[stretch.inside] = 0.0
-        if away.max() > _AWAY * stretch.edges.wave:
-            raise Astray(int(np.argmax(away)))
-        return stretch.goes_on(full)
+        solved, lost = self._solved
+        if solved is None:
+            raise LostTrack(lost, self.at)
+        missed = np.abs(solved.gaps - self._expected)
+        missed[self.branch.inside] = 0.0
+        if missed.max() > EXTERIOR_MISSED * self.branch.edges.wave:
+            raise LostTrack(int(np.argmax(missed)), self.at)
+        return self.branch.continued_at(solved)
 
     @cached_property
     def field(self) -> GapField:
         """Field of the corrected edges; where their equilibrium is lost, of these."""
-        edges: EdgeMechanics = self.__dict__["stretch"].edges
-        full, _ = self._full
-        return full.field if full else edges.field(self.gaps, self.at)
-
-
-def led_by(edges: EdgeMechanics, point: Point, edge: int) -> bool:
-    """Let ``edge`` lead on from a point that is solved with all gaps; whether it did not before."""
-    before: Stretch | None = point.__dict__.get("stretch")
-    if edge < 0 or before is None or edge // 2 in before.inside:
-        return False
-    stretch = Stretch(edges, point, edge)
-    if not stretch.span > 0:
-        return False
-    point.__dict__["stretch"] = stretch
-    return True
+        solved, _ = self._solved
+        return solved.field if solved else self.branch.edges.field(self.gaps, self.at)
 
 
 def confirmed(point: Point) -> Point:
-    """``point``, solved with all gaps; raises :class:`Astray` if it is no equilibrium."""
+    """Return ``point`` solved with all gaps; raises :class:`LostTrack` if it is no equilibrium."""
     return point.confirmed() if isinstance(point, LocalPoint) else point
 
 
-def advance(edges: EdgeMechanics, course: Course, at: float, windows: bool) -> Point | None:
-    """Stable equilibrium at d = ``at`` near where ``course`` leads, or None.
+def around_edge(edges: EdgeMechanics, point: Point, edge: int, known: LocalBranch | None) -> (
+    LocalBranch | None
+):  # fmt: skip
+    """Return a window around ``edge`` at a solved point, where ``known`` lost track of that edge.
 
-    With ``windows``, in a window where only few edges move.
-
-    Raises
-    ------
-    Astray
-        If the point of the course is no equilibrium of all edges.
+    None if the edge is unknown or lies in that window, or if the new one is valid nowhere.
     """
-    reach = CORRECTED * edges.wave
-    point = course.point
-    if len(point.gaps) < edges.many:
-        return edges.equilibrium(course.gaps(at), at, reach)
-    if not windows:
-        reached = edges.equilibrium(course.gaps(at), at, reach)
-        return None if reached is None else reached.after(confirmed(point))
-    stretch: Stretch | None = point.__dict__.get("stretch")
-    if stretch is None or not (stretch.holds(at) or stretch.begins(point)):
-        point = confirmed(point)
-        stretch = Stretch(edges, point)
-        point.__dict__["stretch"] = stretch
-    if not stretch.holds(at):
-        at = point.at + float(np.copysign(stretch.span, at - point.at))
-    return stretch.equilibrium(course.gaps(at), at, reach)
+    if edge < 0 or known is None or edge // 2 in known.inside:
+        return None
+    window = LocalBranch(edges, point, edge)
+    return window if window.span > 0 else None

@@ -14,18 +14,19 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.gap.ends import outward
+from adhesis.solver.sharp.tolerances import (
+    BEYOND_FOLD,
+    CUBIC_OF_OTHERS_TRUSTED,
+    CUBIC_TRUSTED,
+    LEAST_LEFT_BEFORE_FOLD,
+    LEFT_BEFORE_FOLD,
+    PREDICTION_TRUSTED,
+    PREDICTOR_ITERATIONS,
+)
 
-_FAR = 4.0  # a course is not believed beyond so many times the way between its points
-_FAR_CUBIC = 5.0  # nor is a fold by the cubic beyond so many times the way of the edge that leads
-_FAR_EDGES = 1.5  # nor are cubics of the other edges
-_NEAR = 0.1  # share of the way to a fold that is left to the next point
-_BESIDE = 0.3  # least way that is left, in units of what a fold is located to
-_ACROSS = 0.2  # so far beyond the fold, in the same units, there is surely no equilibrium
-_BISECTIONS = 60
 
-
-class Course:
-    """The course of a branch through two points; beyond one point alone it is straight.
+class Predictor:
+    """Predict a branch beyond two of its points; beyond one point alone it is straight.
 
     Parameters
     ----------
@@ -36,13 +37,13 @@ class Course:
     ----------
     fastest : float
         Largest |dn/dd| of an edge at ``point``.
-    ahead : float
+    fold_distance : float
         Distance in d of the fold beyond ``point``; inf if none is seen.
     """
 
     def __init__(self, point: Point) -> None:
         self.point = point
-        self.way, self.ahead = 0.0, np.inf
+        self.way, self.fold_distance = 0.0, np.inf
         # d as a polynomial of how far the leading edge goes on; both in units of their ways
         self._way_by_lead: tuple[float, float, float] | None = None
         self._fold = np.inf  # where that has its extremum
@@ -67,28 +68,28 @@ class Course:
         root = square * square - 3 * cube * here
         if root >= 0 and np.sqrt(root) > square:
             fold = here / (np.sqrt(root) - square)
-            if fold < _FAR_CUBIC:
+            if fold < CUBIC_TRUSTED:
                 self._fold = fold
-                self.ahead = abs(self.way) * fold * (here + fold * (square + fold * cube))
+                self.fold_distance = abs(self.way) * fold * (here + fold * (square + fold * cube))
                 return
         # by the derivatives alone
         self._way_by_lead = here, (here - before) / 2, 0.0
-        if before > here and here * here < 2 * _FAR * (before - here):
+        if before > here and here * here < 2 * PREDICTION_TRUSTED * (before - here):
             self._fold = here / (before - here)
-            self.ahead = abs(self.way) * here * self._fold / 2
+            self.fold_distance = abs(self.way) * here * self._fold / 2
 
     def _led(self, on: float, by: tuple[float, float, float]) -> float:
         """How far the leading edge has gone where d has gone ``on``, both in units of ways."""
-        if on * abs(self.way) >= self.ahead:
+        if on * abs(self.way) >= self.fold_distance:
             return self._fold
         here, square, cube = by
         low, high = 0.0, min(self._fold, 2 * on / here)
         while high < self._fold and high * (here + high * (square + high * cube)) < on:
             low, high = high, 2 * high
-            if high > _FAR * 2 * on / here:
+            if high > PREDICTION_TRUSTED * 2 * on / here:
                 return low
         lead = min(on / here, high)
-        for _ in range(_BISECTIONS):
+        for _ in range(PREDICTOR_ITERATIONS):
             value = lead * (here + lead * (square + lead * cube)) - on
             if value > 0:
                 high = lead
@@ -107,13 +108,13 @@ class Course:
         on = at - point.at
         rate = point.rate
         motion = rate * on
-        if on * self.way > 0 and abs(on) < _FAR * abs(self.way):
+        if on * self.way > 0 and abs(on) < PREDICTION_TRUSTED * abs(self.way):
             earlier = self._earlier
             if self._way_by_lead is not None:
                 led = self._led(on / self.way, self._way_by_lead)
                 here = rate * (self._gone / rate[self._lead])
                 before = earlier.rate * (self._gone / earlier.rate[self._lead])
-                if led < _FAR_EDGES:
+                if led < CUBIC_OF_OTHERS_TRUSTED:
                     gone = outward(point.gaps) * (point.gaps - earlier.gaps).ravel()
                     square, cube = 2 * here + before - 3 * gone, here + before - 2 * gone
                     motion = led * (here + led * (square + led * cube))
@@ -130,18 +131,19 @@ class Course:
         Towards a fold it leads near to it, and from next to it (``finest``) across.
         """
         straight: float = most / max(self.fastest, 1e-300)
-        if np.isinf(self.ahead):
+        if np.isinf(self.fold_distance):
             return straight
-        if self.ahead < 0.8 * finest:
+        if self.fold_distance < 0.8 * finest:
             return self.across(finest)
         most = most / abs(self._gone)
         if most < self._fold and self._way_by_lead is not None:
             here, square, cube = self._way_by_lead
             straight = abs(self.way) * most * (here + most * (square + most * cube))
         else:
-            straight = self.ahead
-        return float(min(straight, self.ahead - max(_NEAR * self.ahead, _BESIDE * finest)))
+            straight = self.fold_distance
+        left = max(LEFT_BEFORE_FOLD * self.fold_distance, LEAST_LEFT_BEFORE_FOLD * finest)
+        return float(min(straight, self.fold_distance - left))
 
     def across(self, finest: float) -> float:
         """Step across the fold that is seen."""
-        return (1 + _NEAR) * self.ahead + _ACROSS * finest
+        return (1 + LEFT_BEFORE_FOLD) * self.fold_distance + BEYOND_FOLD * finest

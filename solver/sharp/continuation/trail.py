@@ -1,64 +1,65 @@
-"""The way along a branch since touches were last looked for."""
+"""Accepted points of a branch since gaps were last searched for touches."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from adhesis.solver.method import ContactState
-from adhesis.solver.sharp.continuation.local_branch import LocalPoint, confirmed
+from adhesis.solver.sharp.continuation.local_branch import LocalBranch, LocalPoint, confirmed
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 
 
-@dataclass
-class Walk:
-    """Points since the last look for touches, and states that wait for the next one.
+class Trail:
+    """Points from the last search on, which found the first of them clear.
+
+    Parameters
+    ----------
+    point : Point
 
     Attributes
     ----------
-    trail : list of Point
-        From the point of the last look, known to be clear.
+    points : list of Point
     clearance : float
-        Least clearance there.
+        Least clearance of a gap at the first point.
     closed : float
         Bound on how far a gap may have closed since.
-    pending : list of ContactState
-        States that wait for the next look: they may lie beyond a touch.
-    known : tuple
-        How many points of the trail there were up to the last one that is an equilibrium of all
-        edges, and ``closed`` there.
     """
 
-    trail: list[Point]
-    clearance: float
-    closed: float
-    pending: list[ContactState]
-    known: tuple[int, float]
-
     def __init__(self, point: Point) -> None:
-        self.trail, self.closed, self.pending = [point], 0.0, []
-        self.clearance = point.clearance
-        self.known = (1, 0.0)
+        self.points = [point]
+        self.clearance, self.closed = point.clearance, 0.0
+        self._windows: list[LocalBranch | None] = [None]  # on which a solved point was found
+        self._solved = (1, 0.0)  # points up to the last one solved with all gaps; closed there
 
-    def add(self, point: Point, closed: float) -> None:
-        """Go on to a point; a gap has closed by ``closed`` at most."""
-        self.trail.append(point)
+    def add(self, point: Point, closed: float, window: LocalBranch | None) -> None:
+        """Append a point, found on ``window``; a gap has closed by at most ``closed`` since."""
+        self.points.append(point)
+        self._windows.append(window)
         self.closed += closed
         if not isinstance(point, LocalPoint):
-            self.known = (len(self.trail), self.closed)
+            self._solved = (len(self.points), self.closed)
+
+    def open_window(self, window: LocalBranch) -> None:
+        """Note the window that begins at the last point, if that is solved with all gaps."""
+        if not isinstance(self.points[-1], LocalPoint):
+            self._windows[-1] = window
 
     def confirm(self) -> Point:
-        """Make sure that the last point is an equilibrium of all edges."""
-        self.trail[-1] = confirmed(self.trail[-1])
-        self.known = (len(self.trail), self.closed)
-        return self.trail[-1]
+        """Solve the last point with all gaps and return it.
 
-    def back(self) -> Point:
-        """Go back to the last point that is one."""
-        count, self.closed = self.known
-        del self.trail[count:]
-        return self.trail[-1]
+        Raises
+        ------
+        LostTrack
+        """
+        self.points[-1] = confirmed(self.points[-1])
+        self._solved = (len(self.points), self.closed)
+        return self.points[-1]
+
+    def return_to_solved(self) -> tuple[Point, LocalBranch | None]:
+        """Drop the points after the last one solved with all gaps; return that and its window."""
+        count, self.closed = self._solved
+        del self.points[count:], self._windows[count:]
+        return self.points[-1], self._windows[-1]
 
     def restart(self, clearance: float) -> None:
-        """Begin anew after a look, at a point that is one."""
-        self.trail, self.clearance, self.closed = [self.trail[-1]], clearance, 0.0
-        self.known = (1, 0.0)
+        """Begin anew after a search, at the last point, which is solved with all gaps."""
+        self.points, self._windows = [self.points[-1]], [self._windows[-1]]
+        self.clearance, self.closed = clearance, 0.0
+        self._solved = (1, 0.0)

@@ -19,11 +19,12 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.quadrature import RULES, Kinds, Rules
-
-_NEAR = 0.3  # edges that moved by less than this, in λ_min, leave a gap comparable
-_SAFETY = 1.5  # on what the nodes tell
-_LEFT = 0.3  # share of a clearance that must surely be left
-_INSIDE = 0.12  # in λ_min: nearer to its ends no minimum appears in a gap that has none
+from adhesis.solver.sharp.tolerances import (
+    CLEARANCE_LEFT,
+    CLOSING_SAFETY,
+    COMPARABLE,
+    NO_MINIMUM_WITHIN,
+)
 
 
 class Seen(NamedTuple):
@@ -71,7 +72,7 @@ class Clearances:
     """
 
     def __init__(self, wave: float, critical: float) -> None:
-        self._near, self._beside = _NEAR * wave, critical / np.sqrt(wave)
+        self._near, self._beside = COMPARABLE * wave, critical / np.sqrt(wave)
         self.seen = NOT_SEEN
 
     def left(self, field: GapField) -> tuple[Array, NDArray[np.int64]]:
@@ -166,9 +167,9 @@ def clearance_left(
         grown = max(begin, 0.0) + max(-end, 0.0)
         clearance = seen.clearance[j]
         if clearance == np.inf:
-            clearance = _to_any_minimum(seen, j, m, _INSIDE / _NEAR * near)
-        rest = clearance - _SAFETY * closed - beside * grown
-        if rest > _LEFT * clearance:
+            clearance = _to_any_minimum(seen, j, m, NO_MINIMUM_WITHIN / COMPARABLE * near)
+        rest = clearance - CLOSING_SAFETY * closed - beside * grown
+        if rest > CLEARANCE_LEFT * clearance:
             left[k] = rest if seen.clearance[j] < np.inf else np.inf
             place[k] = j
     return left, place

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-
-_EDGE = 1e-4  # share of what is left within which of its ends no aim is taken
+from adhesis.solver.sharp.tolerances import (
+    TRIAL_FROM_END,
+)
 
 
 class Closing:
@@ -57,4 +58,4 @@ class Closing:
         root = np.sqrt(np.maximum(b * b - 4 * bend * c, 0.0))
         share = 2 * c / (root - b)
         first = float(np.where(np.isfinite(share), share, c / -slope).min())
-        return min(max(first, _EDGE), 1 - _EDGE)
+        return min(max(first, TRIAL_FROM_END), 1 - TRIAL_FROM_END)

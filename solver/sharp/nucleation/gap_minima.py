@@ -9,14 +9,12 @@ from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.opening_series import SHAPE_NODES, fine_nodes_of, opened, sum_modes
 from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
 from adhesis.solver.sharp.gap.sine_transform import circle
-
-# A minimum below this (of what its curvature makes over a node's distance, or of what the parabola
-# through the nodes may be wrong by) is found from the whole series, by parabolas that get narrower
-# so many times.
-_CLOSE = 0.1
-_DOUBT = 3.0
-_NARROWER = 3
-_FLAT = 1e-100  # half the curvature, where none is seen
+from adhesis.solver.sharp.tolerances import (
+    MINIMUM_DOUBT,
+    MINIMUM_IS_LOW,
+    MINIMUM_REFINEMENTS,
+    NO_CURVATURE,
+)
 
 
 @compiled
@@ -60,14 +58,14 @@ def _bottom(gap: Array, modes: Array, at: float, width: float) -> tuple[float, f
     half = 0.0
     low = np.inf
     x = np.empty(3)
-    for _ in range(_NARROWER):
+    for _ in range(MINIMUM_REFINEMENTS):
         width /= 8
         x[0], x[1], x[2] = at - width, at, at + width
         y = sum_modes(gap, x, modes)
         half = (y[2] - 2 * y[1] + y[0]) / (2 * width**2)
         slope = (y[2] - y[0]) / (2 * width)
         if not half > 0:
-            return at, y[1], max(half, _FLAT)
+            return at, y[1], max(half, NO_CURVATURE)
         step = min(max(-slope / (2 * half), -4 * width), 4 * width)
         at += step
         low = y[1] + slope * step + half * step**2
@@ -112,7 +110,7 @@ def bottoms_of(
             longer[:found] = where[:found]
             out, where = wider, longer
         for j in range(at.shape[0]):
-            if low[j] < max(_CLOSE * half[j] * width[j] ** 2, _DOUBT * doubt[j]):
+            if low[j] < max(MINIMUM_IS_LOW * half[j] * width[j] ** 2, MINIMUM_DOUBT * doubt[j]):
                 at[j], low[j], half[j] = _bottom(table[k], modes, at[j], 0.5 * width[j])
             out[0, found] = at[j]
             out[1, found] = low[j]

@@ -18,18 +18,21 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.gap.quadrature import RULES, Kinds
-from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics, NoState
+from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.clearance import Clearances
 from adhesis.solver.sharp.nucleation.closing import Closing
 from adhesis.solver.sharp.nucleation.gap_minima import bottoms_of
-
-_OVERLAP = 1e-6  # overlaps below this (of h_max) are not left in any state
-_MOST_AIMS = 60  # aims at a touch; a halving each time would exhaust the digits
-_MOST_CLEAR = 2  # aims by a secant that are clear, one after the other, before a halving
-_HALVED = 5  # of many gaps, which are aimed at one by one, one in so many aims is a halving
+from adhesis.solver.sharp.tolerances import (
+    BISECTION_EVERY,
+    CLEAR_TRIALS,
+    CORRECTED,
+    OVERLAP,
+    TOUCH_TRIALS,
+)
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ class Nucleation:
         surface = math.pi * edges.critical**2 / 8  # Γ
         self._seed = surface, 3 * edges.smallest, edges.longest_step
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
-        self.overlap = _OVERLAP * problem.profile.h_max * problem.profile.q0
+        self.overlap = OVERLAP * problem.profile.h_max * problem.profile.q0
 
     def first_touch(self) -> tuple[float, list[Touch]]:
         """Separation q0 s at which the first patches are put, and where.
@@ -174,20 +177,20 @@ class Nucleation:
         clear = last.at
         # Of many gaps each aim is dear: those at both ends tell where to begin, and the least
         # overlap is touch enough.
-        many = len(last.gaps) >= self.edges.many
+        many = self.edges.uses_windows(last.gaps)
         if many and low == 0 and clearance > 0:
             clear_value = clearance
         closing, closed = self._closing(last, hit) if many else (None, None)
         cleared = 0  # aims one after the other that were clear
-        for aims in range(1, _MOST_AIMS + 1):
+        for aims in range(1, TOUCH_TRIALS + 1):
             near = many or abs(clear - hit.at) <= resolution
             if hit_value == 0 or (near and hit_value > -0.5 * self.overlap):
                 break
             share = 0.5
-            if closing is not None and aims % _HALVED:
+            if closing is not None and aims % BISECTION_EVERY:
                 share = closing.aim(clear, hit.at, -0.2 * self.overlap)
             # The least clearance may be another gap's than the overlap: then a secant creeps.
-            elif closing is None and np.isfinite(clear_value) and cleared < _MOST_CLEAR:
+            elif closing is None and np.isfinite(clear_value) and cleared < CLEAR_TRIALS:
                 # secant to half of the overlap that is allowed, kept off the ends
                 aimed = clear_value + 0.2 * self.overlap
                 share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
@@ -243,12 +246,12 @@ class Nucleation:
         high, minima = self.least(field)
         if high > -self.overlap:
             return None
-        for _ in range(_MOST_AIMS):
+        for _ in range(TOUCH_TRIALS):
             if high >= -0.5 * self.overlap:
                 break
             # Openings are linear in d: a secant to a fourth of the overlap that is allowed
             share = min(max((low + 0.25 * self.overlap) / (low - high), 0.02), 0.98)
-            aim = clear + (hit - clear) * (share if cleared < _MOST_CLEAR else 0.5)
+            aim = clear + (hit - clear) * (share if cleared < CLEAR_TRIALS else 0.5)
             aimed = self.edges.field(point.gaps, aim)
             value, there = self.least(aimed)
             cleared = cleared + 1 if value > 0 else 0

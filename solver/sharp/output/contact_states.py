@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,19 +17,6 @@ from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import Hold
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN, Seen
-
-
-@dataclass
-class Trace:
-    """States and jumps of a path, in order, as they are found.
-
-    ``misplaced`` is the work, in J/m² of nominal area, by which the loss may be wrong because jumps
-    were not found at their exact places.
-    """
-
-    states: list[ContactState] = field(default_factory=list)
-    jumps: list[Jump] = field(default_factory=list)
-    misplaced: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

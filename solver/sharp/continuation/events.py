@@ -1,0 +1,62 @@
+"""Events of a stable branch, which the loop that follows a path acts on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A further point of the branch.
+
+    Attributes
+    ----------
+    point : Point
+    is_output : bool
+        Whether its state belongs to the path: the trapezoidal rule needs it, or the target is
+        reached.
+    may_touch : bool
+        Whether surfaces may have touched inside a gap since the last search.
+    remaining : array, optional
+        Where a gap has closed or a patch vanished: the gaps that are left.
+    """
+
+    point: Point
+    is_output: bool
+    may_touch: bool
+    remaining: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """No stable equilibrium is found a smallest step beyond ``point``.
+
+    Attributes
+    ----------
+    point : Point
+        The last point of the branch.
+    at : float
+        d a smallest step beyond it, or the target.
+    """
+
+    point: Point
+    at: float
+
+
+class LostTrack(Exception):
+    """A window led to where no equilibrium of all edges is.
+
+    Attributes
+    ----------
+    edge : int
+        The edge outside the window that lost its equilibrium; -1 if it is unknown.
+    at : float
+        d of the point.
+    """
+
+    def __init__(self, edge: int, at: float) -> None:
+        super().__init__()
+        self.edge, self.at = edge, at

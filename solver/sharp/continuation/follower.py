@@ -1,0 +1,246 @@
+"""The loop that follows a path along stable branches: it acts on the events of a branch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from adhesis.solver.model.contact_state import ContactState
+from adhesis.solver.sharp.continuation.branch import Branch, Target
+from adhesis.solver.sharp.continuation.events import Accepted, Fold
+from adhesis.solver.sharp.continuation.history import ComputedJump, History
+from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN
+from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
+from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation
+from adhesis.solver.sharp.output.contact_states import Memory, States
+from adhesis.solver.sharp.tolerances import (
+    FINER_FIELD,
+    LATE_REFINEMENT,
+    LEAST_REFINEMENT,
+    PREDICTED_MOTION,
+    SAME_BRANCH,
+)
+
+
+class Follower:
+    """Follows the branches of one problem.
+
+    Parameters
+    ----------
+    edges : EdgeMechanics
+    nucleation : Nucleation
+    states : States
+    jumps : Jumps
+    resolution : Resolution
+    """
+
+    def __init__(
+        self,
+        edges: EdgeMechanics,
+        nucleation: Nucleation,
+        states: States,
+        jumps: Jumps,
+        resolution: Resolution,
+    ) -> None:
+        self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
+        self.resolution = resolution
+        self.closing = ClosingBound(edges)
+        self._last: tuple[Memory, Point] | None = None
+
+    def remembered(self, memory: Memory | None) -> Point | None:
+        """Return the point at which a path stopped, if this is the memory of its state."""
+        self.nucleation.clearances.seen = NOT_SEEN if memory is None else memory.seen
+        if memory is None or memory.course is None:
+            return None
+        if self._last is not None and self._last[0] is memory:
+            return self._last[1]
+        at, rate, slope = memory.course
+        return Point(at, self.edges.field(memory.gaps, at), rate, slope, memory.clearance)
+
+    def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
+        """Follow a stable branch to the target or through its next jump.
+
+        Returns
+        -------
+        at, point
+            d reached and the stable point there, None if no contact is left.
+        """
+        branch = Branch(self.edges, self.closing, self.resolution, point, target)
+        while branch.point.at != target.at:
+            event = branch.advance()
+            if isinstance(event, Fold):
+                jump = self._at_fold(history, branch, event, target)
+            else:
+                jump = self._at_point(history, branch, event, target)
+            if jump is not None:
+                history.commit(jump)
+                return jump.at, jump.point
+        self._remember(history, branch)
+        return target.at, branch.point
+
+    def _remember(self, history: History, branch: Branch) -> None:
+        """Let the last state remember its point."""
+        # What has not closed since the last search need not be searched again.
+        point = branch.point.cleared(max(branch.trail.clearance - branch.trail.closed, 0.0))
+        branch.point = point
+        memory = Memory(
+            point.field.gaps,
+            point.clearance,
+            (point.at, point.rate, point.slope),
+            self.nucleation.clearances.seen,
+        )
+        # A dense field does not depend on the way to it; a hierarchical one does.
+        if self.edges.uses_windows(point.field.gaps):
+            self._last = None
+        else:
+            self._last = memory, point.behind(None)
+        history.states[-1] = replace(history.states[-1], internal=memory)
+
+    def _at_point(
+        self, history: History, branch: Branch, event: Accepted, target: Target
+    ) -> ComputedJump | None:
+        """Hand out the state of an accepted point; return the jump there, if there is one."""
+        point = event.point
+        output = None
+        if event.is_output:
+            fixed = self.edges.is_fixed and point.at == target.at
+            output = self.states.of_point(point, target.prescribed if fixed else None)
+        touched = None
+        # Every state that is handed out is searched; between states only if a gap may have closed.
+        if event.is_output or event.may_touch:
+            touched = self._search(branch)
+        if output is not None and (touched is None or self._is_before(output, touched, target)):
+            history.states.append(output)
+        if touched is not None:
+            return self._touch_jump(touched, target)
+        if event.remaining is None:
+            return None
+        states = () if event.is_output else (self.states.of_point(point),)
+        before = states[-1] if states else history.states[-1]
+        jump = self.jumps.compute(before, event.remaining, point.at, target.branch, known=point)
+        return replace(jump, states=states + jump.states)
+
+    def _at_fold(
+        self, history: History, branch: Branch, fold: Fold, target: Target
+    ) -> ComputedJump | None:
+        """Return the jump at the end of a branch; None if the branch goes on, or is refined."""
+        touched = self._search(branch)
+        if touched is not None:
+            return self._touch_jump(touched, target)
+        touched = self._touch_before_fold(fold)
+        if touched is not None:
+            touching = self._touch_jump(touched, target)
+            return replace(touching, states=(self.states.of_point(fold.point), *touching.states))
+        last = history.states[-1] if history.states else None
+        jump, refined = self._fold_jump(last, fold, target, branch.steps.finest)
+        after = None if jump is None else jump.point
+        if branch.in_windows and self._is_near(fold.point, after, PREDICTED_MOTION):
+            # A window's verdict that this is a fold is not taken for that of all edges: where the
+            # descent ends nearby, the step is taken once more with all of them.
+            branch.solve_all_gaps()
+            return None
+        if refined < branch.steps.finest:
+            branch.steps.refine(refined)
+            return None
+        goes_on = fold.at != target.at and not branch.in_windows
+        if goes_on and after is not None and self._is_near(fold.point, after, SAME_BRANCH):
+            # Newton's iteration failed where there was no fold: the branch goes on.
+            branch.continue_from(after)
+            return None
+        return jump
+
+    def _search(self, branch: Branch) -> Located | None:
+        """Search the trail for the first touch; without one it begins anew."""
+        trail = branch.trail
+        if len(trail.points) == 1:
+            return None
+        touched, clearance = self.nucleation.located(
+            trail.points, self.resolution.jump, trail.clearance
+        )
+        trail.restart(clearance)
+        return touched
+
+    def _is_before(self, state: ContactState, touched: Located, target: Target) -> bool:
+        direction = -1.0 if target.branch == "loading" else 1.0
+        return direction * (self.states.place(state) - touched.point.at) < 0
+
+    def _touch_jump(self, touched: Located, target: Target) -> ComputedJump:
+        """Compute the jump from the point of a branch at which surfaces touch inside a gap."""
+        point = touched.point
+        before = self.states.of_point(point)
+        jump = self.jumps.compute(
+            before, point.field.gaps, point.at, target.branch, touched.touches, point
+        )
+        late = self.states.work(before, jump.states[-1], touched.late)
+        return replace(jump, states=(before, *jump.states), misplaced=late)
+
+    def _touch_before_fold(self, fold: Fold) -> Located | None:
+        """Locate a touch on the last step to a fold, its edges being held; None if there is none.
+
+        The fold lies somewhere on that step, too: which of the two comes first is not resolved.
+        """
+        point = fold.point
+        low = self.nucleation.least(point.field)[0]
+        way = abs(fold.at - point.at)
+        if not self.edges.is_fixed:
+            way *= max(1.0, abs(point.field.separation_by_prescribed))
+        if low > self.closing.rate_held(point) * way:
+            return None
+        return self.nucleation.located_held(point, low, fold.at)
+
+    def _fold_jump(
+        self, last: ContactState | None, fold: Fold, target: Target, finest: float
+    ) -> tuple[ComputedJump | None, float]:
+        """Compute the jump at a fold.
+
+        Returns the jump, and the separation to which it is to be located: below ``finest`` it was
+        found too late for its drop, and there is none.
+        """
+        point = fold.point
+        way = abs(fold.at - point.at)
+        states: tuple[ContactState, ...] = ()
+        if last is None or last.internal.gaps is not point.field.gaps:
+            last = self.states.of_point(point)
+            states = (last,)
+        before = self.states.shifted(last, point.field, fold.at)
+        jump = self.jumps.compute(before, point.field.gaps, fold.at, target.branch, known=point)
+        after = jump.states[-1]
+        late = self.states.work(before, after, way)
+        drop = jump.jump.energy_drop
+        allowed = self.resolution.late * max(drop, self.resolution.least_drop)
+        if late > allowed and finest > self.resolution.finest:
+            share = max(LATE_REFINEMENT * allowed / late, LEAST_REFINEMENT)
+            return None, max(share * min(way, finest), self.resolution.finest)
+        displaced = self.states.work(before, after, self._fold_error(point))
+        misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
+        if jump.point is None and self.edges.is_load:
+            misplaced += self._closed_early(before, point, way)
+        return replace(jump, states=(*states, before, after), misplaced=misplaced), finest
+
+    def _closed_early(self, before: ContactState, point: Point, way: float) -> float:
+        """Bound the work in J/m² that a loop under a load misses, as it is closed before the fold.
+
+        It is closed at the separation of the last state (``model.control``), a ``way`` in d or less
+        before the fold. There s goes like a square root of the distance from the fold, which
+        therefore lies 2 ds/dd times that distance further on.
+        """
+        return abs(before.mean_stress) * 2 * abs(point.slope) * way / self.states.q0
+
+    def _fold_error(self, point: Point) -> float:
+        """Estimate by how much (in d) the error of the field displaces the fold next to ``point``.
+
+        The error of the openings is their difference from those of a more accurate field.
+        """
+        finer = self.edges.field(point.gaps, point.at, share=FINER_FIELD)
+        return abs(point.fold_displacement(finer.opening - point.field.opening))
+
+    def _is_near(self, point: Point, after: Point | None, share: float) -> bool:
+        """Whether no edge moved by as much as this ``share`` of λ_min in a descent."""
+        if after is None or after.gaps.shape != point.gaps.shape:
+            return False
+        return bool(np.abs(after.gaps - point.gaps).max() < share * self.edges.wave)

@@ -1,0 +1,61 @@
+"""Races: whether the order in which edges move decides where a descent ends."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.descent.trajectory import Track
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.gap.ends import outward
+from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.tolerances import HELD_BACK, RAN
+
+
+class RaceCheck:
+    """Estimates, from the forces that moving edges take from each other, whether they race.
+
+    Parameters
+    ----------
+    edges : EdgeMechanics
+    """
+
+    def __init__(self, edges: EdgeMechanics) -> None:
+        self._edges = edges
+
+    def may_occur(self, start: Array, end: Point | None, track: Track) -> bool:
+        """Whether the order in which edges ran from ``start`` can have decided where they ended.
+
+        It can where they hold each other back: edges that only help each other on reach the same
+        minimum in any order. So the force is asked for that the runners took from each other: to
+        first order in their ways and with the tangent at the end or, where patches or gaps went,
+        along the ``track``, for every set of gaps on it. Of many gaps that is not known.
+        """
+        if end is None and len(start) == 1:
+            return False
+        if end is None or end.field.gaps.shape != start.shape:
+            return not track.whole or any(
+                self._hold_back(stage.way, stage.taken) for stage in track.stages
+            )
+        gaps = end.field.gaps
+        way = outward(gaps) * (gaps - start).ravel()
+        runners = self._runners(way)
+        if len(runners) < 2:
+            return False
+        opening = end.field.solution.opening[runners]
+        stiffness = opening[:, None] * self._edges.stiffness(end, runners)
+        return self._hold_back(way[runners], (stiffness + stiffness.T) * way[runners])
+
+    def _runners(self, way: Array) -> NDArray[np.int64]:
+        return np.flatnonzero(np.abs(way) > RAN * self._edges.wave)
+
+    def _hold_back(self, way: Array, taken: Array) -> bool:
+        """Whether the motion of runners (columns) took so much force from others (rows)."""
+        runners = self._runners(way)
+        if len(runners) < 2:
+            return False
+        taken = taken[np.ix_(runners, runners)] * np.sign(way[runners])[:, None]
+        np.fill_diagonal(taken, 0.0)
+        held_back = np.maximum(taken, 0.0).sum(axis=1)
+        return bool(held_back.max() > HELD_BACK * self._edges.critical**2)

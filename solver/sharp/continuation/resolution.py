@@ -1,0 +1,36 @@
+"""How finely a path is followed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How finely a path is followed; separations as q0 s.
+
+    Attributes
+    ----------
+    jump : float
+        Separation to which a jump is located.
+    bend : float
+        Largest relative error of the trapezoidal rule over one step.
+    h_max : float
+        q0 h_max.
+    finest : float
+        No jump is located more finely than this.
+    late : float
+        Work that a jump may add to the loss by being found late, in units of its drop.
+    least_drop : float
+        Drop in J/m² below which jumps need not be located more finely.
+    field_share : float
+        Share of every drop that counts as its error by the error of the field.
+    """
+
+    jump: float
+    bend: float
+    h_max: float
+    finest: float
+    late: float
+    least_drop: float
+    field_share: float

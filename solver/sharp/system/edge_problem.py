@@ -1,0 +1,89 @@
+"""The edges of one problem: material law, tolerances, counters; in units of 1/q0."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.sharp.counters import Counters
+from adhesis.solver.sharp.equilibrium.griffith import Law
+from adhesis.solver.sharp.field.solution import FIXED, Hold
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.tolerances import (
+    COARSE_FIELD,
+    DESCENT_HANDS_OVER,
+    FAINT_FORCE,
+    LEAST_FAINT_FORCE,
+    LONGEST_STEP,
+    OVERLAPPING,
+    SETTLED,
+    SMALLEST_LENGTH,
+    SMALLEST_OF_SEED,
+)
+
+
+class EdgeProblem:
+    """What fields, equilibria and descents of one problem have in common.
+
+    Parameters
+    ----------
+    source : StressSource
+    critical : float
+        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
+    tolerance : float
+        Relative accuracy of the field.
+    hold : Hold
+        Prescribed quantity.
+
+    Attributes
+    ----------
+    wave : float
+        λ_min in θ.
+    settled : float
+        A correction this small ends Newton's iteration.
+    coarse : float
+        How far an equilibrium may move with the error of the field.
+    smallest : float
+        Narrower patches and gaps are removed.
+    law : Law
+    count : Counters
+    """
+
+    def __init__(
+        self, source: StressSource, critical: float, tolerance: float, hold: Hold = FIXED
+    ) -> None:
+        self.source, self.critical, self.tolerance = source, critical, tolerance
+        self.wave = 2 * np.pi / source.top
+        self.settled = SETTLED * self.wave
+        self.coarse = max(self.settled, COARSE_FIELD * tolerance * self.wave)
+        self.longest_step = LONGEST_STEP * self.wave
+        # far below the width at which a patch on the sharpest crest first comes to rest,
+        # (16 Γ/(π κ²))^(1/3) with Γ = π C_c²/8
+        seed = (2 * critical**2 / source.sharpest**2) ** (1 / 3)
+        self.smallest = SMALLEST_LENGTH * self.wave
+        if critical > 0:
+            self.smallest = min(self.smallest, SMALLEST_OF_SEED * seed)
+        roughness_opening = np.sqrt(source.m2 * self.wave)
+        self.law = Law(
+            critical=float(critical),
+            digits=float(-np.log(tolerance)),
+            settled=self.settled,
+            coarse=self.coarse,
+            near=DESCENT_HANDS_OVER * self.wave,
+            longest=self.longest_step,
+            smallest=float(self.smallest),
+            overlapping=float(OVERLAPPING * max(critical, roughness_opening)),
+            hold=hold,
+            faint=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
+            origin=source.highest,
+        )
+        self.count = Counters()
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the separation is prescribed."""
+        return self.law.hold == FIXED
+
+    @property
+    def is_load(self) -> bool:
+        """Whether the mean stress is prescribed."""
+        return self.law.hold.share == 0

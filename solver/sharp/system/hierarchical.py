@@ -1,0 +1,87 @@
+"""Many gaps: their interaction on a tree of clusters, and windows of few gaps that move."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.descent.trajectory import Track
+from adhesis.solver.sharp.descent.windowed_descent import descend_many
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.edge_elimination import between_edges
+from adhesis.solver.sharp.equilibrium.hierarchical_newton import equilibrium_many
+from adhesis.solver.sharp.field.hierarchical_solver import solve_many_plain
+from adhesis.solver.sharp.field.solution import Solution
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.system.edge_system import DescentEnd, EdgeSystem, Equilibrium, Kinds
+from adhesis.solver.sharp.tolerances import CLOSING_BY_MOTION, CLOSING_OF_MANY
+
+
+class HierarchicalSystem(EdgeSystem):
+    """Edges of many gaps."""
+
+    uses_windows: ClassVar[bool] = True
+    closing_factor: ClassVar[float] = CLOSING_OF_MANY
+
+    def solution(self, gaps: Array, prescribed: float, share: float) -> Solution:
+        """Solve the field of these gaps to a ``share`` of the tolerance."""
+        problem = self._problem
+        digits = problem.law.digits - math.log(share)
+        kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
+        solved = solve_many_plain(
+            gaps, prescribed, problem.law.hold, kinds, digits, 2, RULES, problem.source.panels
+        )
+        return Solution(*solved)
+
+    def stiffness(self, point: Point, edges: Kinds) -> Array:
+        """Return ∂C_e/∂θ_f between some edges, the others held; the diagonal is not given."""
+        problem = self._problem
+        by_edge: Array = between_edges(
+            point.gaps, point.at, problem.law.hold, point.field.solution.kinds,
+            problem.law.digits, edges, RULES, problem.source.panels,
+        )  # fmt: skip
+        return by_edge
+
+    def equilibrium(
+        self, gaps: Array, prescribed: float, reach: float, kinds: Kinds, *, patient: bool
+    ) -> Equilibrium:
+        """Iterate for the equilibrium near these gaps, the edges of each gap eliminated."""
+        problem = self._problem
+        found, at, about, rate, slope, steps = equilibrium_many(
+            gaps, prescribed, reach, kinds, patient, problem.law, RULES, problem.source.panels
+        )
+        problem.count.newton(steps)
+        lost = -1
+        if not found and np.isfinite(rate).all():
+            lost = int(np.argmax(np.abs(rate)))
+        return Equilibrium(found, at, about.of, rate, slope, lost, about)
+
+    def descend(
+        self,
+        gaps: Array,
+        prescribed: float,
+        most: int,
+        kinds: Kinds,
+        smallest: float,
+        track: Track,
+        *,
+        equal_speeds: bool,
+    ) -> DescentEnd:
+        """Descend in windows, one after the other; the track is not known."""
+        problem = self._problem
+        track.whole = False
+        law = problem.law._replace(smallest=smallest)
+        at, ended, fields, tangents, kinds = descend_many(
+            gaps, prescribed, most, kinds, equal_speeds, law, RULES,
+            problem.source.panels,
+        )  # fmt: skip
+        problem.count.descent(fields, tangents)
+        return DescentEnd(at, ended, fields, kinds)
+
+    def closing_motion(self, before: Array, after: Array) -> float:
+        """Motion of the edges of one gap, times how many gaps that concerns."""
+        return float(CLOSING_BY_MOTION * np.abs(after - before).sum(axis=1).max())
