@@ -66,7 +66,9 @@ def _paper() -> tuple[str, ...]:
 
 PARTS = {
     "loop": Part(("docs/figures/loop.py OUT/loop.png",), "loop.png", "figures"),
-    "rooms": Part(("docs/figures/rooms.py OUT/rooms.png",), "rooms.png", "figures"),
+    "structure": Part(
+        ("docs/figures/structure.py OUT/structure.png",), "structure.png", "figures"
+    ),
     "measured": Part(
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),

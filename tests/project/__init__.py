@@ -1,1 +1,1 @@
-"""Tests of the project as a whole: rooms, documentation, set-up, package."""
+"""Tests of the project as a whole: structure, documentation, set-up, package."""

@@ -1,6 +1,6 @@
-"""The rules of the rooms, read from the import statements and from what a process has loaded.
+"""The rules of packages, read from the import statements and from what a process has loaded.
 
-A room is a folder; in a folder that has rooms inside, each module is a room of its own.
+A folder is a unit; in a folder that has folders inside, each module is a unit of its own.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGES = {"adhesis": "adhesis", "adhesis.solver": "solver", "adhesis.ensemble": "ensemble"}
 FOLDERS = (*PACKAGES.values(), "tests")
 
-# Who may import what weighs: to the door of MPI, of the file format, of compiled code, of figures.
+# The only modules that import what is slow to load: MPI, the file format, the compiler, figures.
 MPI = {"adhesis.ensemble.run.ranks", "adhesis.ensemble.doctor.probe"}
 HDF5 = {
     "adhesis.ensemble.results.merge",
@@ -46,7 +46,7 @@ FIGURES = {
     "adhesis.ensemble.report.plots",
     "adhesis.ensemble.trace.figures",
 }
-DOORS = {"mpi4py": MPI, "h5py": HDF5, "numba": COMPILED, "matplotlib": FIGURES}
+IMPORTERS = {"mpi4py": MPI, "h5py": HDF5, "numba": COMPILED, "matplotlib": FIGURES}
 
 # What the mechanics know nothing of.
 NOT_IN_SOLVER = {
@@ -113,19 +113,19 @@ def imported(path: Path) -> set[str]:
 IMPORTS = {name: imported(path) for name, path in PATHS.items()}
 
 
-def room(module: str) -> str:
+def unit(module: str) -> str:
     folder = PATHS[module].parent
     if any((other / "__init__.py").exists() for other in folder.iterdir()):
         return module
     return module if PATHS[module].name == "__init__.py" else module.rpartition(".")[0]
 
 
-def rooms() -> dict[str, set[str]]:
-    """Return what each room imports of others."""
+def units() -> dict[str, set[str]]:
+    """Return what each unit imports of others."""
     arrows: dict[str, set[str]] = {}
     for module, names in IMPORTS.items():
-        here = arrows.setdefault(room(module), set())
-        here |= {room(name) for name in names if name in PATHS} - {room(module)}
+        here = arrows.setdefault(unit(module), set())
+        here |= {unit(name) for name in names if name in PATHS} - {unit(module)}
     return arrows
 
 
@@ -155,8 +155,8 @@ def test_no_circle_of_modules() -> None:
     assert circle({m: {n for n in names if n in PATHS} for m, names in IMPORTS.items()}) == []
 
 
-def test_no_circle_of_rooms() -> None:
-    assert circle(rooms()) == []
+def test_no_circle_of_units() -> None:
+    assert circle(units()) == []
 
 
 def test_mechanics_know_nothing_of_campaigns_ranks_and_files() -> None:
@@ -178,14 +178,14 @@ def test_campaigns_know_the_public_modules_of_mechanics_alone() -> None:
     assert used == SOLVER_FOR_ENSEMBLE
 
 
-@pytest.mark.parametrize("package", DOORS)
-def test_what_weighs_comes_in_by_its_doors(package: str) -> None:
+@pytest.mark.parametrize("package", IMPORTERS)
+def test_what_is_slow_to_load_is_imported_by_few_modules(package: str) -> None:
     importers = {
         module
         for module, names in IMPORTS.items()
         if package in {name.split(".")[0] for name in names}
     }
-    assert importers == DOORS[package]
+    assert importers == IMPORTERS[package]
 
 
 @pytest.mark.parametrize(
@@ -224,7 +224,7 @@ def loaded(code: str, *words: str, blocked: str = "") -> set[str]:
     return set(done.stdout.splitlines()[-1].split()[1:])
 
 
-def test_the_public_door_is_light() -> None:
+def test_the_public_package_loads_little() -> None:
     assert loaded("import mpi4py") >= {"mpi4py"}
     assert loaded("import adhesis") & {"mpi4py", "h5py", "matplotlib", "xarray", "rich"} == set()
 
@@ -235,7 +235,7 @@ COMMAND = "from adhesis.ensemble.command.main import main\nassert main(sys.argv[
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     small = campaign(realisations=2)
-    return write(tmp_path_factory.mktemp("rooms") / "r.h5", small, rows(small))
+    return write(tmp_path_factory.mktemp("structure") / "r.h5", small, rows(small))
 
 
 def test_status_loads_no_mpi_and_no_figures(results: Path) -> None:
@@ -251,12 +251,12 @@ def test_report_loads_no_mpi(results: Path, tmp_path: Path) -> None:
     assert "mpi4py" not in packages
 
 
-def test_the_design_page_names_every_room_and_every_file_that_it_names_is_there() -> None:
+def test_the_design_page_names_every_folder_and_every_file_that_it_names_is_there() -> None:
     page = (ROOT / "docs" / "design.md").read_text()
-    picture = (ROOT / "docs" / "figures" / "rooms.py").read_text()
+    picture = (ROOT / "docs" / "figures" / "structure.py").read_text()
     for folder in {path.parent for path in PATHS.values()} - {ROOT / p for p in PACKAGES.values()}:
         assert f"{folder.name}/" in page, folder
-        if folder.parent in (ROOT / "solver", ROOT / "ensemble"):
+        if folder.parent in (ROOT / "solver", ROOT / "ensemble", ROOT / "solver" / "sharp"):
             assert f'"{folder.name}": (' in picture, folder
     known = {path.name for path in PATHS.values()}
     assert set(re.findall(r"`(\w+\.py)`", page)) - known == set()
