@@ -1,0 +1,262 @@
+"""The parts of the stepper, each without the others: predictor, step size, branch, trail, history.
+
+The branch here is one gap whose half-width is a = a0 + sqrt(d - d_fold), with a fold at d_fold, or
+a = a0 + slope·d without a fold; no elastic field is solved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from adhesis.solver.model.jump import Branch as BranchName
+from adhesis.solver.sharp.continuation.branch import Branch, Target
+from adhesis.solver.sharp.continuation.events import Accepted, Fold, LostTrack
+from adhesis.solver.sharp.continuation.history import ComputedJump, History
+from adhesis.solver.sharp.continuation.local_branch import LocalPoint
+from adhesis.solver.sharp.continuation.predictor import Predictor
+from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.sharp.continuation.step_size import StepSize
+from adhesis.solver.sharp.continuation.trail import Trail
+from adhesis.solver.sharp.equilibrium.branch_point import Before, Point
+
+WAVE, FOLD = 1.0, 0.2
+
+
+@dataclass
+class Curve:
+    """Stands for the mechanics of edges: equilibria are those of a known curve."""
+
+    fold: float | None = FOLD
+    smallest: float = 1e-9
+    critical: float = 1.0
+    wave: float = WAVE
+    is_load: bool = False
+    closing_factor: float = 1.0
+    asked: int = 0
+
+    def half_width(self, at: float) -> float:
+        """Half of the gap's length."""
+        return 0.5 + (0.1 * at if self.fold is None else float(np.sqrt(at - self.fold)))
+
+    def rate(self, at: float) -> float:
+        """Derivative of the half-width by d."""
+        return 0.1 if self.fold is None else 0.5 / float(np.sqrt(at - self.fold))
+
+    def point(self, at: float, clearance: float = 0.0) -> Point:
+        """Point of the curve."""
+        a = self.half_width(at)
+        field = SimpleNamespace(gaps=np.array([[3 - a, 3 + a]]), pressure=-at * at, separation=at)
+        # n is the outward motion of the contact: the gap opens with d
+        rate = np.full(2, -self.rate(at))
+        return Point(at, cast(Any, field), rate, -2 * at, clearance)
+
+    def uses_windows(self, gaps: Any) -> bool:
+        """Few gaps."""
+        return False
+
+    def system(self, gaps: Any) -> Any:
+        """The system is this object, too."""
+        return self
+
+    def closing_motion(self, before: Any, after: Any) -> float:
+        """Largest motion of an end."""
+        return float(np.abs(after - before).max())
+
+    def equilibrium(self, gaps: Any, at: float, reach: float) -> Point | None:
+        """Point of the curve, if it is within reach."""
+        self.asked += 1
+        if self.fold is not None and at <= self.fold:
+            return None
+        point = self.point(at)
+        return point if np.abs(point.gaps - gaps).max() < reach else None
+
+
+def resolution(jump: float = 1e-6, bend: float = 1e-3) -> Resolution:
+    return Resolution(jump, bend, 1.0, 1e-9, 0.5, 0.0, 0.05)
+
+
+def branch(
+    curve: Curve, start: float, target: float, towards: BranchName = "loading", **options: float
+) -> Branch:
+    closing = SimpleNamespace(over=lambda point, reached, name: abs(reached.at - point.at))
+    aim = Target(target, target, towards)
+    return Branch(
+        cast(Any, curve), cast(Any, closing), resolution(**options), curve.point(start), aim
+    )
+
+
+# ---------------------------------------------------------------------- predictor
+
+
+@pytest.mark.parametrize("before", [0.9, 0.5, 0.3])
+def test_a_predictor_sees_the_fold_of_a_square_root(before):
+    curve = Curve()
+    here = 0.25
+    earlier = curve.point(before)
+    point = curve.point(here).behind(Before(earlier.at, earlier.rate, earlier.gaps))
+    predictor = Predictor(point)
+    assert predictor.fold_distance == pytest.approx(here - FOLD, rel=1e-9)
+    at = 0.22
+    np.testing.assert_allclose(predictor.gaps(at), curve.point(at).gaps, rtol=1e-9)
+
+
+def test_a_predictor_is_straight_beyond_one_point_and_sees_no_fold():
+    point = Curve().point(0.5)
+    predictor = Predictor(point)
+    assert np.isinf(predictor.fold_distance)
+    np.testing.assert_array_equal(predictor.gaps(0.48), point.predicted(0.48))
+
+
+# ---------------------------------------------------------------------- step size
+
+
+def fixed_predictor(fold_distance: float = np.inf, reach: float = 0.1) -> Any:
+    return SimpleNamespace(
+        fold_distance=fold_distance,
+        point=SimpleNamespace(at=1.0),
+        reach=lambda motion, finest: reach,
+        across=lambda finest: 1.1 * fold_distance + 0.2 * finest,
+    )
+
+
+def test_steps_end_at_the_target_and_shrink_after_failures():
+    steps, predictor = StepSize(1e-3), fixed_predictor()
+    assert steps.next(predictor, 0.0, 0.1) == -0.1
+    assert steps.next(predictor, 0.95, 0.1) == pytest.approx(-0.05)
+    assert steps.next(predictor, 1.04, 0.1) == pytest.approx(0.04)
+    sizes = []
+    while steps.reject(step := steps.next(predictor, 0.0, 0.1), predictor):
+        sizes.append(-step)
+    assert sizes == sorted(sizes, reverse=True)
+    assert abs(step) <= 1e-3  # the smallest step failed, and no fold is seen that it could cross
+
+
+def test_a_fold_that_is_seen_is_crossed_by_one_step():
+    steps, predictor = StepSize(1e-3), fixed_predictor(fold_distance=1.2e-3, reach=0.9e-3)
+    assert steps.reject(steps.next(predictor, 0.0, 0.1), predictor)
+    assert steps.crosses_fold
+    across = steps.next(predictor, 0.0, 0.1)
+    assert 1.2e-3 < -across < 2e-3
+    assert not steps.reject(across, predictor)
+
+
+def test_an_accepted_step_may_grow_twofold_and_a_bend_halves_it():
+    steps, predictor = StepSize(1e-3), fixed_predictor(reach=10.0)
+    steps.restart(0.01)
+    assert steps.next(predictor, 0.0, 0.1) == -0.01
+    steps.accept(-0.01, predictor)
+    assert steps.next(predictor, 0.0, 0.1) == -0.02
+    steps.halve(-0.02)
+    assert steps.next(predictor, 0.0, 0.1) == -0.01
+    steps.refine(1e-5)
+    assert steps.finest == 1e-5
+    assert -steps.next(predictor, 0.0, 0.1) == 1e-5
+
+
+# ---------------------------------------------------------------------- branch
+
+
+def events(of: Branch, target: float) -> list[Accepted | Fold]:
+    out: list[Accepted | Fold] = []
+    while of.point.at != target:
+        out.append(of.advance())
+        assert len(out) < 1000
+        if isinstance(out[-1], Fold):
+            break
+    return out
+
+
+def test_a_branch_ends_in_its_fold_at_the_resolution_that_is_asked():
+    for jump in (1e-3, 1e-6, 1e-9):
+        curve = Curve()
+        found = events(branch(curve, 0.9, 0.0, jump=jump), 0.0)
+        fold = found[-1]
+        assert isinstance(fold, Fold)
+        assert fold.at < FOLD < fold.point.at
+        assert fold.point.at - fold.at < 2 * jump
+        assert curve.asked < 80  # a bisection alone would need as many points for each digit
+        places = [event.point.at for event in found]
+        assert places == sorted(places, reverse=True)
+
+
+def test_a_branch_without_a_fold_reaches_the_target_exactly():
+    found = events(branch(Curve(fold=None), 0.9, 0.123), 0.123)
+    last = found[-1]
+    assert isinstance(last, Accepted)
+    assert last.point.at == 0.123
+    assert last.is_output
+
+
+def test_states_are_handed_out_as_densely_as_the_trapezoidal_rule_needs():
+    counts = []
+    for bend in (1e-2, 1e-4):
+        found = events(branch(Curve(fold=None), 0.9, 0.1, bend=bend), 0.1)
+        counts.append(sum(isinstance(e, Accepted) and e.is_output for e in found))
+    # the rule is of second order: a hundredth of the error at ten times the states
+    assert 4 < counts[1] / counts[0] < 20
+
+
+def test_a_vanished_patch_is_an_event():
+    curve = Curve(fold=None)
+    curve.smallest = 2 * np.pi - 2 * curve.half_width(0.5)
+    of = branch(curve, 0.1, 0.9, "unloading")
+    found = [cast(Accepted, e) for e in events(of, 0.9)]
+    vanished = [e.remaining is not None for e in found]
+    assert vanished == [e.point.at > 0.5 for e in found]
+    assert 0 < sum(vanished) < len(vanished)
+    assert all(e.may_touch for e in found if e.remaining is not None)
+
+
+# ---------------------------------------------------------------------- trail and history
+
+
+def local_point(at: float, solved: Point | None) -> LocalPoint:
+    """Return a point of a window whose solution with all gaps is known, or lost."""
+    window = SimpleNamespace(
+        inside=np.array([0]),
+        edges=SimpleNamespace(wave=WAVE, correct=lambda *_: (solved, -1 if solved else 3)),
+        expected=lambda local, at: Curve().point(at).gaps,
+        continued_at=lambda point: point,
+    )
+    gaps = Curve().point(at).gaps
+    return LocalPoint(cast(Any, window), at, gaps, gaps, np.zeros(2), 0.0, 0.0, at)
+
+
+def test_a_trail_returns_to_its_last_solved_point():
+    curve = Curve()
+    trail = Trail(curve.point(0.9, clearance=0.5))
+    trail.add(curve.point(0.8), 0.1, None)
+    trail.add(local_point(0.7, None), 0.1, None)
+    trail.add(local_point(0.6, None), 0.1, None)
+    assert trail.closed == pytest.approx(0.3)
+    with pytest.raises(LostTrack) as lost:
+        trail.confirm()
+    assert (lost.value.edge, lost.value.at) == (3, 0.6)
+    point, window = trail.return_to_solved()
+    assert (point.at, window) == (0.8, None)
+    assert [p.at for p in trail.points] == [0.9, 0.8]
+    assert trail.closed == pytest.approx(0.1)
+    trail.restart(0.4)
+    assert ([p.at for p in trail.points], trail.clearance, trail.closed) == ([0.8], 0.4, 0.0)
+
+
+def test_a_point_of_a_window_is_confirmed_in_its_place():
+    curve = Curve()
+    trail = Trail(curve.point(0.9))
+    trail.add(local_point(0.8, curve.point(0.8)), 0.1, None)
+    assert not isinstance(trail.confirm(), LocalPoint)
+    assert trail.return_to_solved()[0].at == 0.8
+
+
+def test_a_jump_is_written_once_and_whole():
+    history = History()
+    before, after, jump = object(), object(), object()
+    computed = ComputedJump(0.5, cast(Any, (before, after)), cast(Any, jump), None, 0.25)
+    assert (history.states, history.jumps) == ([], [])
+    history.commit(computed)
+    assert (history.states, history.jumps, history.misplaced) == ([before, after], [jump], 0.25)
