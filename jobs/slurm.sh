@@ -1,21 +1,28 @@
 #!/usr/bin/env bash
-# A campaign as a Slurm job that comes back by itself until the campaign is finished.
+# A campaign as a Slurm job that is requeued until the campaign is finished.
 #
-#   sbatch --ntasks=64 --time=12:00:00 jobs/slurm.sh CAMPAIGN.toml [FILE.h5]
+#   sbatch --ntasks=64 --time=12:00:00 jobs/slurm.sh CAMPAIGN.toml [FILE.h5] [OPTION…]
 #
-# Submit it from the folder that holds the results (FILE.h5, default: NAME.h5 there); the report
-# goes to NAME/ beside it when all tasks are done. Set before submitting, where the defaults do not
-# fit: ADHESIS=path of the adhesis command (default: .venv of the submit folder, then PATH),
-# LAUNCHER="srun --mpi=pmix" (default: mpirun if there is one, then srun), MAX_RESTARTS=50. One of
-# the tasks hands out and waits, the others compute.
+# Submit it from the folder that holds the results (FILE.h5, default: NAME.h5 there). OPTIONs are
+# those of adhesis run, as --redo failed or --max-failures 0. As many ranks are started as the job
+# has tasks; one of them hands out and waits, the others compute. With none of --ntasks,
+# --ntasks-per-node and --nodes one process computes alone.
 #
 # Two minutes before the time limit Slurm signals this script, which passes it on: the run stops
-# handing out, closes the file and exits with 75, and the job is put back into the queue. A job
-# that is cancelled is not. After the loss of a node Slurm itself requeues it (--requeue).
+# handing out, closes the file and exits with 75, and the job is put back into the queue; so it is
+# when a rank was killed or a node lost, at most MAX_RESTARTS=50 times in all. A job that is
+# cancelled is not. When all tasks are done or failed a job of its own, on one core, writes the
+# report to NAME/.
+#
+# In a job array %a in an argument stands for the number of the job (jobs/parts.sh makes one):
+#
+#   sbatch --array=1-20 jobs/slurm.sh CAMPAIGN.toml --part %a/20
+#
+# Variables to set before submitting, where the defaults do not fit: docs/clusters.md.
 #
 #SBATCH --job-name=adhesis
-#SBATCH --ntasks=2
 #SBATCH --cpus-per-task=1
+#SBATCH --hint=nomultithread
 #SBATCH --time=24:00:00
 #SBATCH --signal=B:USR1@120
 #SBATCH --requeue
@@ -27,62 +34,58 @@
 ##SBATCH --partition=…
 ##SBATCH --mem-per-cpu=1G
 
-set -u
-
-# The modules that tools/setup.sh was run with, for example:
+# The modules that tools/setup.sh was run with, and other settings of the cluster, for example:
 #   module load gcc openmpi hdf5-parallel python
+#   STAGING=$TMPDIR
 
-campaign=${1:?which campaign? usage: sbatch jobs/slurm.sh CAMPAIGN.toml [FILE.h5]}
-name=$(basename "$campaign" .toml)
-file=${2:-$name.h5}
+set -u
+# Slurm runs a copy of this file; the others of its folder lie beside the original.
+if [ -z "${JOBS:-}" ]; then
+    command=$(scontrol show job "$SLURM_JOB_ID" | sed -n 's/^ *Command=//p' | head -n 1)
+    if [ $# -gt 0 ]; then command=${command%" $*"}; fi
+    JOBS=$(cd "$SLURM_SUBMIT_DIR" && cd "$(dirname "$command")" && pwd)
+fi
+# shellcheck source=jobs/common.sh
+if ! . "$JOBS/common.sh"; then
+    echo "there is no common.sh in $JOBS: set JOBS to the folder jobs of the clone" >&2
+    exit 2
+fi
+# `sbatch --export=…` restricts what srun, and mpirun by srun, hand to the ranks.
+export SLURM_EXPORT_ENV=ALL
+
+: "${1:?which campaign? usage: sbatch jobs/slurm.sh CAMPAIGN.toml [FILE.h5] [OPTION…]}"
+if [ -n "${SLURM_ARRAY_TASK_ID:-}" ]; then set -- "${@//%a/$SLURM_ARRAY_TASK_ID}"; fi
+read_arguments "$@"
 restarts=${SLURM_RESTART_COUNT:-0}
+if [ "$restarts" -gt 0 ]; then omit_redo; fi
+find_adhesis "$SLURM_SUBMIT_DIR"
 
-if [ -z "${ADHESIS:-}" ]; then
-    ADHESIS=$SLURM_SUBMIT_DIR/.venv/bin/adhesis
-    if [ ! -x "$ADHESIS" ]; then ADHESIS=$(command -v adhesis); fi
-fi
-if [ -z "${LAUNCHER:-}" ]; then
-    mpirun=$(dirname "$ADHESIS")/../mpirun # set-up wrote down which one fits
-    if [ -s "$mpirun" ]; then mpirun=$(cat "$mpirun"); else mpirun=mpirun; fi
-    LAUNCHER=srun
-    if command -v "$mpirun" >/dev/null; then LAUNCHER="$mpirun -n $SLURM_NTASKS"; fi
-fi
-# One thread a rank: the ranks share the cores among themselves.
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
+# Without --ntasks Slurm gives the tasks of each node alone, as 4 or 4(x2),3.
+tasks_of_nodes() { tr , '\n' <<<"${SLURM_TASKS_PER_NODE:-1}" | awk -F '[(x)]+' '{ n += $1 * ($2 ? $2 : 1) } END { print n }'; }
+ranks=${SLURM_NTASKS:-$(tasks_of_nodes)}
+choose_launcher -n "$ranks"
 
-# A signal reaches the run only if somebody passes it on: mpirun and srun do, to all ranks, and
-# they get it from here. That is why they run in the background.
-signalled='' cancelled=''
-# shellcheck disable=SC2317
-pass_on() {
-    signalled=yes
-    echo "$(date '+%F %T') $1 received"
-    if [ "$1" = TERM ]; then cancelled=yes; fi
-    kill -s "$1" "$run" 2>/dev/null
-}
-run=
-trap 'pass_on USR1' USR1
-trap 'pass_on TERM' TERM
+note "job $SLURM_JOB_ID on $SLURM_JOB_NODELIST, $ranks ranks on $SLURM_JOB_CPUS_PER_NODE cores, start $((restarts + 1))"
+run_campaign
 
-echo "$(date '+%F %T') job $SLURM_JOB_ID on $SLURM_JOB_NODELIST, $SLURM_NTASKS ranks, start $((restarts + 1))"
-$LAUNCHER "$ADHESIS" run "$campaign" --out "$file" &
-run=$!
-while :; do
-    signalled=
-    wait "$run"
-    code=$?
-    # A signal ends the wait, but not the run.
-    if [ -z "$signalled" ]; then break; fi
-done
-echo "$(date '+%F %T') adhesis run ended with $code"
-
-if [ "$code" = 75 ] && [ -z "$cancelled" ]; then
+# SIGTERM comes when the job is cancelled, and also ahead of a preemption, of a job that runs still.
+state() { scontrol show job "$SLURM_JOB_ID" | sed -n 's/^ *JobState=\([A-Z_]*\).*/\1/p' | head -n 1; }
+if [ -n "$terminated" ] && [ "$(state)" != RUNNING ]; then
+    note "the job was ended from outside: it is not requeued"
+elif is_cut_short; then
     if [ "$restarts" -ge "${MAX_RESTARTS:-50}" ]; then
-        echo "started $((restarts + 1)) times: not requeued again; sbatch it again to resume"
+        note "started $((restarts + 1)) times: not requeued again; sbatch it again to resume"
     else
-        scontrol requeue "$SLURM_JOB_ID" || echo "could not be requeued; sbatch it again to resume"
+        scontrol requeue "$SLURM_JOB_ID" || note "could not be requeued; sbatch it again to resume"
     fi
-elif [ "$code" -le 1 ] && [ -e "$file" ]; then # 1: some tasks failed, which the report says too
-    "$ADHESIS" report "$file" --to "$name" || code=$?
+elif is_report_due && [ "${REPORT:-}" != no ]; then
+    read -ra more <<<"${REPORT_OPTIONS:-}"
+    script_of env ADHESIS="$ADHESIS" "$JOBS/report.sh" "$file" "$name" |
+        sbatch --job-name="$SLURM_JOB_NAME-report" --output=%x-%j.log --time=1:00:00 \
+            ${SLURM_JOB_ACCOUNT:+"--account=$SLURM_JOB_ACCOUNT"} \
+            ${SLURM_JOB_PARTITION:+"--partition=$SLURM_JOB_PARTITION"} \
+            ${SLURM_JOB_QOS:+"--qos=$SLURM_JOB_QOS"} \
+            --nodes=1 --ntasks=1 --cpus-per-task=1 ${more[@]+"${more[@]}"} ||
+        note "the report could not be submitted; it is written by: $ADHESIS report $file --to $name"
 fi
 exit "$code"

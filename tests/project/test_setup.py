@@ -19,6 +19,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parent.parent.parent
 SCRIPTS = sorted([*ROOT.glob("jobs/*.sh"), *ROOT.glob("tools/*.sh"), ROOT / ".ci" / "run"])
+SOURCED = {ROOT / "jobs" / "common.sh", ROOT / "tools" / "mpi.sh", ROOT / "tools" / "parts.sh"}
 # Distribution names that differ from what is imported, and what other packages need to find.
 IMPORTED_AS = {"markdown-it-py": "markdown_it", "surfacetopography": "SurfaceTopography"}
 LOADED_BY_NAME = {"h5netcdf"}  # xarray's engine
@@ -43,7 +44,7 @@ def test_script_is_well_formed(script: Path) -> None:
     subprocess.run(["bash", "-n", script], check=True)
     text = script.read_text()
     assert "\r" not in text
-    if script.name not in ("mpi.sh", "parts.sh"):  # those are sourced
+    if script not in SOURCED:
         assert text.startswith("#!/")
         assert os.access(script, os.X_OK)
     if shutil.which("shellcheck"):
@@ -52,7 +53,7 @@ def test_script_is_well_formed(script: Path) -> None:
 
 def test_batch_scripts_force_no_rules_on_a_cluster() -> None:
     """Running as root or with more ranks than cores is for this machine's owner to allow."""
-    for name in ("slurm.sh", "pbs.sh"):
+    for name in ("common.sh", "slurm.sh", "pbs.sh", "parts.sh", "report.sh"):
         text = (ROOT / "jobs" / name).read_text()
         assert "ALLOW_RUN_AS_ROOT" not in text
         assert "oversubscribe" not in text
@@ -231,67 +232,3 @@ def test_local_script_stops_its_run_in_order(tmp_path: Path, number: signal.Sign
         assert "the same command resumes it (out/study.h5)" in script.stderr.readline()
     finally:
         os.killpg(script.pid, signal.SIGKILL)  # the stand-in's sleep
-
-
-# ------------------------------------------------------------------ the PBS script, with a stand-in
-
-
-def pbs(tmp_path: Path, code: int, **env: str) -> tuple[str, str]:
-    """Run jobs/pbs.sh where qstat, qsub and adhesis only say how they were called."""
-    tools = tmp_path / "bin"
-    tools.mkdir()
-    calls = tmp_path / "calls"
-    for name, text in {
-        "adhesis": f'echo "adhesis $*" >>{calls}; >study.h5; [ "$1" = report ] || exit {code}',
-        "qsub": f'echo "qsub $*" >>{calls}',
-        "mpirun": f'echo "mpirun $1 $2" >>{calls}; shift 4; exec "$@"',
-        "qstat": "printf '    Resource_List.select = 2:ncpus=2:mpiprocs=2\\n"
-        "    Resource_List.nodect = 2\\n    Resource_List.nodes = 2\\n"
-        "    Resource_List.walltime = 01:30:00\\n    resources_used.walltime = 00:00:30\\n'",
-    }.items():
-        (tools / name).write_text(f"#!/bin/sh\n{text}\n")
-        (tools / name).chmod(0o755)
-    (tmp_path / "nodes").write_text("a\na\nb\nb\n")
-    done = subprocess.run(
-        [ROOT / "jobs" / "pbs.sh"],
-        env={
-            "PATH": f"{tools}:/usr/bin:/bin",
-            "PBS_O_WORKDIR": str(tmp_path),
-            "PBS_NODEFILE": str(tmp_path / "nodes"),
-            "PBS_JOBID": "17.head",
-            "CAMPAIGN": "study.toml",
-        }
-        | env,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == code, done.stdout + done.stderr
-    return calls.read_text(), done.stdout
-
-
-def test_pbs_script_tells_the_run_its_time_and_reports(tmp_path: Path) -> None:
-    calls, _ = pbs(tmp_path, 0)
-    run = re.search(r"adhesis run study.toml --out study.h5 --walltime (\d+)", calls)
-    assert run is not None
-    assert 5240 <= int(run[1]) <= 5250  # an hour and a half, less 30 s and two minutes
-    assert "mpirun -n 4" in calls
-    assert "adhesis report study.h5 --to study" in calls
-    assert "qsub" not in calls
-
-
-def test_pbs_script_submits_its_continuation(tmp_path: Path) -> None:
-    calls, _ = pbs(tmp_path, 75)
-    (line,) = [line for line in calls.splitlines() if line.startswith("qsub")]
-    assert "-l select=2:ncpus=2:mpiprocs=2 -l walltime=01:30:00 -v CAMPAIGN=study.toml," in line
-    assert "nodes=" not in line
-    assert "RESTARTS=1" in line
-    assert line.endswith(" jobs/pbs.sh")
-    assert "report" not in calls
-
-
-def test_pbs_script_does_not_come_back_for_ever(tmp_path: Path) -> None:
-    calls, text = pbs(tmp_path, 75, RESTARTS="3", MAX_RESTARTS="3")
-    assert "qsub" not in calls
-    assert "not submitted again" in text
