@@ -1,7 +1,8 @@
-"""jobs/slurm.sh in a real Slurm: signalled at the time limit, requeued, finished.
+"""The scripts of jobs/ in a real Slurm: jobs that are signalled, killed, cancelled, and in parts.
 
 A munged, a slurmctld and a slurmd of their own are started on free ports with everything they write
-in a scratch folder, and stopped afterwards. No service of this machine is touched.
+in a scratch folder, and stopped afterwards. No service of this machine is touched. All jobs are
+submitted at once, since each mostly waits for Slurm; the tests then watch one each.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import getpass
 import os
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -18,16 +20,16 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import pytest
 
-from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DONE
 from adhesis.ensemble.run import launch
-from tests.support.campaign_support import CAMPAIGN
+from tests.support.campaign_support import campaign_text, done_rows
 from tests.support.launchers import PATH
 
 ROOT = Path(__file__).parent.parent.parent
+SCRIPT = ROOT / "jobs" / "slurm.sh"
 pytestmark = pytest.mark.slurm
 
 
@@ -37,6 +39,19 @@ def wait_for(what: Callable[[], object], text: str, seconds: float) -> None:
         if time.monotonic() > end:
             raise TimeoutError(f"{text}: not within {seconds:.0f} s")
         time.sleep(0.2)
+
+
+def processes_in(folder: Path, word: str) -> list[int]:
+    """Return the processes with a word in their command line that work in a folder."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (process / "cmdline").read_bytes().split(b"\0")
+            if (process / "cwd").resolve() == folder and any(word.encode() in w for w in words):
+                found.append(int(process.name))
+        except OSError:
+            continue
+    return found
 
 
 def free_port() -> int:
@@ -109,9 +124,11 @@ SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
 MpiDefault=none
 ReturnToService=2
+KillWait=5
+SlurmdParameters=config_overrides
 JobAcctGatherType=jobacct_gather/none
 SchedulerParameters=sched_interval=2
-NodeName={node} NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
+NodeName={node} NodeAddr=127.0.0.1 CPUs=32 State=UNKNOWN
 PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
 """
     )
@@ -169,102 +186,162 @@ PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
         shutil.rmtree(folder, ignore_errors=True)
 
 
-@pytest.fixture
-def study(cluster: Cluster, tmp_path: Path) -> Path:
-    """A folder to submit from: a campaign of 40 tasks, and a adhesis that takes 1 s for each.
+@dataclass
+class Job:
+    """A job that was submitted from a folder of its own."""
 
-    All is the real command but for the mechanics, so that the test is as long everywhere. After
-    a restart the tasks take no time.
+    cluster: Cluster
+    folder: Path
+    number: str
+
+    @property
+    def values(self) -> dict[str, str]:
+        """What scontrol tells of the job."""
+        return self.cluster.job(self.number)
+
+    @property
+    def log(self) -> str:
+        """Return what all its starts have written."""
+        path = self.folder / f"adhesis-{self.number}.log"
+        return path.read_text() if path.exists() else ""
+
+    def done_tasks(self) -> int:
+        """Return the number of done rows in its results file."""
+        return done_rows(self.folder / "study.h5")
+
+    def wait(self, what: Callable[[], object], text: str, seconds: float = 90) -> None:
+        """Wait for a condition; the job and all logs in the message."""
+        try:
+            wait_for(what, text, seconds)
+        except TimeoutError as error:
+            raise AssertionError(
+                f"{error}\n{self.values}\n{self.log}\n{self.cluster.logs()}"
+            ) from error
+
+
+class Submit(Protocol):
+    """How a job is submitted; see :func:`submit`."""
+
+    def __call__(self, *words: str, realisations: int = 3, launcher: str = "") -> Job: ...
+
+
+@pytest.fixture(scope="module")
+def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Submit:
+    """Return what submits a campaign of 4 times so many tasks, from a folder with a comma.
+
+    All is the real command but for the mechanics and the report. A rank of a first start computes
+    two tasks and stays in the third one until it is stopped; after a restart, and in parts, tasks
+    take no time.
     """
-    (tmp_path / "study.toml").write_text(
-        CAMPAIGN.replace("realisations = 2", "realisations = 10").replace(
-            "load_steps = 4", "load_steps = 10"
-        )
-    )
-    adhesis = tmp_path / "adhesis"
-    adhesis.write_text(
-        f"""#!/bin/sh
-step=0.1
-if [ -n "$SLURM_RESTART_COUNT" ]; then step=0; fi
-exec {sys.executable} {ROOT}/tests/support/fake_run.py "step=$step log={tmp_path}/begun" "$@"
-"""
-    )
-    adhesis.chmod(0o755)
-    launcher = launch.launcher()
-    if launcher is None:
+    mpirun = launch.launcher()
+    if mpirun is None:
         pytest.skip("no mpirun here")
-    cluster.env |= {"ADHESIS": str(adhesis), "LAUNCHER": f"{launcher} -n 2"}
-    return tmp_path
+
+    def submit(*words: str, realisations: int = 3, launcher: str = "") -> Job:
+        folder = tmp_path_factory.mktemp("a study, ")
+        text = campaign_text(realisations=str(realisations))
+        (folder / "study.toml").write_text(text)
+        adhesis = folder / "bin" / "adhesis"
+        adhesis.parent.mkdir()
+        adhesis.write_text(
+            f"""#!/bin/sh
+behaviour=log=begun
+if [ "$1" = report ]; then exec mkdir "$4"; fi
+if [ -z "$SLURM_RESTART_COUNT$SLURM_ARRAY_TASK_ID" ]; then behaviour="log=begun hold=2"; fi
+exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
+"""
+        )
+        adhesis.chmod(0o755)
+        (folder / "mpirun").write_text(f"{mpirun}\n")  # as set-up records it
+        env = cluster.env | {"ADHESIS": str(adhesis), "LAUNCHER": launcher, "REPORT": "no"}
+        if not words[0].startswith("/"):
+            words = ("sbatch", "--parsable", *words, str(SCRIPT), "study.toml")
+        done = subprocess.run(words, env=env, cwd=folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        numbers = re.findall(r"\d+", done.stdout)
+        return Job(cluster, folder, numbers[-1])
+
+    return submit
 
 
-def submit(cluster: Cluster, study: Path, *options: str) -> str:
-    script = ROOT / "jobs" / "slurm.sh"
-    return cluster.call("sbatch", "--parsable", *options, script, "study.toml", cwd=study).strip()
-
-
-def done_tasks(study: Path) -> int:
-    file = study / "study.h5"
-    if not file.exists():
-        return 0
-    return int((Results(file).status() == DONE).sum())
-
-
-def states(cluster: Cluster, number: str, study: Path) -> str:
-    """Where the job is, and its log: for messages."""
-    log = study / f"adhesis-{number}.log"
-    text = log.read_text() if log.exists() else "no log"
-    return f"{cluster.job(number)}\n{text}\n{cluster.logs()}"
-
-
-def test_a_cancelled_job_ends_and_stays_away(cluster: Cluster, study: Path) -> None:
-    number = submit(cluster, study)
-    wait_for(lambda: done_tasks(study) > 0, "a first task", 60)
-    cluster.call("scancel", number)
-    wait_for(lambda: cluster.job(number)["JobState"] == "CANCELLED", "cancelled", 60)
-    wait_for(lambda: number not in cluster.call("squeue", "--noheader", "--format=%i"), "gone", 60)
-    job = cluster.job(number)
-    assert (job["JobState"], job["Restarts"]) == ("CANCELLED", "0")
-    assert 0 < done_tasks(study) < 40  # and the file is readable
-
-
-def test_a_job_at_its_time_limit_is_requeued_and_finishes(cluster: Cluster, study: Path) -> None:
+@pytest.fixture(scope="module")
+def jobs(cluster: Cluster, submit: Submit) -> dict[str, Job]:
+    """Every job of this module."""
     # Slurm looks at its clocks twice a minute and signals up to a minute early: soon, that is.
-    number = submit(cluster, study, "--time=2", "--signal=B:USR1@85")
-    log = study / f"adhesis-{number}.log"
-    try:
-        wait_for(lambda: cluster.job(number)["Restarts"] == "1", "requeued", 90)
-        before = done_tasks(study)
-        assert 0 < before < 40
-        assert "USR1 received" in log.read_text()
-        assert "adhesis run ended with 75" in log.read_text()
-        # Time enough for the rest, which would be signalled as soon otherwise.
-        cluster.call("scontrol", "update", f"JobId={number}", "TimeLimit=60")
-        wait_for(lambda: cluster.job(number)["JobState"] == "COMPLETED", "finished", 180)
-    except (AssertionError, TimeoutError) as error:
-        raise AssertionError(f"{error}\n{states(cluster, number, study)}") from error
-    assert cluster.job(number)["Restarts"] == "1"
-    assert "adhesis run ended with 0" in log.read_text()
-    assert done_tasks(study) == 40
-    assert (study / "study" / "losses.csv").exists()
+    limited = ("--ntasks=2", "--time=2", "--signal=B:USR1@85")
+    jobs = {"limited": submit(*limited, realisations=10)}
+    jobs["parts"] = submit(str(ROOT / "jobs" / "parts.sh"), "2", "--mem=1", "study.toml")
+    jobs["killed"] = submit("--nodes=1", "--ntasks-per-node=3", realisations=10)
+    jobs["cancelled"] = submit("--ntasks=2", realisations=10)
+    if "pmix" in cluster.call("srun", "--mpi=list"):
+        # Without SLURM_EXPORT_ENV ranks would lack PYTHONPATH.
+        settings = "--export=ADHESIS,LAUNCHER,REPORT,PATH,SLURM_CONF,PYTHONPATH"
+        jobs["srun"] = submit("--ntasks=2", settings, realisations=10, launcher="srun --mpi=pmix")
+    return jobs
+
+
+def test_a_cancelled_job_ends_and_starts_no_report(cluster: Cluster, jobs: dict[str, Job]) -> None:
+    job = jobs["cancelled"]
+    job.wait(lambda: job.done_tasks() > 0, "a first task")
+    cluster.call("scancel", job.number)
+    queue = ("squeue", "--noheader", "--format=%i")
+    job.wait(lambda: job.number not in cluster.call(*queue), "gone")
+    assert (job.values["JobState"], job.values["Restarts"]) == ("CANCELLED", "0")
+    assert "it is not requeued" in job.log
+    assert 0 < job.done_tasks() <= 2  # and the file is readable
+    assert not (job.folder / "study").exists()
+
+
+def test_a_job_with_a_killed_rank_is_requeued(cluster: Cluster, jobs: dict[str, Job]) -> None:
+    job = jobs["killed"]
+    job.wait(lambda: job.done_tasks() > 0, "a first task")
+    assert "3 ranks" in job.log  # by --ntasks-per-node
+    ranks = processes_in(job.folder, "fake_run.py")
+    ranks = [pid for pid in ranks if "mpirun" not in Path(f"/proc/{pid}/comm").read_text()]
+    assert len(ranks) == 3
+    os.kill(max(ranks), signal.SIGKILL)
+    job.wait(lambda: job.values["Restarts"] == "1", "requeued")
+    assert "adhesis run ended with 137" in job.log
+    job.wait(lambda: job.values["JobState"] == "COMPLETED", "finished")
+    assert job.done_tasks() == 40
+
+
+def test_srun_passes_the_signal_on_too(cluster: Cluster, jobs: dict[str, Job]) -> None:
+    if "srun" not in jobs:
+        pytest.skip("this Slurm has no PMIx")
+    job = jobs["srun"]
+    job.wait(lambda: job.done_tasks() > 0, "a first task")
+    # What Slurm does at the time limit (B: of --signal), without waiting for it.
+    cluster.call("scancel", "--batch", "--signal=USR1", job.number)
+    job.wait(lambda: job.values["Restarts"] == "1", "requeued")
+    assert "adhesis run ended with 75" in job.log
+    cluster.call("scancel", job.number)
+
+
+def test_parts_run_as_an_array_and_are_joined(jobs: dict[str, Job]) -> None:
+    merge = jobs["parts"]
+    merge.wait(lambda: merge.values["JobState"] == "COMPLETED", "joined", 180)
+    assert merge.done_tasks() == 12
+    for part in ("study.1-of-2.h5", "study.2-of-2.h5"):
+        assert done_rows(merge.folder / part) == 6
+    assert (merge.folder / "study").is_dir()  # reported
+
+
+def test_a_job_at_its_time_limit_is_requeued_and_finishes(
+    cluster: Cluster, jobs: dict[str, Job]
+) -> None:
+    job = jobs["limited"]
+    job.wait(lambda: job.values["Restarts"] == "1", "requeued")
+    assert "USR1 received" in job.log
+    assert "adhesis run ended with 75" in job.log
+    assert "stopped early: SIGUSR1 received; 38 tasks are left" in job.log
+    # Time enough for the rest, which would be signalled as soon otherwise.
+    cluster.call("scontrol", "update", f"JobId={job.number}", "TimeLimit=60")
+    job.wait(lambda: job.values["JobState"] == "COMPLETED", "finished", 180)
+    assert job.values["Restarts"] == "1"
+    assert "adhesis run ended with 0" in job.log
+    assert job.done_tasks() == 40
     # What was done was not computed again: only the task that the signal met was begun twice.
-    begun = (study / "begun").read_text().split()
+    begun = (job.folder / "begun").read_text().split()
     assert len(set(begun)) == 40
     assert len(begun) <= 41
-
-
-def test_srun_passes_the_signal_on_too(cluster: Cluster, study: Path) -> None:
-    if "pmix" not in cluster.call("srun", "--mpi=list"):
-        pytest.skip("this Slurm has no PMIx")
-    cluster.env["LAUNCHER"] = "srun --mpi=pmix"
-    number = submit(cluster, study)
-    log = study / f"adhesis-{number}.log"
-    try:
-        wait_for(lambda: done_tasks(study) > 0, "a first task", 60)
-        # What Slurm does at the time limit (B: of --signal), without waiting for it.
-        cluster.call("scancel", "--batch", "--signal=USR1", number)
-        wait_for(lambda: cluster.job(number)["Restarts"] == "1", "requeued", 60)
-        assert "adhesis run ended with 75" in log.read_text()
-    except (AssertionError, TimeoutError) as error:
-        raise AssertionError(f"{error}\n{states(cluster, number, study)}") from error
-    finally:
-        cluster.call("scancel", number)

@@ -32,7 +32,7 @@ STAND_INS = {
             fi
             exit "$CODE"
         fi
-        [ "$1" = status ] && printf '{\\n "tasks": 9,\\n "pending": %s,\\n "done": 5\\n}\\n' "$PENDING"
+        [ "$1" = status ] && printf '{\\n "tasks": 9,\\n "pending": %s,\\n}\\n' "$PENDING"
         exit 0""",
     "mpirun": 'shift 2; [ "$1" = -machinefile ] && shift 2; exec "$@"',
     "scontrol": """
@@ -60,6 +60,7 @@ class Cluster:
     env: dict[str, str]
 
     def run(self, *command: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
+        """Run a command here."""
         return subprocess.run(
             [str(word) for word in command],
             cwd=self.folder,
@@ -282,7 +283,7 @@ def test_staged_results_come_back_whole(cluster: Cluster, env: dict[str, str]) -
 
 
 def test_staged_results_of_a_killed_job_are_not_lost(cluster: Cluster) -> None:
-    """The next start on the same disk goes on with them; it replaces no results but those it had."""
+    """The next start on this disk goes on with them; it replaces no results but those it had."""
     file, scratch = cluster.folder / "s.h5", cluster.folder / "scratch"
     file.write_text("earlier rows")
     changed = "echo by another run >s.h5; exit 0\n"
@@ -338,7 +339,7 @@ def test_pbs_job_tells_the_run_its_time_and_submits_the_report(cluster: Cluster)
     assert job["l"] == "select=1:ncpus=1 walltime=1:00:00"
     assert (job["-q"], job["-A"], job["-P"]) == ("small", "ab12", "rough")
     (cluster.folder / "job").write_text(job["script"])
-    assert subprocess.run(["bash", cluster.folder / "job"], env=cluster.env, cwd="/").returncode == 0
+    subprocess.run(["bash", cluster.folder / "job"], env=cluster.env, cwd="/", check=True)
     assert cluster.calls("adhesis")[-1] == ["report", "study.h5", "--to", "study"]
 
 
