@@ -222,7 +222,8 @@ class Job:
 class Submit(Protocol):
     """How a job is submitted; see :func:`submit`."""
 
-    def __call__(self, *words: str, realisations: int = 3, launcher: str = "") -> Job: ...
+    def __call__(self, *words: str, realisations: int = 3, launcher: str = "") -> Job:
+        """Submit."""
 
 
 @pytest.fixture(scope="module")
