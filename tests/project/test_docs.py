@@ -42,6 +42,11 @@ NOT_RUN = {
     "adhesis run my.toml --out my.h5 --ranks 9": "nine ranks; tests/ensemble/test_mpi.py",
     "adhesis run my.toml --out my.h5 --redo failed --ranks 8": "as before",
     "sbatch --ntasks=64 --time=12:00:00 PATH/jobs/slurm.sh my.toml": "tests/ensemble/test_slurm.py",
+    "sbatch --nodes=2 --ntasks-per-node=32 --time=12:00:00 PATH/jobs/slurm.sh my.toml my.h5 "
+    "--max-failures 0": "as before",
+    "PATH/jobs/parts.sh 20 --time=12:00:00 my.toml": "as before",
+    "sbatch --array=3,7 --time=12:00:00 PATH/jobs/slurm.sh my.toml --part %a/20": "as before",
+    "PATH/jobs/report.sh my.h5 my 20": "tests/project/test_jobs.py",
     'sbatch --ntasks=2 --wrap ".venv/bin/adhesis doctor --in ."': "needs a Slurm",
     'sbatch --ntasks=1 --wrap ".venv/bin/adhesis warm"': "as before",
     "qsub -l select=2:ncpus=32:mpiprocs=32 -v CAMPAIGN=my.toml,SCRIPT=PATH/jobs/pbs.sh "
