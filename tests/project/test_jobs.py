@@ -97,7 +97,7 @@ def cluster(tmp_path: Path) -> Cluster:
     programs = folder / "bin"
     programs.mkdir(parents=True)
     for name, text in STAND_INS.items():
-        log = f"printf '%s|' {name} \"$@\" >>\"$CALLS\"; echo >>\"$CALLS\""
+        log = f'printf \'%s|\' {name} "$@" >>"$CALLS"; echo >>"$CALLS"'
         (programs / name).write_text(f"#!/bin/bash\n{log}\n{text}\n")
     body = "\n".join(line[4:] for line in QSUB.splitlines())
     (programs / "qsub").write_text(f"#!/usr/bin/env python3\n{body}\n")
@@ -220,6 +220,13 @@ def test_slurm_job_passes_options_on(
     assert action == ("nothing" if "part" in run else "report")  # a part is reported on with all
 
 
+@pytest.mark.parametrize("name", ["slurm.sh", "pbs.sh"])
+def test_modules_are_loaded_before_unset_variables_are_errors(name: str) -> None:
+    """The start-up files of modules use variables that may be unset."""
+    text = (JOBS / name).read_text()
+    assert 0 < text.index("#   module load") < text.index("\nset -u\n")
+
+
 def test_slurm_job_takes_no_other_file(cluster: Cluster) -> None:
     done, _ = slurm(cluster, "s.toml", "--out", "r.h5")
     assert done.returncode == 2
@@ -329,9 +336,7 @@ def test_pbs_job_tells_the_run_its_time_and_submits_the_report(cluster: Cluster)
     done = pbs(cluster, OPTIONS="--max-failures 0")
     assert done.returncode == 0, done.stderr
     (run,) = (" ".join(words) for words in cluster.calls("adhesis") if words[0] == "run")
-    match = re.fullmatch(
-        r"run study.toml --out study.h5 --walltime (\d+) --max-failures 0", run
-    )
+    match = re.fullmatch(r"run study.toml --out study.h5 --walltime (\d+) --max-failures 0", run)
     assert match is not None, run
     assert 5240 <= int(match[1]) <= 5250  # an hour and a half, less 30 s and two minutes
     assert cluster.calls("mpirun")[0][:2] == ["-n", "4"]
