@@ -99,7 +99,7 @@ is_cut_short() {
     case $code in
         75) ;;                    # stopped in order, by a signal or at the walltime
         135 | 137 | 138 | 139) ;; # a rank was ended by signal 7, 9, 10 or 11 …
-        7 | 9 | 10 | 11) ;;       # … as MPICH reports it
+        7 | 9 | 10 | 11 | 15 | 255) ;; # … as MPICH reports it, codes of several ranks by their bits
         205) ;;                   # Open MPI has lost a node
         *) return 1 ;;
     esac

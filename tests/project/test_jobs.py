@@ -150,7 +150,7 @@ def slurm(
         (1, {}, "report"),  # some tasks failed
         (1, {"PENDING": "3"}, "nothing"),  # the launcher was ended, or --max-failures
         (0, {"REPORT": "no"}, "nothing"),
-        *((code, {}, "requeue") for code in (75, 137, 139, 205, 9)),
+        *((code, {}, "requeue") for code in (75, 137, 139, 205, 9, 255)),
         *((code, {}, "nothing") for code in (2, 70, 74, 127, 134)),
         (75, {"SLURM_RESTART_COUNT": "49"}, "requeue"),
         *((code, {"SLURM_RESTART_COUNT": "50"}, "nothing") for code in (75, 137)),
