@@ -69,6 +69,17 @@ def interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[Array, 
     return np.minimum(low, mean - std * above), np.maximum(high, mean - std * below)
 
 
+def relative_error(mean: float, low: float, high: float) -> float:
+    """Return how far an interval reaches from its mean on the further side, over the mean.
+
+    Infinite where there is no interval.
+    """
+    furthest = max(mean - low, high - mean)
+    if furthest == 0:
+        return 0.0
+    return furthest / abs(mean) if mean and not np.isnan(furthest) else float("inf")
+
+
 def untransformed(x: float, skewness: Array, n: int) -> Array:
     """Return (mean - true mean)/std where Hall's cubic of it is ``x``.
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.curves import Curve
 from adhesis.ensemble.aggregate.statistics import Estimate, estimates
+from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import InputError
@@ -100,6 +101,16 @@ class Cell:
     values: dict[str, Array]
     estimates: dict[str, Estimate]
     curves: dict[str, Curve]
+
+    @property
+    def precision(self) -> Precision | None:
+        """How well the mean of the quantity of ``[stop]`` is known; None without ``[stop]``."""
+        stop = self.campaign.stop
+        if stop.relative_error is None:
+            return None
+        known = self.estimates[stop.quantity]
+        ends = (known.mean, known.low, known.high)
+        return Precision(stop.quantity, stop.relative_error, known.n, *ends, not self.pending)
 
 
 def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.interval import interval, relative_error
 from adhesis.solver.model.profile import Array
 
 
@@ -32,6 +32,11 @@ class Estimate:
     sem: float
     low: float
     high: float
+
+    @property
+    def relative_error(self) -> float:
+        """How far the interval reaches from the mean, over the mean; infinite without one."""
+        return relative_error(self.mean, self.low, self.high)
 
 
 def estimates(values: Array, with_interval: bool = True) -> list[Estimate]:

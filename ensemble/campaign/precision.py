@@ -1,9 +1,12 @@
 """When a cell has enough realisations: the rule of ``[stop]``, on complete batches alone.
 
 Realisations are looked at after the first ones and after every batch. A cell has enough when, at
-:data:`LOOKS_IN_A_ROW` looks in a row, the 95 % interval of the mean loss that the tables print
-(:mod:`adhesis.ensemble.interval`) reaches no further from it than wanted, over at least
-:data:`LEAST` losses.
+:data:`LOOKS_IN_A_ROW` looks in a row, the 95 % interval that the tables print of the mean of the
+steered quantity (:mod:`adhesis.ensemble.interval`) reaches no further from it than wanted, over at
+least :data:`LEAST` values.
+
+:class:`Precision` is the only judge of a cell: the rule, ``adhesis status``, the closing lines of a
+run and the report all have interval and verdict from it.
 
 A rule that stops as soon as an interval looks narrow stops when the spread happens to look small,
 and its intervals cover the mean less often than they say (Anscombe 1953, J. R. Stat. Soc. B 15, 1;
@@ -17,14 +20,16 @@ To wait until the sample's skewness is small would do harm: that picks the sampl
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble import interval
 
 LEAST = 32
 LOOKS_IN_A_ROW = 4
+MOST_LISTED = 20  # cells in the closing lines of a run and among the findings of a report
 
 Array = NDArray[np.float64]
 
@@ -40,48 +45,127 @@ def fewest(at: Sequence[int]) -> int:
     return at[min(first + LOOKS_IN_A_ROW, len(at)) - 1]
 
 
-def relative_error(losses: Array) -> float:
-    """How far the interval of the mean reaches from it, over the mean; infinite below two losses.
+@dataclass(frozen=True)
+class Precision:
+    """How well the mean of a cell is known, and whether that is as well as wanted.
+
+    Attributes
+    ----------
+    quantity : str
+        Column of the results file that ``[stop]`` steers.
+    wanted : float
+        How far the interval may reach from the mean, over the mean.
+    count : int
+        Realisations that the mean is over.
+    mean, low, high : float
+        The mean and both ends of its interval, in the unit of the quantity; NaN where unknown.
+    finished : bool
+        Whether no realisation of the cell is still to be computed.
+    """
+
+    quantity: str
+    wanted: float
+    count: int
+    mean: float
+    low: float
+    high: float
+    finished: bool = True
+
+    @property
+    def relative_error(self) -> float:
+        """How far the interval reaches from the mean, over the mean; infinite without one."""
+        return interval.relative_error(self.mean, self.low, self.high)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether the interval is narrow enough, over enough realisations."""
+        return self.count >= LEAST and self.relative_error <= self.wanted
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the cell has met the wanted precision; None while realisations are missing."""
+        return self.narrow if self.finished else None
+
+    def __str__(self) -> str:
+        error = self.relative_error
+        known = f"{self.quantity}: interval unknown"
+        if np.isfinite(error):
+            known = f"{self.quantity} {self.low:.4g} to {self.high:.4g} (± {as_percent(error)})"
+        verdict = {True: "met", False: "not met", None: "not finished"}[self.met]
+        if self.met is False and self.count < LEAST:
+            verdict += f", as it takes at least {LEAST} realisations"
+        plural = "" if self.count == 1 else "s"
+        return (
+            f"{known} of {self.count} realisation{plural}, wanted ± {as_percent(self.wanted)}: "
+            f"{verdict}"
+        )
+
+
+def as_percent(share: float) -> str:
+    """Return three digits of a share, in percent and without an exponent."""
+    return f"{float(f'{100 * share:.3g}'):g} %"
+
+
+def precision(
+    values: Sequence[float] | Array, wanted: float, quantity: str = "", *, finished: bool = True
+) -> Precision:
+    """Return how well the mean of a cell is known.
 
     Parameters
     ----------
-    losses : array, shape (n,)
-        In any unit.
+    values : array, shape (n,)
+        One of each realisation; those that are not finite, of failed tasks, are left out.
+    wanted : float
+    quantity : str, optional
+        What the values are.
+    finished : bool, optional
+        Whether no realisation is still to be computed.
     """
-    if losses.size < 2:
-        return float("inf")
-    mean = float(losses.mean())
-    low, high = interval(losses)
-    furthest = max(mean - float(low), float(high) - mean)
-    if furthest == 0:
-        return 0.0
-    return furthest / abs(mean) if mean else float("inf")
+    known = np.asarray(values, np.float64)
+    known = known[np.isfinite(known)]
+    mean = float(known.mean()) if known.size else float("nan")
+    low, high = interval.interval(known)
+    return Precision(quantity, wanted, known.size, mean, float(low), float(high), finished)
 
 
-def narrow(losses: Array, wanted: float) -> bool:
-    """Whether one look finds the interval narrow enough, over enough losses."""
-    return losses.size >= LEAST and relative_error(losses) <= wanted
-
-
-def enough(losses: Sequence[float] | Array, at: Sequence[int], wanted: float) -> int | None:
+def enough(values: Sequence[float] | Array, at: Sequence[int], wanted: float) -> int | None:
     """Return after how many realisations a cell has enough, None if it has not yet.
 
     Parameters
     ----------
-    losses : sequence of float
+    values : sequence of float
         By realisation, so many as are known without a gap; NaN where the task failed.
     at : sequence of int
         Where it is looked at (:func:`looks`).
     wanted : float
         How far the interval may reach from the mean, over the mean.
     """
-    values = np.asarray(losses, np.float64)
     row = 0
     for count in at:
-        if count > values.size:
+        if count > len(values):
             return None
-        known = values[:count]
-        row = row + 1 if narrow(known[np.isfinite(known)], wanted) else 0
+        row = row + 1 if precision(values[:count], wanted).narrow else 0
         if row == LOOKS_IN_A_ROW or count == at[-1]:
             return count
     return None
+
+
+def precision_lines(cells: Sequence[tuple[str, Precision]]) -> list[str]:
+    """Return lines on which cells have met the wanted precision; none without any cell.
+
+    Of many cells only those are listed that have not met it, and of these the first.
+
+    Parameters
+    ----------
+    cells : sequence of (str, Precision)
+        Name of every cell, and how well its mean is known.
+    """
+    if not cells:
+        return []
+    met = sum(bool(known.met) for _, known in cells)
+    lines = [f"[stop]: {met} of {len(cells)} cells met the wanted precision"]
+    listed = [entry for entry in cells if not entry[1].met] if len(cells) > MOST_LISTED else cells
+    lines += [f"  {name}: {known}" for name, known in listed[:MOST_LISTED]]
+    if len(listed) > MOST_LISTED:
+        lines.append(f"  … and {len(listed) - MOST_LISTED} more (adhesis status lists all)")
+    return lines

@@ -217,14 +217,22 @@ class OutputTable:
     )
 
 
+Quantity = Literal["loss_dimensionless", "loss"]
+
+
 @dataclass(frozen=True)
 class StopTable:
-    """``[stop]``: realisations in batches until the mean loss of a cell is known well enough."""
+    """``[stop]``: realisations in batches until a mean of every cell is known well enough."""
 
     relative_error: float | None = _key(
         number_between(0, 1),
-        "how far the 95 % interval of the mean loss may reach from it, over it",
+        "how far the 95 % interval of the mean of the quantity may reach from it, over it",
         None,
+    )
+    quantity: Quantity = _key(  # noqa: RUF009  # a field
+        choice(*get_args(Quantity)),
+        "column of the results file whose mean is to be known so well",
+        "loss_dimensionless",
     )
     batch: int = _key(whole_number(1), "realisations that a cell gets at a time", 8)
     most: int = _key(whole_number(1, 2**31 - 1), "most realisations of a cell", 1000)

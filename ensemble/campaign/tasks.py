@@ -52,12 +52,15 @@ class Task:
         """Where the task stands on the axes of the sweep: all realisations of a cell share it."""
         return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
 
-    def __str__(self) -> str:
-        return (
-            f"H = {self.hurst:g}, γ = {self.work_of_adhesion:g} J/m², "
-            + "".join(f"{name} = {value:g}, " for name, value in self.others)
-            + f"realisation {self.realisation}"
+    @property
+    def cell_name(self) -> str:
+        """Values of the task on the axes of the sweep: "H = 0.8, γ = 0.04 J/m²"."""
+        return f"H = {self.hurst:g}, γ = {self.work_of_adhesion:g} J/m²" + "".join(
+            f", {name} = {value:g}" for name, value in self.others
         )
+
+    def __str__(self) -> str:
+        return f"{self.cell_name}, realisation {self.realisation}"
 
 
 @dataclass(frozen=True)

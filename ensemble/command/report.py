@@ -12,7 +12,7 @@ EXAMPLES = (
     "adhesis report paper.h5 --to report",
     "adhesis report paper.h5 --to report --beside fine.h5",
 )
-_TABLES = ("losses", "growth", "jumps", "works", "beside", "slopes")
+_TABLES = ("losses", "precision", "growth", "jumps", "works", "beside", "slopes")
 _FILES = (*(f"{name}.csv" for name in _TABLES), "curves.nc", "report.md", "report.html")
 
 

@@ -184,6 +184,7 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
 
 def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
     from adhesis.ensemble.campaign.file import load_campaign
+    from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Overdue
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
@@ -227,6 +228,8 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
         )
         if summary.failed:
             say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
+        for line in precision_lines(summary.precisions):
+            say(line)
         if summary.doubtful:
             say(
                 f"{summary.doubtful} losses are doubtful: by their own account they may be off by "

@@ -11,6 +11,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.campaign.precision import as_percent
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.axes import cell_name, lines_along, place, together
 from adhesis.ensemble.task.doubt import bound, doubtful
@@ -56,25 +57,25 @@ def _percent(share: float) -> str:
 
 
 def _statistical(data: Aggregate) -> str:
-    halves = [
-        (found.high - found.low) / 2 / abs(found.mean)
+    errors = [
+        error
         for cell in data.cells
-        if cell.done > 1 and (found := cell.estimates["loss_dimensionless"]).mean
+        if np.isfinite(error := cell.estimates["loss_dimensionless"].relative_error)
     ]
     counts = sorted({cell.done for cell in data.cells if cell.done})
     many = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
     plural = "realisations" if counts[-1] > 1 else "realisation"
     point = "cell" if data.further else "(H, γ)"
-    if not halves:
+    if not errors:
         return f"With {many} {plural} of each {point}, how well the mean is known cannot be said."
-    width = (
-        f"{_percent(min(halves))} to {_percent(max(halves))} %"
-        if len(halves) > 1
-        else f"{_percent(halves[0])} %"
+    reach = (
+        f"{_percent(min(errors))} to {_percent(max(errors))} %"
+        if len(errors) > 1
+        else f"{_percent(errors[0])} %"
     )
     return (
-        f"With {many} {plural} of each {point}, the 95 % interval of the mean loss is its mean "
-        f"± {width}."
+        f"With {many} {plural} of each {point}, the 95 % interval of the mean W~ reaches {reach} "
+        "from it, on the further side."
     )
 
 
@@ -99,6 +100,22 @@ def _numerical(data: Aggregate) -> str:
         )
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
+
+
+def precision(data: Aggregate) -> list[str]:
+    """Which cells have met the precision that ``[stop]`` asks for; none without ``[stop]``."""
+    known = [(cell_name(cell), cell.precision) for cell in data.cells]
+    cells = [(name, found) for name, found in known if found is not None]
+    if not cells:
+        return []
+    quantity, wanted = cells[0][1].quantity, cells[0][1].wanted
+    met = sum(bool(found.met) for _, found in cells)
+    sentence = (
+        f"The 95 % interval of the mean {quantity} was to reach at most {as_percent(wanted)} from "
+        f"it ([stop]): {met} of {len(cells)} cells met that"
+    )
+    rest = [f"{name}: {found}" for name, found in cells if not found.met]
+    return [f"{sentence}; the others: {_listed(rest)}." if rest else f"{sentence}."]
 
 
 def missing(data: Aggregate) -> list[str]:

@@ -34,17 +34,18 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     def show(section: str) -> list[str]:
         return [_shown(item, of_paper) for item in figures.get(section, ())]
 
-    losses = loss_tables.losses(data)
+    losses, known = loss_tables.losses(data), loss_tables.precision(data)
     out = [
         f"# Hysteresis loops of {code_span(data.path.name)}",
         markdown(" ".join(findings.verdict(data))),
-        *_bullets(findings.missing(data)),
+        *_bullets([*findings.precision(data), *findings.missing(data)]),
         _summary(data),
         left_out(data),
         shown_cells(data),
         "## Losses",
         losses.markdown(),
         _footnote(data),
+        *(["### Precision of the mean (`[stop]`)", known.markdown()] if known.rows else []),
         *show("losses"),
         *(["### Along further axes", *show("axes")] if figures.get("axes") else []),
     ]
@@ -121,10 +122,14 @@ def _summary(data: Aggregate) -> str:
         for axis in data.further
         if axis.name not in ("max_penetration", "max_stress")
     )
+    many = f"{sweep.realisations} realisations"
+    if data.campaign.stop.relative_error is not None:
+        counts = [cell.done for cell in data.cells]
+        many = f"{min(counts)} to {max(counts)} realisations by `[stop]`"
     return (
         f"{data.done} loops of {data.done + data.failed + data.pending} tasks: "
         f"H = {_list(sweep.hurst)}; γ = {_list(sweep.work_of_adhesion)} J/m²; {further}"
-        f"{sweep.realisations} realisations. Each loop was loaded to {top} "
+        f"{many}. Each loop was loaded to {top} "
         f"in {cycle.load_steps} steps and unloaded until detached; "
         f"method `{data.campaign.solver.method}`. Numbers: `losses.csv`; curves: `curves.nc`."
     )

@@ -68,6 +68,8 @@ def _write_files(data: Aggregate, directory: Path) -> None:
     from adhesis.ensemble.report.tables import losses, mechanisms, works
 
     losses.losses(data).write_csv(directory / "losses.csv")
+    if (known := losses.precision(data)).rows:
+        known.write_csv(directory / "precision.csv")
     losses.paired(data).write_csv(directory / "growth.csv")
     mechanisms.jumps(data).write_csv(directory / "jumps.csv")
     works.works(data).write_csv(directory / "works.csv")
@@ -102,10 +104,14 @@ def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
 
     losses.losses(data).print(stream)
     print(file=stream)
+    if (known := losses.precision(data)).rows:
+        known.print(stream)
+        print(file=stream)
     mechanisms.mechanisms(data).print(stream)
     print(file=stream)
     for sentence in (
         *findings.verdict(data),
+        *findings.precision(data),
         *findings.missing(data),
         *findings.quality(data),
     ):

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.campaign.precision import relative_error
+from adhesis.ensemble.campaign.precision import precision
+from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
@@ -40,7 +41,11 @@ def read_status(path: Path | str) -> dict[str, Any]:
         versions and the processor that computed them; ``seconds`` per done task (``mean``,
         ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each cell (a
         value of each of the ``axes``) with
-        its counts, its mean time and its mean loss with standard error (J/m², and W~);
+        its counts, its mean time, its mean loss with standard error (J/m², and W~), and with
+        ``[stop]`` how well the mean of the steered ``quantity`` is known: ``relative_error``,
+        ``interval_low`` and ``interval_high`` (None where unknown), ``wanted_relative_error``,
+        whether it was ``met`` (None while tasks of the cell are pending), and all this as a
+        sentence (``precision``);
         ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
         checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the worst first;
         ``last_row``, when the file was last written to (as ``time.time()`` counts), None before the
@@ -53,7 +58,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     """
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy
-        wanted = results.campaign.stop.relative_error
+        stop = results.campaign.stop
         axes = ["hurst", "work_of_adhesion"]
         axes += [dataset.name for dataset in axis_datasets(results.campaign)]
         state = results.status()
@@ -93,7 +98,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "doubtful": _doubtful(state, column, accuracy),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
-        "groups": _groups(state, column, axes, wanted),
+        "groups": _groups(state, column, axes, stop),
         "failures": failures,
     }
 
@@ -136,7 +141,7 @@ def _groups(
     state: NDArray[np.uint8],
     column: dict[str, NDArray[Any]],
     axes: Sequence[str],
-    wanted: float | None,
+    stop: StopTable,
 ) -> list[dict[str, Any]]:
     points, group_of = np.unique(
         np.stack([column[name] for name in axes]), axis=1, return_inverse=True
@@ -159,12 +164,21 @@ def _groups(
             for i in range(size)
         ]
 
-    def precision(i: int) -> dict[str, Any]:
-        """How well the loss of a cell is known, and how well it is to be."""
-        now = relative_error(column["loss"][done & (group_of == i)])
+    def known(i: int) -> dict[str, Any]:
+        """How well the steered quantity of a cell is known, and how well it is to be."""
+        if stop.relative_error is None:
+            return {}
+        values = column[stop.quantity][done & (group_of == i)]
+        finished = not count["pending"][i]
+        now = precision(values, stop.relative_error, stop.quantity, finished=finished)
         return {
-            "relative_error": now if np.isfinite(now) else None,
-            "wanted_relative_error": wanted,
+            "quantity": now.quantity,
+            "relative_error": _finite(now.relative_error),
+            "interval_low": _finite(now.low),
+            "interval_high": _finite(now.high),
+            "wanted_relative_error": now.wanted,
+            "met": now.met,
+            "precision": str(now),
         }
 
     seconds = mean_and_error("wall_time")
@@ -178,10 +192,14 @@ def _groups(
             "loss_standard_error": loss[i][1],
             "loss_dimensionless": scaled[i][0],
             "loss_dimensionless_standard_error": scaled[i][1],
-            **({} if wanted is None else precision(i)),
+            **known(i),
         }
         for i in range(size)
     ]
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def as_text(status: dict[str, Any], pace: str = "") -> str:
@@ -228,18 +246,8 @@ def _group_line(group: dict[str, Any], further: Sequence[str]) -> str:
         + (f"{mean:9.3g}" if mean is not None else " " * 9)
         + (f"  {loss:.4g}" if loss is not None else "")
         + (f" ± {error:.2g}" if error is not None else "")
-        + _precision(group)
+        + (f"  {group['precision']}" if "precision" in group else "")
     ).rstrip()
-
-
-def _precision(group: dict[str, Any]) -> str:
-    """How far a cell is on its way to the wanted interval."""
-    if "wanted_relative_error" not in group:
-        return ""
-    wanted, known = group["wanted_relative_error"], group["relative_error"]
-    now = "unknown" if known is None else f"{100 * known:.2g} %"
-    enough = ", enough" if not group["pending"] else ""
-    return f"  interval ± {now} of ± {100 * wanted:g} %{enough}"
 
 
 def _task(row: Mapping[str, Any]) -> str:

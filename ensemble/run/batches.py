@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from adhesis.ensemble.campaign.precision import enough, looks
+from adhesis.ensemble.campaign.precision import Precision, enough, looks, precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 
@@ -17,7 +17,7 @@ from adhesis.ensemble.campaign.tasks import Task
 @dataclass
 class _Cell:
     rows: list[int]  # by realisation
-    losses: dict[int, float] = field(default_factory=dict)  # by realisation; NaN if it failed
+    values: dict[int, float] = field(default_factory=dict)  # by realisation; NaN if it failed
     asked: int = 0
     full: bool = False
 
@@ -30,22 +30,24 @@ class Batches:
     campaign : Campaign
     tasks : sequence of Task
         Row by row.
-    losses : mapping of int to float
-        Of the rows that have been computed; NaN of those that failed.
+    values : mapping of int to float
+        The quantity that ``[stop]`` steers, of the rows that have been computed; NaN of those that
+        failed.
     """
 
     def __init__(
-        self, campaign: Campaign, tasks: Sequence[Task], losses: Mapping[int, float]
+        self, campaign: Campaign, tasks: Sequence[Task], values: Mapping[int, float]
     ) -> None:
         assert campaign.stop.relative_error is not None
         self._wanted = campaign.stop.relative_error
+        self._quantity = campaign.stop.quantity
         self._looks = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
         self._tasks = tasks
         self._cells: dict[tuple[float, ...], _Cell] = {}
         for row, task in enumerate(tasks):
             self._cells.setdefault(task.cell, _Cell([])).rows.append(row)
-        for row, loss in losses.items():
-            self._cells[tasks[row].cell].losses[tasks[row].realisation] = loss
+        for row, value in values.items():
+            self._cells[tasks[row].cell].values[tasks[row].realisation] = value
         for cell in self._cells.values():
             self._advance(cell)
 
@@ -56,7 +58,7 @@ class Batches:
             row
             for cell in self._cells.values()
             for realisation, row in enumerate(cell.rows[: cell.asked])
-            if realisation not in cell.losses
+            if realisation not in cell.values
         ]
 
     @property
@@ -64,8 +66,24 @@ class Batches:
         """Rows without a result of the cells that have enough."""
         return [row for cell in self._cells.values() if cell.full for row in self._left(cell)]
 
-    def finished(self, row: int, loss: float) -> tuple[list[int], list[int]]:
-        """Take in a row's loss, NaN if it failed.
+    @property
+    def precisions(self) -> list[tuple[str, Precision]]:
+        """Name of every cell, and how well the mean of its quantity is known."""
+        return [
+            (
+                self._tasks[cell.rows[0]].cell_name,
+                precision(
+                    [cell.values[r] for r in sorted(cell.values)],
+                    self._wanted,
+                    self._quantity,
+                    finished=cell.full,
+                ),
+            )
+            for cell in self._cells.values()
+        ]
+
+    def finished(self, row: int, value: float) -> tuple[list[int], list[int]]:
+        """Take in a row's value of the quantity, NaN if it failed.
 
         Returns
         -------
@@ -76,29 +94,29 @@ class Batches:
         """
         cell = self._cells[self._tasks[row].cell]
         before = cell.asked
-        cell.losses[self._tasks[row].realisation] = loss
+        cell.values[self._tasks[row].realisation] = value
         if cell.full:
             return [], []
         self._advance(cell)
         further = [
             r
             for realisation, r in enumerate(cell.rows[before : cell.asked], start=before)
-            if realisation not in cell.losses
+            if realisation not in cell.values
         ]
         return further, self._left(cell) if cell.full else []
 
     @staticmethod
     def _left(cell: _Cell) -> list[int]:
-        return [row for r, row in enumerate(cell.rows) if r not in cell.losses]
+        return [row for r, row in enumerate(cell.rows) if r not in cell.values]
 
     def _advance(self, cell: _Cell) -> None:
         """Ask for batches until one is not complete, or the cell has enough."""
         known = 0
-        if any(r not in cell.losses for r in range(cell.asked)):
+        if any(r not in cell.values for r in range(cell.asked)):
             return
-        while known in cell.losses:
+        while known in cell.values:
             known += 1
-        stop = enough([cell.losses[r] for r in range(known)], self._looks, self._wanted)
+        stop = enough([cell.values[r] for r in range(known)], self._looks, self._wanted)
         cell.full = stop is not None
         if stop is None:
             cell.asked = next(look for look in self._looks if look > known)

@@ -246,10 +246,11 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
         times[group] = (sum_before + seconds[row], count + 1)
     rows, batches = np.flatnonzero(status == PENDING).tolist(), None
     if results.campaign.stop.relative_error is not None:
-        losses = np.where(status == FAILED, np.nan, results.column("loss"))
+        steered = results.column(results.campaign.stop.quantity)
+        values = np.where(status == FAILED, np.nan, steered)
         known = np.flatnonzero((status == DONE) | (status == FAILED))
         batches = Batches(
-            results.campaign, tasks, {row: float(losses[row]) for row in known.tolist()}
+            results.campaign, tasks, {row: float(values[row]) for row in known.tolist()}
         )
         rows = batches.to_do
     return Plan(

@@ -29,7 +29,7 @@ PILOT_SECONDS = 60.0
 _MOST_CELLS_SHOWN = 60
 # Ranks are worth having as long as they are busy for this share of the time.
 _BUSY = 0.8
-# With [stop]: losses beyond the first of their cells before their spread says anything, and what
+# With [stop]: loops beyond the first of their cells before their spread says anything, and what
 # the rule takes more than one that knew the spread (docs/campaign-file.md).
 _FEWEST_FOR_SPREAD = 6
 _MORE_THAN_LEAST = 1.3
@@ -117,26 +117,26 @@ class Price:
 
 
 class _Known:
-    """Times and losses by cell, of loops that are done or were tried out."""
+    """Times and the quantity of ``[stop]`` by cell, of loops that are done or were tried out."""
 
     def __init__(self, tasks: list[Task]) -> None:
         self.seconds: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
-        self.losses: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
+        self.values: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
 
-    def add(self, cell: Cell, seconds: float, loss: float) -> None:
-        """Take in a loop; a loss that is not known is NaN."""
+    def add(self, cell: Cell, seconds: float, value: float) -> None:
+        """Take in a loop; a value that is not known is NaN."""
         self.seconds[cell].append(seconds)
-        if math.isfinite(loss):
-            self.losses[cell].append(loss)
+        if math.isfinite(value):
+            self.values[cell].append(value)
 
     def spread(self) -> tuple[float, int]:
-        """Standard deviation of a loss over the mean of its cell, and the losses that tell it."""
-        cells = [np.array(losses) for losses in self.losses.values() if len(losses) > 1]
-        freedom = sum(losses.size - 1 for losses in cells)
+        """Standard deviation of a value over the mean of its cell, and the number of values."""
+        cells = [np.array(values) for values in self.values.values() if len(values) > 1]
+        freedom = sum(values.size - 1 for values in cells)
         if freedom < _FEWEST_FOR_SPREAD:
             return math.nan, 0
         square = sum(float(np.sum((x / x.mean() - 1) ** 2)) for x in cells)
-        return math.sqrt(square / freedom), sum(losses.size for losses in cells)
+        return math.sqrt(square / freedom), sum(values.size for values in cells)
 
 
 def price(
@@ -187,7 +187,7 @@ def price(
         for task in unit:
             row = compute(campaign, task)
             took = float(row["cpu_time"])
-            known.add(task.cell, took, float(row.get("loss", math.nan)))
+            known.add(task.cell, took, float(row.get(campaign.stop.quantity, math.nan)))
             pilots, together = pilots + 1, together + took
             on_pilot(task, took)
         spent, longest = spent + together, max(longest, together)
@@ -221,16 +221,16 @@ def _left(
             results.tasks(),
             results.status().tolist(),
             results.column("cpu_time").tolist(),
-            results.column("loss").tolist(),
+            results.column(campaign.stop.quantity).tolist(),
             strict=True,
         )
         done = 0
-        for theirs, status, took, loss in rows:
+        for theirs, status, took, value in rows:
             task = mine.get(results.campaign.identity(theirs))
             if task is None:
                 continue
             if status == DONE:
-                known.add(task.cell, took, loss)
+                known.add(task.cell, took, value)
                 done += 1
             more = campaign.stop != results.campaign.stop and status == NOT_NEEDED
             if status not in (PENDING, DAMAGED) and not more:
@@ -299,15 +299,15 @@ def _realisations(campaign: Campaign, known: _Known) -> tuple[int, str]:
     """Realisations that a cell takes with ``[stop]``, and a sentence on it."""
     at = looks(campaign.sweep.realisations, campaign.stop.batch, campaign.stop.most)
     few = fewest(at)
-    spread, losses = known.spread()
-    if not losses:
+    spread, loops = known.spread()
+    if not loops:
         return at[-1], f"[stop]: {few} to {at[-1]} realisations a cell; the price is for {at[-1]}"
     assert campaign.stop.relative_error is not None
     needed = _MORE_THAN_LEAST * (1.96 * spread / campaign.stop.relative_error) ** 2
     count = next((look for look in at if look >= max(needed, few)), at[-1])
     return count, (
-        f"[stop]: about {count} realisations a cell, as {losses} losses scatter by "
-        f"{100 * spread:.2g} % so far; at least {few}, at most {at[-1]}"
+        f"[stop]: about {count} realisations a cell, as {campaign.stop.quantity} of {loops} loops "
+        f"scatters by {100 * spread:.2g} % so far; at least {few}, at most {at[-1]}"
     )
 
 
@@ -353,7 +353,7 @@ def as_text(price: Price) -> str:
         for cell in price.cells:
             mark = " " if cell.measured else "~"
             hours = cell.tasks * cell.seconds / 3600
-            name = str(cell.task).rpartition(", realisation")[0]
+            name = cell.task.cell_name
             lines.append(f"{mark}{cell.seconds:7.3g} {cell.tasks:6d} {hours:11.3g}  {name}")
         if not all(cell.measured for cell in price.cells):
             lines.append("~ extrapolated from other cells")

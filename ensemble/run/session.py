@@ -12,6 +12,7 @@ from typing import Any, Protocol, Self
 
 import h5py
 
+from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.outputs import target_of
@@ -44,12 +45,15 @@ class Told:
     audit_residual : float
     doubtful : bool
         See :mod:`adhesis.ensemble.task.doubt`.
+    steered : float
+        The quantity of ``[stop]``.
     """
 
     loss: float
     audit_residual: float
     loss_error: float
     doubtful: bool
+    steered: float
 
 
 class RowWriter(Protocol):
@@ -134,6 +138,8 @@ class Summary:
         (:mod:`adhesis.ensemble.task.doubt`).
     stopped : str or None
         Why it stopped before the last task.
+    precisions : tuple of (str, Precision)
+        With ``[stop]``: name of every cell, and how well the mean of its quantity is known.
     """
 
     total: int
@@ -144,6 +150,7 @@ class Summary:
     seconds: float
     doubtful: int
     stopped: str | None
+    precisions: tuple[tuple[str, Precision], ...] = ()
 
     @property
     def pending(self) -> int:
@@ -328,6 +335,7 @@ class _Session:
     def summary(self, stopped: str | None) -> Summary:
         done = self._plan.done + self._counts.done
         failed = self._plan.failed + self._counts.failed
+        batches = self._plan.batches
         return Summary(
             total=self._counts.total,
             done=done,
@@ -337,6 +345,7 @@ class _Session:
             seconds=time.monotonic() - self._started,
             doubtful=self._counts.doubtful,
             stopped=stopped if done + failed < self._counts.total else None,
+            precisions=() if batches is None else tuple(batches.precisions),
         )
 
     def _computing(self, tick: Callable[[], None]) -> Compute:
@@ -363,7 +372,8 @@ class _Session:
         loss, residual = float(row["loss"]), float(row["audit_residual"])
         error = float(row["loss_error"])
         wrong = doubtful(self._campaign.solver.accuracy, loss, residual, error)
-        return Told(loss, residual, error, bool(wrong))
+        steered = float(row[self._campaign.stop.quantity])
+        return Told(loss, residual, error, bool(wrong), steered)
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         if outcome.error is None:
@@ -381,8 +391,8 @@ class _Session:
             self._counts.failed += 1
             progress.failure(str(self._plan.tasks[outcome.task]), outcome.error)
         if self._plan.batches is not None:
-            loss = math.nan if outcome.error is not None else outcome.result.loss
-            further, spare = self._plan.batches.finished(outcome.task, loss)
+            value = math.nan if outcome.error is not None else outcome.result.steered
+            further, spare = self._plan.batches.finished(outcome.task, value)
             assert self._writer is not None
             self._writer.mark(spare, needed=False)
             self._counts.total += len(further)

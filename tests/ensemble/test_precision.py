@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 
@@ -9,14 +10,26 @@ import numpy as np
 import pytest
 
 from adhesis.ensemble.aggregate.statistics import estimates
-from adhesis.ensemble.campaign.compare import compare
+from adhesis.ensemble.campaign.compare import Changes, compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
-from adhesis.ensemble.campaign.precision import LEAST, enough, fewest, looks, narrow, relative_error
+from adhesis.ensemble.campaign.precision import (
+    LEAST,
+    MOST_LISTED,
+    enough,
+    fewest,
+    looks,
+    precision,
+    precision_lines,
+)
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import interval
+from adhesis.ensemble.report import findings
+from adhesis.ensemble.report.write import write_report
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
+from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.run.session import Options, run_campaign
+from tests.support import synthetic_results
 from tests.support.campaign_support import (
     MPIRUN,
     adhesis,
@@ -32,11 +45,12 @@ from tests.support.fake_run import fake_engine
 STOP = "[stop]\nrelative_error = {}\nbatch = 4\nmost = {}\n"
 
 
-def text(relative_error=0.2, most=80, **changes):
+def text(relative_error=0.2, most=80, quantity="", **changes):
     """Return a campaign of two cells, with little to write."""
     small = {"realisations": "8", "work_of_adhesion": "[0.04]", "load_steps": "1", "jumps": "1"}
     fields = "field_penetrations = []\nfield_realisations = 0\n"
-    return campaign_text(**small, **changes) + fields + STOP.format(relative_error, most)
+    steered = f'quantity = "{quantity}"\n' if quantity else ""
+    return campaign_text(**small, **changes) + fields + STOP.format(relative_error, most) + steered
 
 
 def run(path, out, fake="", **options):
@@ -52,11 +66,41 @@ def test_the_rule_goes_by_the_interval_that_tables_print():
     values = np.random.default_rng(3).lognormal(0, 0.6, 40)
     (printed,) = estimates(values)
     furthest = max(printed.high - printed.mean, printed.mean - printed.low)
-    assert relative_error(values) == pytest.approx(furthest / printed.mean, rel=1e-14)
-    assert narrow(values, 1.001 * relative_error(values))
-    assert not narrow(values, 0.999 * relative_error(values))
-    assert relative_error(values[:1]) == np.inf
-    assert relative_error(np.zeros(30)) == 0.0
+    known = precision(values, 0.2)
+    assert (known.mean, known.low, known.high) == (printed.mean, printed.low, printed.high)
+    assert known.relative_error == printed.relative_error
+    assert known.relative_error == pytest.approx(furthest / printed.mean, rel=1e-14)
+    assert precision(values, 1.001 * known.relative_error).narrow
+    assert not precision(values, 0.999 * known.relative_error).narrow
+    assert precision(values[:1], 0.2).relative_error == np.inf
+    assert precision(np.zeros(30), 0.2).relative_error == 0.0
+
+
+def test_a_cell_is_described_with_quantity_both_ends_and_verdict():
+    values = np.tile([0.9, 1.1], 20)
+    for wanted, count, finished, verdict in (
+        (0.05, 40, True, "met"),
+        (0.02, 40, True, "not met"),
+        (0.05, 40, False, "not finished"),
+        (0.2, 8, True, "not met, as it takes at least 32 realisations"),
+    ):
+        known = precision(values[:count], wanted, "loss", finished=finished)
+        assert known.met is {"met": True, "not finished": None}.get(verdict, False)
+        error = f"{100 * known.relative_error:.3g}"
+        assert str(known) == (
+            f"loss {known.low:.4g} to {known.high:.4g} (± {error} %) of {count} realisations, "
+            f"wanted ± {100 * wanted:g} %: {verdict}"
+        )
+    unknown = precision([np.nan, 1.0], 0.05, "loss")
+    assert str(unknown).startswith("loss: interval unknown of 1 realisation, wanted ± 5 %: not met")
+    met, not_met = precision(values, 0.05, "loss"), precision(values, 0.02, "loss")
+    assert precision_lines([]) == []
+    assert precision_lines([("A", met), ("B", not_met)]) == [
+        "[stop]: 1 of 2 cells met the wanted precision", f"  A: {met}", f"  B: {not_met}",
+    ]
+    many = precision_lines([("A", met)] * MOST_LISTED + [("B", not_met)] * (MOST_LISTED + 5))
+    assert many[1:-1] == [f"  B: {not_met}"] * MOST_LISTED
+    assert "… and 5 more" in many[-1]
 
 
 def test_looks_are_after_the_first_and_every_batch():
@@ -71,7 +115,7 @@ def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
     at = looks(8, 8, 200)
     stop = enough(losses, at, 0.05)
     assert stop is not None
-    row = [narrow(losses[:n], 0.05) for n in at if n <= stop]
+    row = [precision(losses[:n], 0.05).narrow for n in at if n <= stop]
     assert row[-4:] == [True] * 4
     assert [True] * 4 not in [row[i : i + 4] for i in range(len(row) - 4)]
     assert enough(losses[: stop - 1], at, 0.05) is None  # decided on complete batches
@@ -82,7 +126,7 @@ def test_a_cell_has_enough_at_four_looks_in_a_row_and_not_by_luck():
     rare = np.ones(120)
     rare[::40] = 3
     assert 1.98 * rare.std(ddof=1) / np.sqrt(rare.size) / rare.mean() < 0.06
-    assert not narrow(rare, 0.07)
+    assert not precision(rare, 0.07).narrow
     assert enough(np.full(200, np.nan), at, 0.05) == 200  # all failed: there is an end
 
 
@@ -91,7 +135,7 @@ def test_a_wide_look_starts_the_count_of_looks_again():
     at = looks(8, 8, 200)
     losses = np.tile([0.9, 1.1], 100)
     losses[40] = 1.6  # seen first at the look at 48
-    found = [narrow(losses[:n], 0.045) for n in at]
+    found = [precision(losses[:n], 0.045).narrow for n in at]
     assert found[:7] == [False, False, False, True, True, False, True]  # 8, 16, … 56 realisations
     assert all(found[6:])
     assert enough(losses, at, 0.045) == at[9]
@@ -138,31 +182,49 @@ def test_intervals_at_the_stop_cover_the_mean(draw, wanted):
 # ---------------------------------------------------------------------- runs
 
 
-def test_every_cell_gets_what_it_needs_and_no_more(tmp_path):
+@pytest.mark.parametrize("quantity", ["", "loss"])
+def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity):
+    """By default that is the dimensionless loss, which has the interval of the table of losses."""
     path, out = tmp_path / "c.toml", tmp_path / "r.h5"
-    path.write_text(text())
+    path.write_text(text(quantity=quantity))
     summary = run(path, out)
     assert (summary.pending, summary.failed, summary.stopped) == (0, 0, None)
+    steered = quantity or "loss_dimensionless"
     with Results(out) as results:
-        campaign, status, loss = results.campaign, results.status(), results.column("loss")
+        assert results.campaign.stop.quantity == steered
+        status = results.status()
+        values = {name: results.column(name) for name in ("loss", "loss_dimensionless")}
     at = looks(8, 4, 80)
-    counts = []
-    for i in range(2):
+    needed = {
+        name: [enough(mine, at, 0.2) for mine in np.split(column, 2)]
+        for name, column in values.items()
+    }
+    assert needed["loss"] != needed["loss_dimensionless"]
+    for i, count in enumerate(needed[steered]):
         mine = slice(80 * i, 80 * (i + 1))
-        counts.append(enough(loss[mine], at, 0.2))
-        assert (status[mine][: counts[-1]] == DONE).all()
-        assert (status[mine][counts[-1] :] == NOT_NEEDED).all()
-    assert min(counts) >= LEAST
-    assert max(counts) < 80
-    assert sum(counts) == summary.done
-    assert campaign.realisations == 80
-    told = json.loads(adhesis("status", out, "--json").stdout)
-    assert told["not_needed"] == 160 - sum(counts)
-    assert all(0 < g["relative_error"] <= 0.2 for g in told["groups"])
-    assert ", enough" in adhesis("status", out).stdout
+        assert (status[mine][:count] == DONE).all()
+        assert (status[mine][count:] == NOT_NEEDED).all()
+        assert LEAST <= count < 80
+    assert summary.done == sum(needed[steered])
+    told = json.loads(json.dumps(read_status(out)))
+    assert told["not_needed"] == 160 - summary.done
+    shown = as_text(told)
+    for group, (name, known), values_of in zip(
+        told["groups"], summary.precisions, np.split(values[steered], 2), strict=True
+    ):
+        assert name == f"H = {group['hurst']:g}, γ = 0.04 J/m²"
+        assert known.met
+        assert known.relative_error <= 0.2
+        low, high = interval(values_of[: group["done"]])
+        assert (known.low, known.high) == (low, high)
+        assert (group["interval_low"], group["interval_high"]) == (low, high)
+        assert group["relative_error"] == known.relative_error
+        assert (group["quantity"], group["met"]) == (steered, True)
+        assert str(known) in shown
     before = out.read_bytes()
-    assert run(path, out).computed == 0
+    again = adhesis("run", path, "--out", out, fake="")
     assert out.read_bytes() == before
+    assert precision_lines(summary.precisions)[1] in again.stderr.splitlines()
 
 
 def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path):
@@ -173,6 +235,45 @@ def test_a_tighter_wish_or_more_realisations_go_on_from_there(tmp_path):
     second, alone = run(path, out), run(path, whole)
     assert second.computed == alone.computed - first.computed > 0
     assert differences(out, whole) == []
+
+
+@pytest.mark.parametrize("quantity", ["loss_dimensionless", "loss"])
+def test_the_report_has_the_interval_of_the_table_and_the_verdict_of_the_rule(
+    tmp_path, capsys, monkeypatch, quantity
+):
+    """Of these losses the spread is 20 %, that of W~ 28 %: ± 9 % is met by the loss alone."""
+    plan = parse_campaign(
+        synthetic_results.campaign(hurst=(0.7,), gamma=(0.01, 0.04), realisations=40).text
+        + f'[stop]\nrelative_error = 0.09\nmost = 40\nquantity = "{quantity}"\n'
+    )
+    values = synthetic_results.rows(plan)
+    values["status"][70:] = PENDING
+    out = synthetic_results.write(tmp_path / "r.h5", plan, values)
+    for figures in ("HEIGHTS", "LOOPS", "LOSSES", "MECHANISMS", "SHAPES"):
+        monkeypatch.setattr(f"adhesis.ensemble.report.figures.catalogue.{figures}", ())
+    data = write_report(out, tmp_path / "report")
+    with (tmp_path / "report" / "precision.csv").open(encoding="utf-8") as stream:
+        known = list(csv.DictReader(stream))
+    with (tmp_path / "report" / "losses.csv").open(encoding="utf-8") as stream:
+        printed = list(csv.DictReader(stream))
+    unit = " [J/m^2]" if quantity == "loss" else ""
+    for mine, table, group in zip(known, printed, read_status(out)["groups"], strict=True):
+        assert mine["quantity"] == group["quantity"] == quantity
+        for end in ("low", "high"):
+            assert mine[f"ci_{end}"] == table[f"{quantity}_ci_{end}{unit}"]
+            assert float(mine[f"ci_{end}"]) == group[f"interval_{end}"]
+        assert float(mine["relative_error"]) == group["relative_error"]
+    met = quantity == "loss"
+    assert [mine["met"] for mine in known] == ["yes" if met else "no", "not finished"]
+    assert [group["met"] for group in read_status(out)["groups"]] == [met, None]
+    (sentence,) = findings.precision(data)
+    assert f"interval of the mean {quantity} was to reach at most 9 % from it" in sentence
+    assert f"{int(met)} of 2 cells met that" in sentence
+    assert str(data.cells[1].precision) in sentence
+    assert sentence in capsys.readouterr().out
+    page = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+    assert "### Precision of the mean (`[stop]`)" in page
+    assert "30 to 40 realisations by `[stop]`" in page
 
 
 def test_failures_count_as_looked_at_and_may_be_computed_again(tmp_path):
@@ -209,6 +310,10 @@ def test_what_a_stop_may_be(tmp_path):
         ("[stop]\nbatch = 8\n", "[stop] relative_error is missing"),
         (STOP.format(0.1, 7), "[stop] most is 7: it must be at least realisations"),
         (STOP.format(1.5, 70), "relative_error is 1.5: it must be"),
+        (
+            STOP.format(0.1, 70) + 'quantity = "h_max"\n',
+            '[stop] quantity is \'h_max\': it must be one of "loss_dimensionless", "loss"',
+        ),
     ):
         with pytest.raises(InputError) as caught:
             parse_campaign(campaign_text(realisations="8") + changes)
@@ -217,6 +322,10 @@ def test_what_a_stop_may_be(tmp_path):
     assert set(compare(old, new).grown) == {"stop.relative_error", "stop.most"}
     assert len(compare(new, old).other) == 2
     assert compare(parse_campaign(campaign_text(realisations="8")), old).other
+    spelt = parse_campaign(text(quantity="loss_dimensionless"))
+    assert compare(old, spelt) == Changes((), ())
+    (phrase,) = compare(old, parse_campaign(text(quantity="loss"))).other
+    assert phrase == "stop.quantity is 'loss' here and 'loss_dimensionless' there"
     path = tmp_path / "c.toml"
     path.write_text(text())
     process = adhesis("run", path, "--part", "1/2", "--out", tmp_path / "p.h5")

@@ -101,17 +101,17 @@ def test_loops_on_one_loading_branch_are_tried_together(monkeypatch):
     assert [cell.measured for cell in told.cells] == [1, 1, 1]
 
 
-def test_with_a_stop_the_spread_of_the_losses_tells_how_many(tmp_path):
+def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
     stop = "[stop]\nrelative_error = 0.1\nmost = 200\n"
     campaign = parse_campaign(campaign_text(realisations="8") + stop)
     rng = np.random.default_rng(1)
 
     def compute(campaign, task):
-        return {"cpu_time": 1.0, "loss": 3.0 * (1 + 0.4 * rng.standard_normal())}
+        return {"cpu_time": 1.0, "loss_dimensionless": 3.0 * (1 + 0.4 * rng.standard_normal())}
 
     told = price(campaign, compute=compute)  # all 200 of each cell are tried: they take no time
     assert told.left in (4 * 80, 4 * 88)  # whole batches
-    assert "as 800 losses scatter by 40 % so far; at least 56, at most 200" in as_text(told)
+    assert "loss_dimensionless of 800 loops scatters by 40 % so far; at least 56" in as_text(told)
     blind = price(campaign, compute=compute, seconds=-1.0)
     assert "[stop]: 56 to 200 realisations a cell; the price is for 200" in as_text(blind)
     # What the rule has left out is not priced.

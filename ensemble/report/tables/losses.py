@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
 from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.aggregate.statistics import Estimate
+from adhesis.ensemble.campaign.precision import as_percent
 from adhesis.ensemble.interval import interval_method
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.tables.key import axis_columns, key, key_columns
@@ -77,6 +80,38 @@ def losses(data: Aggregate) -> Table:
     )
     rows = [_loss_row(data, cell) for cell in data.cells]
     return make_table("Loss of one loop (Table 1)", columns, rows)
+
+
+def precision(data: Aggregate) -> Table:
+    """How well the quantity of ``[stop]`` is known in each cell; no rows without ``[stop]``."""
+    columns = (
+        *key_columns(data),
+        TableColumn("n", "n"),
+        TableColumn("quantity", "quantity"),
+        TableColumn("mean", "mean", number()),
+        TableColumn("ci_low", "95 % from", number()),
+        TableColumn("ci_high", "to", number()),
+        TableColumn("relative_error", "±, further side", as_percent),
+        TableColumn("wanted_relative_error", "wanted", as_percent),
+        TableColumn("met", "met"),
+    )
+    verdict = {True: "yes", False: "no", None: "not finished"}
+    rows: list[list[Value]] = [
+        [
+            *key(cell),
+            known.count,
+            known.quantity,
+            known.mean,
+            known.low,
+            known.high,
+            known.relative_error if math.isfinite(known.relative_error) else None,
+            known.wanted,
+            verdict[known.met],
+        ]
+        for cell in data.cells
+        if (known := cell.precision) is not None
+    ]
+    return make_table("Precision of the mean ([stop])", columns, rows)
 
 
 def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
