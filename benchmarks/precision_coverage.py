@@ -1,18 +1,23 @@
 """How often the 95 % interval of a mean holds the mean: at a fixed number, and at the stop.
 
     python benchmarks/precision_coverage.py --campaigns 1000
+    python benchmarks/precision_coverage.py --study --campaigns 1000
     python benchmarks/precision_coverage.py --fixed --campaigns 20000
 
 Losses are made up, of known mean 1. The first table is of campaigns with ``[stop]``: each cell gets
 batches until the rule has enough, and the interval at that moment either holds 1 or does not. The
-second is of so many realisations and no rule, Student's interval beside the one that is used.
+second is the same for the losses of the study (``docs/study/loops.csv``): realisations are drawn,
+with replacement, from those of one of its large cells, whose mean therefore is the true one. It has
+W~ steered and W~ asked for, and then the loss in J/m² steered and W~ asked for. The third is of so
+many realisations and no rule, Student's interval beside the one that is used.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,8 +27,11 @@ from scipy.special import stdtrit
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from adhesis.ensemble.campaign.precision import enough, looks
+from adhesis.ensemble.campaign.precision import enough, looks, precision
 from adhesis.ensemble.interval import interval
+
+STUDY = Path(__file__).resolve().parent.parent / "docs" / "study" / "loops.csv"
+FEWEST_OF_STUDY = 120
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, tuple[int, int]], Array]
@@ -107,14 +115,80 @@ def at_a_number(losses: Losses, n: int, ensembles: int) -> tuple[float, float, f
     )
 
 
+def cells_of_the_study() -> Iterator[tuple[str, Array]]:
+    """Name of each turning point and γ, and W~ and loss of one H there, each over its mean."""
+    cells: dict[tuple[str, ...], list[tuple[float, float]]] = {}
+    names = ("work_of_adhesion", "max_penetration", "hurst", "campaign", "ratio", "stiffness")
+    with STUDY.open(encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            if row["status"] == "done" and row["max_penetration"]:
+                values = (float(row["loss_dimensionless"]), float(row["loss"]))
+                cells.setdefault(tuple(row[name] for name in names), []).append(values)
+    for (gamma, top, *_), loops in sorted(cells.items()):
+        if len(loops) >= FEWEST_OF_STUDY:
+            values = np.array(loops)
+            yield f"γ = {gamma} J/m², Δ~max = {top}", values / values.mean(axis=0)
+
+
+def of_the_study(
+    loops: Array, steered: int, wanted: float, rng: np.random.Generator, campaigns: int, **rule: int
+) -> tuple[float, float, float]:
+    """Coverage of W~ at the stop, its median reach there, and median number of realisations.
+
+    ``steered`` is the column that the rule looks at: 0 for W~, 1 for the loss.
+    """
+    at, held, counts, reach = looks(rule["batch"], rule["batch"], rule["most"]), 0, [], []
+    for _ in range(campaigns):
+        drawn = loops[rng.integers(0, len(loops), at[-1])]
+        count = enough(drawn[:, steered], at, wanted)
+        assert count is not None
+        known = precision(drawn[:count, 0], wanted)
+        held += known.low <= 1 <= known.high
+        counts.append(count)
+        reach.append(known.relative_error)
+    return held / campaigns, float(np.median(reach)), float(np.median(counts))
+
+
+def print_study(campaigns: int, batch: int, most: int) -> None:
+    """Print a row for each γ and turning point of the study: mean over H, and the worst H."""
+    places: dict[str, list[Array]] = {}
+    for name, loops in cells_of_the_study():
+        places.setdefault(name, []).append(loops)
+    wishes = (0.2, 0.1, 0.05)
+    for steered, title in enumerate(("W~ steered", "loss steered")):
+        print(f"| {title} | std of W~ |", " | ".join(f"± {100 * w:g} %" for w in wishes), "|")
+        for name, cells in places.items():
+            row = []
+            for wanted in wishes:
+                found = np.array(
+                    [
+                        of_the_study(
+                            *(loops, steered, wanted, np.random.default_rng([13, k]), campaigns),
+                            batch=batch,
+                            most=most,
+                        )
+                        for k, loops in enumerate(cells)
+                    ]
+                )
+                held, reach, count = found.mean(axis=0)
+                worst = found[:, 0].min()
+                row.append(f"{held:.1%}, worst {worst:.1%} (± {100 * reach:.1f} %, {count:.0f})")
+            std = np.mean([loops[:, 0].std(ddof=1) for loops in cells])
+            print(f"| {name}, {len(cells)} H | {std:.2f} |", " | ".join(row), "|", flush=True)
+
+
 def main() -> None:
-    """Print one of the two tables."""
+    """Print one of the three tables."""
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("--campaigns", type=int, default=1000)
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--most", type=int, default=1000)
     parser.add_argument("--fixed", action="store_true", help="at fixed numbers, without a rule")
+    parser.add_argument("--study", action="store_true", help="of the losses of the study")
     options = parser.parse_args()
+    if options.study:
+        print_study(options.campaigns, options.batch, options.most)
+        return
     if options.fixed:
         print("| losses |", " | ".join(f"n = {n}" for n in FIXED), "|")
         for losses in KINDS:

@@ -13,7 +13,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from adhesis.ensemble.errors import InputError, WriteError
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
     from adhesis.ensemble.campaign.tasks import Task
-    from adhesis.ensemble.run.session import Engine
+    from adhesis.ensemble.run.session import Engine, Options, Summary
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
 OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
@@ -184,14 +184,11 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
 
 def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
     from adhesis.ensemble.campaign.file import load_campaign
-    from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Overdue
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
-    from adhesis.ensemble.run.progress import duration
     from adhesis.ensemble.run.ranks import together
-    from adhesis.ensemble.run.session import Options, run_campaign
-    from adhesis.ensemble.task.doubt import bound
+    from adhesis.ensemble.run.session import Options, OutOfReach, run_campaign
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
@@ -220,27 +217,49 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
         text = f"adhesis run: {error}; run the same command again to resume"
         _end_job(comm, RESUME, text)
         return RESUME
+    except OutOfReach as error:
+        # The ranks cannot end together: MPI would wait for those that do not answer.
+        _report_end(campaign, path, error.summary, say)
+        code = _code(error.summary, options)
+        _end_job(comm, code, f"adhesis run: {error}; what was done is kept")
+        return code
     if comm is None or comm.rank == 0:
-        failed = f", {summary.failed} failed" if summary.failed else ""
+        _report_end(campaign, path, summary, say)
+    return _code(summary, options)
+
+
+def _report_end(
+    campaign: Campaign, path: Path, summary: Summary, say: Callable[[str], None]
+) -> None:
+    """Report what a run has left in its results file."""
+    from adhesis.ensemble.campaign.precision import precision_lines
+    from adhesis.ensemble.run.progress import duration
+    from adhesis.ensemble.task.doubt import bound
+
+    failed = f", {summary.failed} failed" if summary.failed else ""
+    say(
+        f"{path}: {summary.done} of {summary.total} tasks done{failed}; "
+        f"{summary.computed} computed in {duration(summary.seconds)}"
+    )
+    if summary.failed:
+        say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
+    for line in precision_lines(summary.precisions):
+        say(line)
+    if summary.doubtful:
         say(
-            f"{path}: {summary.done} of {summary.total} tasks done{failed}; "
-            f"{summary.computed} computed in {duration(summary.seconds)}"
+            f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
+            f"more than {100 * bound(campaign.solver.accuracy):g} %, the accuracy asked for "
+            f"(adhesis status {path})"
         )
-        if summary.failed:
-            say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
-        for line in precision_lines(summary.precisions):
-            say(line)
-        if summary.doubtful:
-            say(
-                f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
-                f"more than {100 * bound(campaign.solver.accuracy):g} %, the accuracy asked for "
-                f"(adhesis status {path})"
-            )
-        if summary.stopped:
-            say(
-                f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "
-                "run the same command again to resume"
-            )
+    if summary.stopped:
+        say(
+            f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "
+            "run the same command again to resume"
+        )
+
+
+def _code(summary: Summary, options: Options) -> int:
+    """Return the exit code of a run."""
     too_many = options.max_failures is not None and summary.failed_now >= options.max_failures
     if summary.pending and not too_many:
         return RESUME

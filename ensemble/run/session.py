@@ -19,7 +19,7 @@ from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Compute, Outcome, StopCheck
-from adhesis.ensemble.run.dispatch import Limits, Master, Worker, work_alone
+from adhesis.ensemble.run.dispatch import SILENCE, Limits, Master, Worker, work_alone
 from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
@@ -92,6 +92,8 @@ class Engine:
         Makes what stands around a rank's loop of handing out or working.
     methods : callable
         The methods that tasks are computed by: they are compiled before the first task.
+    silence : float
+        How long a rank may not be heard from until its tasks are handed to others, in s.
     """
 
     compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
@@ -100,6 +102,7 @@ class Engine:
     all_write: bool = bool(h5py.get_config().mpi)
     watch: Callable[[], AbstractContextManager[object]] = nullcontext
     methods: Callable[[Campaign, Iterable[Task]], Collection[str]] = methods_of
+    silence: float = SILENCE
 
 
 @dataclass(frozen=True)
@@ -158,6 +161,25 @@ class Summary:
         return self.total - self.done - self.failed
 
 
+class OutOfReach(Exception):
+    """Ranks do not answer at the end of a run, so that the ranks cannot end together.
+
+    Attributes
+    ----------
+    summary : Summary
+        What the run has left.
+    """
+
+    def __init__(self, ranks: tuple[int, ...], summary: Summary) -> None:
+        names = ", ".join(map(str, ranks))
+        super().__init__(
+            f"rank {names} does not answer and is ended"
+            if len(ranks) == 1
+            else f"ranks {names} do not answer and are ended"
+        )
+        self.summary = summary
+
+
 def run_campaign(
     campaign: Campaign,
     path: Path | str,
@@ -189,6 +211,9 @@ def run_campaign(
         damaged, of another campaign, in use or not writable.
     adhesis.ensemble.run.dispatch.Overdue
         If workers did not stop in time when told to; the results file is sound.
+    OutOfReach
+        On rank 0, if workers do not answer at the end; the results file is sound. The other ranks
+        wait: the caller has to end the job.
     """
     options, engine = options or Options(), engine or Engine()
     path = target_of(path)
@@ -225,7 +250,9 @@ def run_campaign(
             if comm is None:
                 stopped = session.alone()
             elif rank == 0:
-                stopped = session.master(MpiChannel(comm), own_rows)
+                stopped, out_of_reach = session.master(MpiChannel(comm), own_rows)
+                if out_of_reach:
+                    raise OutOfReach(out_of_reach, session.summary(stopped))
             else:
                 session.worker(MpiChannel(comm), own_rows)
                 stopped = None
@@ -287,6 +314,7 @@ class _Session:
             time_left=self._time_left,
             task_seconds=campaign.solver.time_limit,
             grace=GRACE if options.deadline is None else options.deadline.grace,
+            silence=engine.silence,
         )
 
     def alone(self) -> str | None:
@@ -305,7 +333,9 @@ class _Session:
         finally:
             progress.close()
 
-    def master(self, channel: MpiChannel, own_rows: bool) -> str | None:
+    def master(
+        self, channel: MpiChannel, own_rows: bool
+    ) -> tuple[str | None, tuple[int, ...]]:
         schedule = self._schedule()
         workers = channel.size - 1
 
@@ -322,9 +352,10 @@ class _Session:
             *(channel, schedule, self._groups, collect, self._limits),
             tick=progress.tick,
             units=self._units,
+            report=progress.say,
         )
         try:
-            return master.run()
+            return master.run(), master.out_of_reach
         finally:
             progress.close()
 

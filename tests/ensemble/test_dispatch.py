@@ -16,7 +16,9 @@ from numba import njit
 from adhesis.ensemble.run.attempt import GivenUp, Outcome, attempt
 from adhesis.ensemble.run.dispatch import (
     AHEAD,
+    BEAT_SHARE,
     MOST_AHEAD,
+    SILENCE,
     Limits,
     Master,
     Overdue,
@@ -27,6 +29,8 @@ from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.solver.runtime import jit as module
 from tools.interrupted import Interrupt
+
+BEAT = SILENCE * BEAT_SHARE
 
 
 class SimulatedRanks:
@@ -48,6 +52,8 @@ class SimulatedRanks:
         self.answered: list[int] = []
         if signal_at is not None:
             heapq.heappush(self._ends, (signal_at, 1, ("stop", "SIGUSR1 received")))
+        for rank in self._queue:
+            heapq.heappush(self._ends, (BEAT, rank, ("alive", BEAT)))
 
     def clock(self):
         """Return the simulated time."""
@@ -60,7 +66,11 @@ class SimulatedRanks:
     def send(self, to, message, *, urgent=False):
         """Let the simulated worker act on a message."""
         self.now += self._message_time
+        if message[0] == "heard":
+            return
         if message[0] == "dismissed":
+            self._ends = [e for e in self._ends if e[1:] != (to, ("alive", e[0]))]
+            heapq.heapify(self._ends)
             heapq.heappush(self._ends, (self.now, to, ("goodbye",)))
         elif message[0] == "halt":
             self._halted = True
@@ -87,6 +97,9 @@ class SimulatedRanks:
         if self._ends and self._ends[0][0] <= self.now:
             _, rank, message = heapq.heappop(self._ends)
             self.now += self._message_time
+            if message[0] == "alive":
+                again = message[1] + BEAT
+                heapq.heappush(self._ends, (again, rank, ("alive", again)))
             if message[0] in ("outcome", "given up"):
                 task = message[1].task if message[0] == "outcome" else message[1]
                 self.answered.append(task)
@@ -291,13 +304,16 @@ def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
         )
 
 
-class Mailboxes:
-    """A channel between a master and one worker in threads of one process."""
+def mailboxes(size):
+    """Return the boxes of a channel between so many threads."""
+    return {(r, urgent): queue.SimpleQueue() for r in range(size) for urgent in (False, True)}
 
-    size = 2
+
+class Mailboxes:
+    """A channel between a master and workers in threads of one process."""
 
     def __init__(self, rank, boxes):
-        self.rank, self._boxes = rank, boxes
+        self.rank, self.size, self._boxes = rank, len(boxes) // 2, boxes
 
     def send(self, to, message, *, urgent=False):
         """Put a message into a box of its receiver."""
@@ -313,7 +329,7 @@ class Mailboxes:
 
 def test_a_stop_reaches_a_worker_in_the_middle_of_its_task():
     """While it computes it looks for urgent messages alone; the task would never end by itself."""
-    boxes = {(r, urgent): queue.SimpleQueue() for r in (0, 1) for urgent in (False, True)}
+    boxes = mailboxes(2)
     under_way, ended, released = threading.Event(), [], threading.Event()
 
     def compute(task, check):
@@ -339,6 +355,246 @@ def test_a_stop_reaches_a_worker_in_the_middle_of_its_task():
         boxes[1, False].put((0, ("dismissed",)))
         worker.join()
     assert (collected, ended) == ([], [True])
+
+
+# ---------------------------------------------------------------- workers out of reach
+
+
+class Freezing(Mailboxes):
+    """The channel of a worker that hangs as it sends its first message of a kind for a task."""
+
+    def __init__(self, rank, boxes, kind, task):
+        super().__init__(rank, boxes)
+        self._kind, self._task = kind, task
+        self.frozen, self.thawed = threading.Event(), threading.Event()
+
+    def send(self, to, message, *, urgent=False):
+        """Hang once, before the message is sent."""
+        if message[:2] == (self._kind, self._task) and not self.frozen.is_set():
+            self.freeze()
+        super().send(to, message, urgent=urgent)
+
+    def freeze(self):
+        """Hang until thawed."""
+        self.frozen.set()
+        assert self.thawed.wait(60)
+
+
+@pytest.mark.parametrize("returns", [False, True], ids=["stays away", "returns"])
+@pytest.mark.parametrize("point", ["computing", "computed", "delivering"])
+def test_tasks_of_a_worker_out_of_reach_are_done_by_others_and_delivered_once(point, returns):
+    """Worker 1 has task 0; what it delivers itself stays its own.
+
+    The others do nothing until it hangs. If it returns, it does so when all other tasks are done
+    but the one that worker 3 is kept busy with until worker 1 has answered for task 0.
+    """
+    tasks, kept, boxes = range(8), 2, mailboxes(4)
+    channel = Freezing(1, boxes, "claim" if point == "computed" else "", 0)
+    delivered: list[tuple[int, int]] = []
+    returned, reports = threading.Event(), []
+
+    def compute(rank):
+        def run(task, check):
+            if rank == 1 and task == 0 and point == "computing":
+                channel.freeze()
+            while rank > 1 and not channel.frozen.is_set():
+                check()
+                time.sleep(1e-3)
+            while returns and task == kept and not returned.is_set():
+                check()
+                time.sleep(1e-3)
+            return task
+
+        return run
+
+    def deliver(rank):
+        def write(outcome):
+            if rank == 1 and outcome.task == 0 and point == "delivering":
+                channel.freeze()
+            delivered.append((outcome.task, rank))
+            return outcome
+
+        return write
+
+    class Watching(Mailboxes):
+        """The master's channel, by which the test learns that worker 1 has answered."""
+
+        def poll(self, *, urgent=False):
+            message = super().poll(urgent=urgent)
+            if message and message[0] == 1 and message[1][0] in ("outcome", "given up"):
+                returned.set()
+            return message
+
+    def tick():
+        others = {task for task, _ in delivered} | {kept}
+        if returns and reports and others >= set(tasks) - ({0} if point == "delivering" else set()):
+            channel.thawed.set()
+
+    limits = Limits(silence=0.5)
+    workers = [
+        threading.Thread(target=Worker(own, compute(rank), deliver(rank), limits).run, daemon=True)
+        for rank, own in ((1, channel), (2, Mailboxes(2, boxes)), (3, Mailboxes(3, boxes)))
+    ]
+    rounds = {task: task for task in tasks}
+    schedule = Schedule(tasks, dict.fromkeys(tasks, 0), {0: 1.0}, rounds)
+    collected: list[Outcome] = []
+    master = Master(
+        *(Watching(0, boxes), schedule, dict.fromkeys(tasks, 0), collected.append, limits, tick),
+        report=reports.append,
+    )
+    for worker in workers:
+        worker.start()
+    try:
+        assert master.run() is None
+        at_the_end = list(delivered)
+    finally:
+        channel.thawed.set()
+        boxes[1, False].put((0, ("answer", False)))  # if it asks a master that has ended
+        for worker in workers:
+            worker.join(60)
+    lost = {0} if point == "delivering" and not returns else set()
+    assert sorted(task for task, _ in at_the_end) == sorted(set(tasks) - lost)
+    assert sorted(outcome.task for outcome in collected) == sorted(set(tasks) - lost)
+    assert ((0, 1) in delivered) == (point == "delivering")
+    assert len(delivered) == len(tasks)
+    assert master.out_of_reach == (() if returns else (1,))
+    assert any(text.startswith("rank 1 does not answer for 0.5 s: ") for text in reports)
+    assert ("rank 1 answers again" in reports) == returns
+
+
+class Scripted:
+    """A channel whose messages come at given times of a clock that sleep moves on."""
+
+    def __init__(self, rank, size, messages=()):
+        self.rank, self.size, self.now = rank, size, 0.0
+        self.messages = sorted(messages, key=lambda m: m[0])
+        self.sent = []
+
+    def clock(self):
+        """Return the time."""
+        return self.now
+
+    def sleep(self, seconds):
+        """Let time pass."""
+        self.now += seconds
+
+    def send(self, to, message, *, urgent=False):
+        """Keep what is sent."""
+        self.sent.append((to, message))
+
+    def poll(self, *, urgent=False):
+        """Return the next message, if it is time."""
+        if self.messages and self.messages[0][0] <= self.now:
+            return self.messages.pop(0)[1:]
+        return None
+
+
+def scripted_master(channel, tasks, units=None, **options):
+    units = units or Units()
+    group_of = dict.fromkeys(tasks, 0)
+    schedule = Schedule(units.form(tasks), group_of, {0: 1.0}, {task: task for task in tasks})
+    collected: list[Outcome] = []
+    master = Master(
+        *(channel, schedule, group_of, collected.append, Limits(silence=120)),
+        clock=channel.clock,
+        sleep=channel.sleep,
+        units=units,
+        **options,
+    )
+    return master, collected
+
+
+def done(task, rank):
+    return ("outcome", Outcome(task, rank, 1.0))
+
+
+def test_a_master_that_was_held_up_takes_nobody_for_lost():
+    """Its clock jumps by an hour, and what workers sent meanwhile is not there at first."""
+    beats = [(10.0 * k, r, ("alive", 10.0 * k)) for k in range(5) for r in (1, 2)]
+    late = [(3700.0, 1, done(0, 1)), (3700.0, 2, done(1, 2))]
+    last = [(3702.0, 1, ("goodbye",)), (3702.0, 2, ("goodbye",))]
+
+    class HeldUp(Scripted):
+        def sleep(self, seconds):
+            self.now += seconds if not 50 < self.now < 3000 else 3600
+
+    reports = []
+    channel = HeldUp(0, 3, beats + late + last)
+    master, collected = scripted_master(channel, range(2), report=reports.append)
+    assert master.run() is None
+    assert (reports, master.out_of_reach, len(collected)) == ([], (), 2)
+
+
+def test_the_tasks_of_a_unit_are_handed_to_another_worker_together():
+    """But for the one that is done; the same task is handed out again if the other is lost too."""
+    units = Units({task: task // 3 for task in range(6)})
+    beats = [(10.0 * k, 2, ("alive", 10.0 * k)) for k in range(20)]
+    beats += [(10.0 * k, 3, ("alive", 10.0 * k)) for k in range(60)]
+    script = [
+        (1.0, 1, done(0, 1)),  # then nothing more of worker 1, nor of worker 2 after 190 s
+        (2.0, 2, done(3, 2)),
+        (3.0, 2, done(4, 2)),
+        (4.0, 2, done(5, 2)),
+        (400.0, 3, ("claim", 1, True)),
+        (400.1, 3, done(1, 3)),
+        (400.2, 3, ("claim", 2, True)),
+        (400.3, 3, done(2, 3)),
+        (401.0, 3, ("goodbye",)),
+    ]
+    channel = Scripted(0, 4, beats + script)
+    master, collected = scripted_master(channel, range(6), units)
+    assert master.run() is None
+    assert sorted(outcome.task for outcome in collected) == list(range(6))
+    assert master.out_of_reach == (1, 2)
+    handed = [(to, *message[1:]) for to, message in channel.sent if message[0] == "task"]
+    assert handed[:6] == [(1 + task // 3, task, False) for task in range(6)]
+    assert handed[6:] == [(2, 1, True), (2, 2, True), (3, 1, True), (3, 2, True)]
+    assert [m for to, m in channel.sent if to == 3 and m[0] == "answer"] == [("answer", True)] * 2
+
+
+@pytest.mark.parametrize(
+    ("shared", "recalled", "answered", "asks"),
+    [
+        (False, False, 0.0, False),
+        (False, False, 55.0, False),
+        (False, False, 65.0, True),  # no heartbeat was answered for half the time
+        (False, True, 0.0, True),
+        (True, False, 0.0, True),
+    ],
+)
+@pytest.mark.parametrize("granted", [True, False])
+def test_a_worker_asks_before_it_delivers_what_others_may_have(
+    shared, recalled, answered, asks, granted
+):
+    channel = Scripted(1, 2)
+    delivered = []
+    script = [((False), ("task", 5, shared)), (False, ("answer", granted)), (False, ("dismissed",))]
+    if not asks:
+        del script[1]
+
+    def compute(task, check):
+        channel.now += answered  # in compiled code, say
+        return task
+
+    def poll(*, urgent=False):
+        if urgent and channel.sent and channel.sent[-1][1][0] == "alive":
+            sent_at = channel.sent[-1][1][1]
+            channel.sent.append((1, ("heard",)))
+            # The answers to later heartbeats are under way.
+            return (0, ("heard", sent_at, recalled)) if sent_at == 0.0 else None
+        return None if urgent else (0, script.pop(0)[1])
+
+    channel.poll = poll
+    Worker(
+        *(channel, compute, lambda o: delivered.append(o.task) or o, Limits(silence=120)),
+        clock=channel.clock,
+    ).run()
+    kinds = [message[0] for to, message in channel.sent if to == 0 and message[0] != "alive"]
+    first = [] if shared else [("claim", 5, False)]
+    claims = [message for to, message in channel.sent if to == 0 and message[0] == "claim"]
+    assert claims == first + ([("claim", 5, True)] if asks else [])
+    assert delivered == ([5] if granted or not asks else [])
+    assert kinds[-2:] == ["outcome" if delivered else "given up", "goodbye"]
 
 
 def test_tasks_that_would_not_end_in_time_stay_behind():

@@ -168,6 +168,26 @@ def test_a_killed_rank_ends_with_what_to_do(tmp_path):
     assert errors.splitlines()[-1].endswith("run the same command again to resume")
 
 
+def test_tasks_of_a_rank_that_hangs_are_done_by_others_and_the_job_ends(tmp_path, whole):
+    """Rank 2 is stopped in its second task, as if its node hung; it never comes back."""
+    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
+    process = start(
+        *("run", path, "--out", out, "--ranks", "3"), fake=f"hold=1 free={free} silence=1"
+    )
+    wait_until(lambda: done_rows(out) >= 2)
+    (launcher,) = ranks_of(process.pid)
+    os.kill(ranks_of(launcher)[-1], signal.SIGSTOP)
+    free.touch()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    assert "rank 2 does not answer for 1 s: 1 of its 1 tasks are handed to others" in errors
+    assert "8 of 8 tasks done; 8 computed" in errors
+    assert errors.splitlines()[-1] == (
+        "adhesis run: rank 2 does not answer and is ended; what was done is kept"
+    )
+    assert differences(out, whole) == []
+
+
 def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(tmp_path):
     """One worker is told to stop, while the last task, on the other, does not look up."""
     path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")

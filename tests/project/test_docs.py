@@ -72,6 +72,8 @@ NOT_RUN = {
     "adhesis trace long.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out/long": (
         "takes minutes on a busy machine; as the trace before"
     ),
+    "python benchmarks/precision_coverage.py --study --campaigns 1000": "takes minutes; "
+    "test_precision.py asks one cell",
     "python benchmarks/precision_coverage.py --campaigns 4000": "takes minutes; "
     "test_precision.py asks four kinds of a thousand",
     '.venv/bin/pip install "SurfaceTopography>=1.27"': "needs a network",

@@ -7,7 +7,8 @@ its end, ``doubt=TASK`` a loss whose audit is 19 % off,
 ``hold=N`` after N tasks of a process stay in the next one, looking up, until stopped, or until
 there is the file of ``free=FILE``,
 ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's,
-``serial=1`` as if HDF5 had no MPI, ``full=BYTES`` no file may be written beyond so many bytes.
+``serial=1`` as if HDF5 had no MPI, ``silence=SECONDS`` a rank that is silent for so long is out of
+reach, ``full=BYTES`` no file may be written beyond so many bytes.
 """
 
 from __future__ import annotations
@@ -103,6 +104,8 @@ def fake_engine(behaviour: str) -> Engine:
     engine = Engine(
         run_task, lambda campaign, task: None, FakeWriter, methods=lambda campaign, tasks: ()
     )
+    if "silence" in settings:
+        engine = replace(engine, silence=float(settings["silence"]))
     return replace(engine, all_write=False) if "serial" in settings else engine
 
 
