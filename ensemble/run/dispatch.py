@@ -85,7 +85,7 @@ class Limits:
     task_seconds : float, optional
         Longest time of one task.
     grace : float
-        How long workers may take to answer a stop, in s.
+        How long workers may take to answer a stop or their dismissal, in s.
     silence : float
         How long a worker may not be heard from until its tasks are handed to others, in s.
     """
@@ -205,7 +205,7 @@ class Master:
 
     @property
     def out_of_reach(self) -> tuple[int, ...]:
-        """Workers that have not said goodbye, once the run is over."""
+        """Workers that have not answered their dismissal, once the run is over."""
         return tuple(sorted(self._silent))
 
     def run(self) -> str | None:
@@ -365,10 +365,12 @@ class Master:
             if rank in self._silent:  # nobody needs what it may still compute
                 self._channel.send(rank, ("halt",), urgent=True)
             self._channel.send(rank, ("dismissed",))
-        waiting = set(self._sent)
+        waiting, end = set(self._sent), self._clock() + self._limits.grace
         while waiting - self._silent:
             message = self._look()
             if message is None:
+                if self._clock() > end:  # what has no task answers at once, or hangs
+                    self._silent |= waiting
                 self._sleep(SHORTEST_PAUSE)
             elif message[1][0] == "goodbye":
                 waiting.discard(message[0])

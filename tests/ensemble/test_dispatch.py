@@ -525,6 +525,15 @@ def test_a_master_that_was_held_up_takes_nobody_for_lost():
     assert (reports, master.out_of_reach, len(collected)) == ([], (), 2)
 
 
+def test_a_worker_that_does_not_answer_its_dismissal_is_not_waited_for():
+    """It hangs when it has no task any more; within the grace, and not only after the silence."""
+    channel = Scripted(0, 3, [(1.0, 1, done(0, 1)), (2.0, 2, done(1, 2)), (2.1, 1, ("goodbye",))])
+    master, collected = scripted_master(channel, range(2))
+    assert master.run() is None
+    assert (len(collected), master.out_of_reach) == (2, (2,))
+    assert channel.now == pytest.approx(2 + Limits().grace, abs=0.1)
+
+
 def test_the_tasks_of_a_unit_are_handed_to_another_worker_together():
     """But for the one that is done; the same task is handed out again if the other is lost too."""
     units = Units({task: task // 3 for task in range(6)})
