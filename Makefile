@@ -2,6 +2,8 @@
 .DEFAULT_GOAL := help
 .PHONY: help setup setup-test setup-slurm run test test-kills fuzz lint bench docs figures-of-docs check-package clean lock
 SHELL := /bin/bash
+# Byte code is kept, or each process compiles all that it imports: a second or two of CPU.
+unexport PYTHONDONTWRITEBYTECODE
 bin := .venv/bin
 # Extra arguments for pytest, as in: make test ARGS='-k loop'
 ARGS :=

@@ -167,8 +167,9 @@ install_slurm() {
     fi
 }
 
-# Not the launcher's and not another installation's: what is in .venv is what is meant.
-unset PYTHONPATH PYTHONHOME
+# Not the launcher's and not another installation's: what is in .venv is what is meant. Byte code is
+# kept whatever the environment says, or every process compiles all that it imports.
+unset PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 PIP_PROGRESS_BAR=off
 # The lists hold all that is needed, so nothing has to be resolved. Byte code is made of what is
 # imported, at the end: most of pandas and scipy never is.

@@ -272,18 +272,20 @@ def _tell_price(
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.price import as_text, price
     from adhesis.ensemble.run.session import Engine
-    from adhesis.ensemble.warm import warm_up  # brings the compiler in
 
     engine = engine or Engine()
     part = Part.parse(args.part) if args.part else WHOLE
-    tasks = campaign.tasks(part)
-    for task in {t.cell: t for t in reversed(tasks)}.values():
-        engine.check(campaign, task)
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    warm_up(engine.methods(campaign, tasks), say)
+    def prepare(tasks: list[Task]) -> None:
+        from adhesis.ensemble.warm import warm_up  # loads the compiler
+
+        for task in {t.cell: t for t in reversed(tasks)}.values():
+            engine.check(campaign, task)
+        warm_up(engine.methods(campaign, tasks), say)
+
     heard = time.monotonic()
 
     def tried(task: Task, seconds: float) -> None:
@@ -293,7 +295,10 @@ def _tell_price(
             say(f"pilot loop: {task}: {seconds:.3g} s")
 
     told = price(
-        *(campaign, path, part), compute=lambda c, t: engine.compute(c, t, None), on_pilot=tried
+        *(campaign, path, part),
+        compute=lambda c, t: engine.compute(c, t, None),
+        prepare=prepare,
+        on_pilot=tried,
     )
     print(as_text(told))
     return DONE

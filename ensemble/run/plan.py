@@ -116,7 +116,9 @@ def prepare(
     say: Callable[[str], None] = lambda text: None,
     check: Callable[[Campaign, Task], None] = check_task,
 ) -> Plan:
-    """Check everything, lock, make or extend the file, and find what is to be done; by rank 0.
+    """Lock, check everything, make or extend the file, and find what is to be done; by rank 0.
+
+    Only tasks that are to be computed are checked, as that loads the solver.
 
     Parameters
     ----------
@@ -124,7 +126,7 @@ def prepare(
     path : path
         The results file.
     lock : RunLock
-        Taken here, after all that can be checked without it.
+        Taken here.
     size : int
         Ranks of the run.
     part : Part, optional
@@ -154,11 +156,15 @@ def prepare(
         )
     if redo is not None:
         redo.check(tasks)
-    for task in {t.cell: t for t in reversed(tasks)}.values():
-        check(campaign, task)
+
+    def check_cells(chosen: Sequence[Task]) -> None:
+        for task in {t.cell: t for t in reversed(chosen)}.values():
+            check(campaign, task)
+
     _check_path(path)
     lock.acquire(size, patience)
     if not path.exists():
+        check_cells(tasks)
         create(path, campaign, part=part, versions=versions())
         batches = Batches(campaign, tasks, {}) if campaign.stop.relative_error else None
         rows = batches.to_do if batches else list(range(len(tasks)))
@@ -187,6 +193,8 @@ def prepare(
         before = len(old)
         if not old.has_checksums:
             say(f"{old.path} {NO_CHECKSUMS}; the run copies its rows into a file that has them")
+        if difference.grown:
+            check_cells(tasks)
         if difference.grown or not old.has_checksums:
             create(path, campaign, part=part, versions=versions(), grown_from=old)
             if old.damaged().size:
@@ -203,6 +211,7 @@ def prepare(
             again += chosen
         status[again] = PENDING
         plan = _plan(results, status)
+    check_cells([plan.tasks[row] for row in plan.rows])  # where nothing is left, none is loaded
     if again or plan.batches is not None:
         with Writer(path) as writer:
             writer.reset(again)

@@ -146,6 +146,7 @@ def price(
     *,
     seconds: float = PILOT_SECONDS,
     compute: Callable[[Campaign, Task], Row] | None = None,
+    prepare: Callable[[list[Task]], None] = lambda tasks: None,
     on_pilot: Callable[[Task, float], None] = lambda task, seconds: None,
 ) -> Price:
     """Estimate what a campaign costs; writes nothing.
@@ -165,6 +166,8 @@ def price(
         How long loops are tried out.
     compute : callable, optional
         Computes a task.
+    prepare : callable
+        Called with the tasks still to do, if there are any, before the first is tried out.
     on_pilot : callable
         Called after each loop that was tried out, with its CPU time in s.
 
@@ -179,6 +182,8 @@ def price(
     left, done = tasks, 0
     if path is not None and path.exists():
         left, done = _left(campaign, path, tasks, known)
+    if left:
+        prepare(left)
     pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
     for unit in _units(campaign, [task for task in left if not known.seconds[task.cell]]):
         if time.monotonic() > end:
@@ -333,14 +338,14 @@ def as_text(price: Price) -> str:
         if price.pilots
         else "the loops that are done"
     )
+    memory = f", about {price.rank_bytes / 1e6:.0f} MB of memory a rank" if price.left else ""
     lines = [
         f"{price.left} tasks to do in {len(price.cells)} cells, {price.done} done; "
         "nothing was written",
         *([price.stop] if price.stop else []),
         f"{price.seconds / 3600:.3g} core hours, by {tried}; "
         f"the longest task takes about {duration(price.longest)}",
-        f"results file {price.file_bytes / 1e6:.3g} MB, "
-        f"about {price.rank_bytes / 1e6:.0f} MB of memory a rank",
+        f"results file {price.file_bytes / 1e6:.3g} MB{memory}",
     ]
     if price.left:
         lines.append(f"one process takes {duration(price.makespan(1))}")

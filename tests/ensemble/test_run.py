@@ -309,6 +309,26 @@ def test_every_cell_is_tried_before_anything_is_written(tmp_path, changes, sente
     assert [file.name for file in tmp_path.iterdir()] == ["c.toml"]
 
 
+def test_a_cell_that_is_new_is_tried_before_the_file_grows(tmp_path):
+    """Tasks that are done are not: that would load the solver for nothing."""
+    engine, out = fake_engine(""), tmp_path / "r.h5"
+    run_campaign(load_campaign(write_campaign(tmp_path)), out, engine=engine)
+    before = out.read_bytes()
+    tried = []
+
+    def check(campaign, task):
+        tried.append(task.work_of_adhesion)
+        check_task(campaign, task)
+
+    run_campaign(load_campaign(write_campaign(tmp_path)), out, engine=replace(engine, check=check))
+    assert tried == []
+    grown = load_campaign(write_campaign(tmp_path, work_of_adhesion="[0.01, 0.04, 1e25]"))
+    with pytest.raises(InputError, match=r"cannot be computed: work_of_adhesion is 1e\+25 J/m²"):
+        run_campaign(grown, out, engine=replace(engine, check=check))
+    assert 1e25 in tried
+    assert out.read_bytes() == before
+
+
 def test_bad_options(tmp_path):
     assert "--redo is 'some'" in refused(tmp_path, "--redo", "some")
     assert "choose among --redo" in refused(tmp_path, "--hurst", "0.7")

@@ -111,6 +111,23 @@ def test_make_help_lists_every_target() -> None:
         assert f"make {target} " in done.stdout
 
 
+def test_byte_code_is_kept_whatever_the_environment_says() -> None:
+    """Else every process of a test, and of a user who may not write here, compiles its imports."""
+    done = subprocess.run(
+        ["make", "--eval", "show:;@env", "show"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "PATH=" in done.stdout
+    assert "PYTHONDONTWRITEBYTECODE" not in done.stdout
+    unset = re.search(r"^unset (.*)$", (ROOT / "tools" / "setup.sh").read_text(), re.MULTILINE)
+    assert unset is not None
+    assert "PYTHONDONTWRITEBYTECODE" in unset[1].split()
+
+
 def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
     stamp = Path(sys.prefix, "adhesis-setup")
     if not stamp.exists() or Path(sys.prefix).parent != ROOT:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.synthetic_results import campaign, rows, write
+from tests.support.synthetic_results import campaign, rows, text_of, write
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGES = {"adhesis": "adhesis", "adhesis.solver": "solver", "adhesis.ensemble": "ensemble"}
@@ -241,6 +241,16 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_status_loads_no_mpi_and_no_figures(results: Path) -> None:
     packages = loaded(COMMAND, "status", str(results))
     assert packages & {"mpi4py", "matplotlib", "numba"} == set()
+
+
+@pytest.mark.parametrize("options", [(), ("--dry-run",), ("--redo", "failed")])
+def test_a_run_with_nothing_to_do_loads_no_solver(
+    results: Path, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text(text_of(realisations=2))
+    packages = loaded(COMMAND, "run", str(path), "--out", str(results), *options)
+    assert packages & {"mpi4py", "matplotlib", "numba", "llvmlite", "scipy"} == set()
 
 
 def test_report_loads_no_mpi(results: Path, tmp_path: Path) -> None:

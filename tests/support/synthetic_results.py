@@ -41,20 +41,23 @@ field_nodes = 256
 """
 
 
-def campaign(
+def text_of(
     hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=6, jumps=32, ratio=10, max_penetration=0.9
-) -> Campaign:
+) -> str:
     """The paper's profile, material and path if ``ratio`` is 100; lists are further axes."""
-    return parse_campaign(
-        CAMPAIGN.format(
-            hurst=list(hurst),
-            gamma=list(gamma),
-            realisations=realisations,
-            jumps=jumps,
-            ratio=ratio,
-            max_penetration=max_penetration,
-        )
+    return CAMPAIGN.format(
+        hurst=list(hurst),
+        gamma=list(gamma),
+        realisations=realisations,
+        jumps=jumps,
+        ratio=ratio,
+        max_penetration=max_penetration,
     )
+
+
+def campaign(*args, **changes) -> Campaign:
+    """Return the campaign of :func:`text_of`, by its arguments."""
+    return parse_campaign(text_of(*args, **changes))
 
 
 def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
