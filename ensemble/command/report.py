@@ -44,6 +44,12 @@ def execute(args: argparse.Namespace) -> int:
     check_output_folder("--to", args.to, _FILES, inputs)
     from adhesis.ensemble.report.write import write_report
 
-    with ticking("adhesis report: tables and figures"):
-        write_report(args.file, args.to, beside=args.beside)
+    under_way = ""
+
+    def progress(part: str) -> None:
+        nonlocal under_way
+        under_way = part
+
+    with ticking(lambda: f"adhesis report: {under_way}"):
+        write_report(args.file, args.to, beside=args.beside, progress=progress)
     return 0

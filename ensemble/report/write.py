@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -17,6 +17,7 @@ def write_report(
     directory: Path | str,
     stream: IO[str] | None = None,
     beside: Sequence[Path | str] = (),
+    progress: Callable[[str], None] = lambda part: None,
 ) -> Aggregate:
     """Write ``losses.csv``, ``curves.nc``, figures, ``report.md`` and ``report.html``; print.
 
@@ -30,6 +31,8 @@ def write_report(
         Where the tables go; standard output by default.
     beside : sequence of path
         Results files of other campaigns to compare with.
+    progress : callable
+        Called with the name of each part of the report before it is made.
 
     Raises
     ------
@@ -38,17 +41,19 @@ def write_report(
     WriteError
         If the directory cannot be written; what was there is left as it was.
     """
+    progress("averages")
     data = aggregate(path, beside)
     directory = Path(directory)
     writing = Writing()
     with writing.output("the report in", directory), staged_folder(directory) as folder:
-        _write_files(data, folder)
+        _write_files(data, folder, progress)
     writing.finish()
     _print_summary(data, directory, stream or sys.stdout)
     return data
 
 
-def _write_files(data: Aggregate, directory: Path) -> None:
+def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], None]) -> None:
+    progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
     from adhesis.ensemble.report.axes import common, place
     from adhesis.ensemble.report.curves import write_curves
@@ -86,13 +91,15 @@ def _write_files(data: Aggregate, directory: Path) -> None:
         ("fields", with_shapes),
         ("companions", PENETRATIONS if of_penetration(data) else ()),
     )
-    for _, illustrations in sections:
-        for item in illustrations:
-            with style():
-                figure = item.draw(data if item.whole else data.shown)
-                if not item.whole:
-                    say_below(figure, place(common(data.shown)))
-            save(figure, directory / item.name)
+    items = [item for _, illustrations in sections for item in illustrations]
+    for number, item in enumerate(items, 1):
+        progress(f"figure {number} of {len(items)}, {item.name}")
+        with style():
+            figure = item.draw(data if item.whole else data.shown)
+            if not item.whole:
+                say_below(figure, place(common(data.shown)))
+        save(figure, directory / item.name)
+    progress("pages")
     page = write_page(data, sections)
     (directory / "report.md").write_text(page, encoding="utf-8")
     (directory / "report.html").write_text(html_page(page, directory), encoding="utf-8")

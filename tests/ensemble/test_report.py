@@ -8,6 +8,7 @@ import io
 import re
 import subprocess
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +18,10 @@ import numpy as np
 import pytest
 import xarray
 from matplotlib.container import BarContainer, ErrorbarContainer
+from matplotlib.figure import Figure
 from matplotlib.image import imread
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 
 from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
@@ -451,9 +455,40 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, c
 def test_one_finished_task_of_one_cell_is_enough(tmp_path, drawn):
     plan = campaign(hurst=(0.8,), gamma=(0.04,), realisations=1)
     path = write(tmp_path / "r.h5", plan, rows(plan))
-    data = write_report(path, tmp_path / "out", io.StringIO())
+    parts: list[str] = []
+    data = write_report(path, tmp_path / "out", io.StringIO(), progress=parts.append)
     assert data.done == 1
     assert len(drawn) == 12
+    figures = [f"figure {k} of 12, {name}" for k, name in enumerate(drawn, 1)]
+    assert parts == ["averages", "tables", *figures, "pages"]
+
+
+def test_a_figure_is_laid_out_once_and_drawn_once_for_each_file(tmp_path, monkeypatch):
+    counts = {"layouts": 0, "drawings": 0}
+
+    def counted(owner, name, count):
+        whole = getattr(owner, name)
+
+        def call(*args, **options):
+            counts[count] += 1
+            return whole(*args, **options)
+
+        monkeypatch.setattr(owner, name, call)
+
+    counted(ConstrainedLayoutEngine, "execute", "layouts")
+    counted(Line2D, "draw", "drawings")
+    with style():
+        figure = Figure()
+        axes = figure.add_subplot()
+        axes.add_artist(Line2D([0, 1], [0, 1]))
+        axes.set_axis_off()
+        axes.set_title("a")
+        with mpl.rc_context({"pdf.compression": 0}):
+            monkeypatch.setattr("adhesis.ensemble.report.figures.style.style", nullcontext)
+            _, pdf = save(figure, tmp_path / "figure")
+    assert counts == {"layouts": 1, "drawings": 2}
+    assert b"glyf" in pdf.read_bytes()
+    assert b"GSUB" not in pdf.read_bytes()  # half of the time of a PDF went into it
 
 
 def test_bad_input_is_refused_in_one_sentence(file, tmp_path, capsys):

@@ -10,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -145,11 +147,36 @@ def gamma_label(work_of_adhesion: float) -> str:
     return rf"$\gamma$ = {work_of_adhesion:g} J/m²"
 
 
+@contextmanager
+def _without_shaping_tables() -> Iterator[None]:
+    """Leave out of a PDF's fonts what shapes text, which costs more than all else in them.
+
+    A PDF names its glyphs by number, so that no reader looks there. The list does not belong to
+    fontTools' interface: where there is none, a PDF takes longer and is a little larger.
+    """
+    options: Any = import_module("fontTools.subset").Options  # matplotlib's own dependency
+    dropped = getattr(options, "_drop_tables_default", [])
+    options._drop_tables_default = [*dropped, "GSUB", "GPOS", "GDEF"]
+    try:
+        yield
+    finally:
+        options._drop_tables_default = dropped
+
+
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Save a figure as PNG (300 dpi) and PDF; the same figure gives the same bytes."""
+    """Save a figure as PNG (300 dpi) and PDF; the same figure gives the same bytes.
+
+    The layout is found once, on the canvas of the PNG, which keeps the sizes of texts.
+    """
     png, pdf = stem.with_suffix(".png"), stem.with_suffix(".pdf")
-    with style():
+    found = {"figure.constrained_layout.use": False}  # what no layout engine means
+    with style(), _without_shaping_tables(), mpl.rc_context(found):
+        FigureCanvasAgg(figure)
+        figure.set_dpi(mpl.rcParams["savefig.dpi"])
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(png, metadata={"Software": None})
-        figure.set_layout_engine("none")  # the layout is found; finding it again takes as long
         figure.savefig(pdf, metadata={"CreationDate": None, "Producer": None, "Creator": None})
     return png, pdf
