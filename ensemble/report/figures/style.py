@@ -169,8 +169,12 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     The layout is found once, on the canvas of the PNG, which keeps the sizes of texts.
     """
     png, pdf = stem.with_suffix(".png"), stem.with_suffix(".pdf")
-    found = {"figure.constrained_layout.use": False}  # what no layout engine means
-    with style(), _without_shaping_tables(), mpl.rc_context(found):
+    # What no layout engine means: savefig, too, sets it again.
+    with (
+        style(),
+        _without_shaping_tables(),
+        mpl.rc_context({"figure.constrained_layout.use": False}),
+    ):
         FigureCanvasAgg(figure)
         figure.set_dpi(mpl.rcParams["savefig.dpi"])
         engine = figure.get_layout_engine()
