@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from adhesis._version import __version__ as __version__
+from adhesis.solver import views as _views
 
 if TYPE_CHECKING:
     from adhesis._open import open as open
@@ -96,6 +97,9 @@ __all__ = [
     "self_affine_profile",
     "single_wave",
 ]
+
+# Figures and films of results are made outside of the mechanics, and loaded when they are made.
+_views.maker = lambda: import_module("adhesis.ensemble.loop.views")
 
 
 def __getattr__(name: str) -> object:

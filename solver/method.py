@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Self
@@ -197,9 +198,14 @@ class Method(ABC):
         method._built_from = args, options
         return method
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    @property
+    def recipe(self) -> Callable[[], Method]:
+        """Function that builds the method anew, from the same arguments; it can be pickled."""
         args, options = self._built_from
-        return partial(type(self), *args, **options), ()
+        return partial(type(self), *args, **options)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.recipe, ()
 
     def __init__(self, problem: Problem, *, chosen: str | None = None) -> None:
         how = "Problem(profile, half_space, work_of_adhesion)"

@@ -8,6 +8,7 @@ of the energy drops at the jumps are the same energy. They are computed independ
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import process_time
 
@@ -16,12 +17,13 @@ from numpy.typing import NDArray
 
 from adhesis.solver.checks import choice, counted, reals
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.method import Method, MethodReport
+from adhesis.solver.method import ContactState, Method, MethodReport
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue
+from adhesis.solver.views import Viewed
 
 STEEP = 0.3
 """Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
@@ -32,11 +34,12 @@ _LARGE = 0.02
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoopResult(ByValue):
+class LoopResult(ByValue, Viewed):
     """A complete loop; arrays have the shape (states,), in the order of the path.
 
-    Immutable; two loops are equal if all is that they hold but ``seconds`` and ``method``: the same
-    problem followed twice by one method gives equal loops.
+    Immutable; two loops are equal if all is that they hold but ``seconds``, ``method``,
+    ``contact_states`` and ``new_method``: the same problem followed twice by one method gives equal
+    loops.
 
     Attributes
     ----------
@@ -81,6 +84,10 @@ class LoopResult(ByValue):
         CPU time of this process, in s.
     method : MethodReport
         What the method says of itself (name, resolution, counters).
+    contact_states : tuple of ContactState
+        The states themselves, with the edges of every patch; empty for a loop from a file.
+    new_method : callable or None
+        Builds the method anew, whose ``fields`` and ``openings`` take these states.
 
     References
     ----------
@@ -109,6 +116,8 @@ class LoopResult(ByValue):
     work_spent: float
     seconds: float = field(compare=False)
     method: MethodReport = field(compare=False)
+    contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
+    new_method: Callable[[], Method] | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         """Two lines: what was followed, and its loss; the first warnings are counted only."""
@@ -341,6 +350,8 @@ def result_of(
         work_spent=loss + gained,
         seconds=process_time() - started,
         method=method.report(),
+        contact_states=tuple(record.states),
+        new_method=method.recipe,
     )
 
 

@@ -29,6 +29,7 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue
+from adhesis.solver.views import Viewed
 
 _SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # states whose stress and contact differ by less (of what they went through) are one
@@ -81,10 +82,11 @@ class MinorLoop:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PathResult(ByValue):
+class PathResult(ByValue, Viewed):
     """A path of several legs; arrays have the shape (states,), in the order of the path.
 
-    Immutable; two paths are equal if all is that they hold but ``seconds`` and ``method``.
+    Immutable; two paths are equal if all is that they hold but ``seconds``, ``method``,
+    ``contact_states`` and ``new_method``.
 
     Attributes
     ----------
@@ -121,6 +123,10 @@ class PathResult(ByValue):
     seconds : float
         CPU time of this process, in s.
     method : MethodReport
+    contact_states : tuple of ContactState
+        The states themselves, with the edges of every patch; empty for a path from a file.
+    new_method : callable or None
+        Builds the method anew, whose ``fields`` and ``openings`` take these states.
 
     References
     ----------
@@ -150,6 +156,8 @@ class PathResult(ByValue):
     loss_error: float
     seconds: float = field(compare=False)
     method: MethodReport = field(compare=False)
+    contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
+    new_method: Callable[[], Method] | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         """Two lines: what was followed, and its work."""
@@ -414,4 +422,6 @@ class _Walk:
             loss_error=estimated_error(record, work - change - drops, problem),
             seconds=process_time() - started,
             method=self.method.report(),
+            contact_states=tuple(states),
+            new_method=self.method.recipe,
         )
