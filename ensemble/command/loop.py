@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from adhesis.ensemble.loop.record import (
     write_npz,
 )
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
-from adhesis.ensemble.ticker import tell
+from adhesis.ensemble.ticker import tell, ticking
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -62,6 +63,7 @@ def execute(args: argparse.Namespace) -> int:
         cycle = cycle_of(args, half_space)
         problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control)
         cycle.check(problem)
+    _check_film(args, cycle)
     penetrations = _field_penetrations(args, cycle)
     with refused_as_input(vars(args)):
         method = make_method(
@@ -86,6 +88,9 @@ def execute(args: argparse.Namespace) -> int:
     if args.figure is not None:
         with writing.output("--figure", args.figure):
             _draw(results, args.figure)
+    if args.film is not None:
+        with writing.output("--film", args.film):
+            _film(results, args.film, args.quiet)
     loops: tuple[LoopResult, ...] = ()
     if isinstance(results, PathResult):
         print(path_summary(results))
@@ -160,7 +165,22 @@ def _check_files(args: argparse.Namespace) -> None:
         paths = {f"--{name}": getattr(args, name) for name in names}
         return {option: path for option, path in paths.items() if path is not None}
 
-    check_outputs(named("json", "fields", "figure"), named("heights", "trace"))
+    check_outputs(named("json", "fields", "figure", "film"), named("heights", "trace"))
+
+
+def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
+    """Refuse a film that cannot be made, before the loop is run."""
+    if args.film is None:
+        return
+    if not cycle.is_path and len(cycle.turning_points) > 1:
+        name = "--max-stress" if cycle.control.is_load else "--max-penetration"
+        raise InputError(
+            f"--film is given with {len(cycle.turning_points)} turning points: a film shows one "
+            f"loop, so give {name} one value"
+        )
+    from adhesis.ensemble.loop.film import check_film
+
+    check_film("--film", args.film)
 
 
 def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
@@ -289,6 +309,20 @@ def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
     figure = draw_loops(results)
     with whole_file(path) as stream:
         figure.savefig(stream, format=path.suffix[1:].lower(), dpi=200)
+
+
+def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool) -> None:
+    from adhesis.ensemble.loop.film import film_of
+
+    result = results if isinstance(results, PathResult) else results[0]
+    done = ""
+
+    def progress(number: int, total: int) -> None:
+        nonlocal done
+        done = f"film: {number} of {total} frames computed"
+
+    with nullcontext() if quiet else ticking(lambda: done):
+        film_of(result, progress=progress).save(path)
 
 
 # ---------------------------------------------------------------------- progress

@@ -69,6 +69,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument(
         "--figure", type=Path, metavar="FILE", help="stress and contact: .png, .pdf or .svg"
     )
+    output.add_argument(
+        "--film",
+        type=Path,
+        metavar="FILE",
+        help="the loop as a film: .html (a page with a slider), .gif or .mp4 (needs ffmpeg)",
+    )
     output.add_argument("--fields", type=Path, metavar="FILE.npz", help="stress, shape and gap")
     output.add_argument(
         "--field-penetrations",

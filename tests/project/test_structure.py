@@ -36,6 +36,7 @@ HDF5 = {
 COMPILED = {"adhesis.solver.runtime.jit"}
 FIGURES = {
     "adhesis.ensemble.loop.figure",
+    "adhesis.ensemble.loop.film",
     "adhesis.ensemble.bench.figure",
     "adhesis.ensemble.report.figures.along",
     "adhesis.ensemble.report.figures.catalogue",

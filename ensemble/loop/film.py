@@ -1,0 +1,326 @@
+"""The film of a loop or path: drawn once, moved from frame to frame.
+
+One figure serves all formats. A ``.gif`` or ``.mp4`` is written frame by frame by matplotlib's
+writers. The page is the figure as SVG, in which a short script moves what changes: it stays sharp
+at any size, and takes about 3 KB a frame, where an embedded picture takes some 40 KB.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.animation import FFMpegWriter, PillowWriter
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.film_page import PAGE
+from adhesis.ensemble.loop.scenes import Scene, Scenes, jump_places, scenes_of
+from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
+from adhesis.solver import checks
+from adhesis.solver.checks import counted
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.path import PathResult
+from adhesis.solver.model.profile import Array
+
+FORMATS = (".html", ".gif", ".mp4")
+_WIDTH, _HEIGHT = 9.0, 6.2  # inches
+_DPI = 80  # of .gif and .mp4: 720 × 496 pixels, even numbers, as mp4 wants them
+_RATE = 10  # frames a second
+_BODY, _CONTACT, _POINT = "film-body", "film-contact", "film-point"
+_TENTH = 10.0  # coordinates of the page are whole tenths of a point
+# A surface far above the profile, on long necks, is cut off: the profile keeps a third.
+_MOST_RANGE = 3.0
+_LOOK: Any = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "axes.formatter.use_mathtext": False,  # text of the page stays text
+    "savefig.bbox": None,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "adhesis",
+}
+
+
+def check_film(name: str, path: str | os.PathLike[str]) -> Path:
+    """Return the path of a film that can be made here.
+
+    Parameters
+    ----------
+    name : str
+        The option or parameter, for messages.
+    path : path
+
+    Raises
+    ------
+    InputError
+        If its ending is none of :data:`FORMATS`, or ffmpeg is missing.
+    TypeError
+        If it is no path.
+    """
+    path = Path(checks.path(name, path))
+    ending = path.suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{name} is {path}: the name must end in {', '.join(FORMATS)}")
+    if ending == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError(
+            f"{name} is {path}: ffmpeg, which writes .mp4, is not installed, so take .html or .gif"
+        )
+    return path
+
+
+def film_of(
+    result: LoopResult | PathResult,
+    *,
+    frames: int = 120,
+    progress: Callable[[int, int], None] | None = None,
+) -> Film:
+    """Compute the film of a result; see :meth:`adhesis.LoopResult.film`."""
+    return Film(result, scenes_of(result, frames, progress))
+
+
+class Film:
+    """A loop as a film; made by :meth:`adhesis.LoopResult.film`, shown by a notebook.
+
+    Parameters
+    ----------
+    result : LoopResult or PathResult
+    scenes : Scenes
+    """
+
+    def __init__(self, result: LoopResult | PathResult, scenes: Scenes) -> None:
+        self._result, self._scenes = result, scenes
+
+    def __repr__(self) -> str:
+        return f"<Film: {len(self)} frames, {counted(len(self._result.jumps), 'jump')}>"
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self._scenes.scenes)
+
+    def _repr_html_(self) -> str:
+        """Return the page in a frame of its own, for notebooks."""
+        return (
+            f'<iframe srcdoc="{escape(self.page)}" title="film of a loop" loading="lazy" '
+            'style="width:100%;max-width:60rem;height:48rem;border:0"></iframe>'
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the film.
+
+        Parameters
+        ----------
+        path : path
+            Its ending is the format: ``.html``, ``.gif`` or ``.mp4``.
+
+        Raises
+        ------
+        InputError
+            If the ending is another, or ffmpeg is missing for ``.mp4``.
+        OSError
+            If the file cannot be written.
+        TypeError
+            If ``path`` is no path.
+        """
+        path = check_film("path", path)
+        if path.suffix.lower() == ".html":
+            data = self.page.encode()
+        else:
+            data = self._animation(path.suffix.lower())
+        with whole_file(path) as stream:
+            stream.write(data)
+
+    @cached_property
+    def page(self) -> str:
+        """The film as one page of HTML that needs no other file."""
+        drawing = _Drawing(self._result, self._scenes)
+        drawing.show(self._scenes.scenes[-1])  # which is without contact, often
+        frames = [drawing.moved(scene) for scene in self._scenes.scenes]
+        data = json.dumps(
+            {"x": drawing.across, "top": drawing.top, "rate": _RATE, "frames": frames},
+            separators=(",", ":"),
+        )
+        jumps = counted(len(self._result.jumps), "jump")
+        shown = self._scenes.jumps_shown
+        if shown < len(self._result.jumps):
+            jumps += f", of which the {shown} with the largest drops have frames of their own"
+        return (
+            PAGE.replace("@SVG@", drawing.svg())
+            .replace("@TITLE@", escape(self._title))
+            .replace("@JUMPS@", escape(jumps))
+            .replace("@LAST@", str(len(self) - 1))
+            .replace("@DATA@", data.replace("<", "\\u003c"))
+        )
+
+    @property
+    def _title(self) -> str:
+        problem = self._result.problem
+        work = self._result.work if isinstance(self._result, PathResult) else self._result.loss
+        name = "path: work" if isinstance(self._result, PathResult) else "loop: loss"
+        return f"{name} {work:.4g} J/m² at γ = {problem.work_of_adhesion:g} J/m²"
+
+    def _animation(self, ending: str) -> bytes:
+        """Return the film as matplotlib's own writer makes it."""
+        drawing = _Drawing(self._result, self._scenes)
+        writer = PillowWriter(fps=_RATE) if ending == ".gif" else FFMpegWriter(fps=_RATE)
+        with tempfile.TemporaryDirectory() as folder, style(), mpl.rc_context(_LOOK):
+            file = Path(folder, f"film{ending}")
+            drawing.freeze()
+            with writer.saving(drawing.figure, str(file), dpi=_DPI):
+                for scene in self._scenes.scenes:
+                    drawing.show(scene, texts=True)
+                    writer.grab_frame()
+            return file.read_bytes()
+
+
+class _Drawing:
+    """The figure of a film, and what moves in it."""
+
+    def __init__(self, result: LoopResult | PathResult, scenes: Scenes) -> None:
+        self._result, self._scenes = result, scenes
+        with style(), mpl.rc_context(_LOOK):
+            self.figure = new_figure(2, 1, _WIDTH, _HEIGHT, height_ratios=[3, 4])
+            shape, curve = self.figure.axes
+            self._draw_shape(shape)
+            self._draw_curve(curve)
+            self.figure.draw_without_rendering()  # finds the layout: the page needs coordinates
+            self.figure.set_layout_engine("none")
+        self._shape, self._curve = shape, curve
+        self.across = [int(v) for v in self._tenths(shape, self._mm, 0 * self._mm)[0]]
+        self.top = int(self._tenths(shape, self._mm[:1], np.array([self._ceiling]))[1][0])
+
+    def _draw_shape(self, axes: Axes) -> None:
+        x, height = self._scenes.x, 1e6 * self._scenes.height
+        self._mm = 1e3 * x
+        floor = height.min() - 0.05 * np.ptp(height)
+        top = 1e6 * max(float(scene.surface.max()) for scene in self._scenes.scenes)
+        self._ceiling = min(top, floor + _MOST_RANGE * float(np.ptp(height))) + 0.1 * float(
+            np.ptp(height)
+        )
+        axes.fill_between(self._mm, height, floor, color="0.55", lw=0)
+        (self._body,) = axes.fill(self._mm, height, fc="#56B4E9", ec="#0072B2", lw=1.0, alpha=0.55)
+        (self._contact,) = axes.plot(
+            self._mm[:2], height[:2], color="#D55E00", lw=3.0, solid_capstyle="round"
+        )
+        self._body.set_gid(_BODY)
+        self._contact.set_gid(_CONTACT)
+        axes.set(
+            xlim=(self._mm[0], self._mm[-1]),
+            ylim=(floor, self._ceiling),
+            xlabel="position (mm)",
+            ylabel="height (µm)",
+        )
+        axes.set_title(
+            "elastic body (blue) over the rigid profile (grey), contact in red", loc="left"
+        )
+
+    def _draw_curve(self, axes: Axes) -> None:
+        result = self._result
+        scale = result.problem.stress_scale
+        x, y = result.penetration, result.mean_stress / scale
+        for branch in ("loading", "unloading"):
+            rows = np.where(result.branch == branch, y, np.nan)
+            axes.plot(x, rows, color="k", ls=LINE_OF_BRANCH[branch], lw=1.0, label=branch)
+        places = np.array(jump_places(result), dtype=int)
+        axes.plot(x[places], y[places], "o", ms=2, mfc="#D55E00", mew=0, alpha=0.7, label="jumps")
+        axes.axhline(0, color="0.7", lw=0.5, zorder=0)
+        (self._point,) = axes.plot(x[:1], y[:1], "o", ms=8, mfc="#0072B2", mec="w")
+        self._point.set_gid(_POINT)
+        axes.set(xlabel="penetration Δ/h_max", ylabel="σ~ = 2p̄/(E* q0 h_max)")
+        axes.legend(loc="best")
+        axes.set_title(" ")  # keeps the place of the texts
+        above: Any = {"transform": axes.transAxes, "va": "bottom", "fontsize": 9}
+        self._texts = axes.text(0, 1.02, "", **above), axes.text(1, 1.02, "", ha="right", **above)
+
+    def freeze(self) -> None:
+        """Make one picture of all that does not move: drawing it takes most of the time."""
+        moving: tuple[Artist, ...] = (self._body, self._contact, self._point)
+        for artist in moving:
+            artist.set_visible(False)
+        self.figure.set_dpi(_DPI)
+        canvas: Any = FigureCanvasAgg(self.figure)
+        canvas.draw()
+        picture = np.asarray(canvas.buffer_rgba()).copy()
+        for axes in self.figure.axes:
+            for artist in axes.get_children():
+                if artist not in (*moving, *self._texts):
+                    artist.set_visible(False)
+            axes.set_axis_off()
+        for artist in moving:
+            artist.set_visible(True)
+        self.figure.figimage(picture, zorder=-1)
+
+    # ------------------------------------------------------------------ a frame of the figure
+
+    def show(self, scene: Scene, *, texts: bool = False) -> None:
+        """Move the figure to a frame; with its texts, which a page has beside the figure."""
+        surface = 1e6 * scene.surface
+        x = np.concatenate([self._mm, self._mm[::-1]])
+        top = max(self._ceiling, float(surface.max()))
+        self._body.set_xy(np.column_stack([x, np.concatenate([surface, 0 * surface + top])]))
+        pieces = [np.array([[np.nan, np.nan]])]
+        for left, right in 1e3 * scene.patches:
+            inside = self._mm[(self._mm > left) & (self._mm < right)]
+            piece = np.array([left, *inside, right])
+            pieces += [np.column_stack([piece, np.interp(piece, self._mm, surface)]), pieces[0]]
+        self._contact.set_data(*np.concatenate(pieces).T)
+        result, index = self._result, scene.state
+        stress = result.mean_stress[index] / result.problem.stress_scale
+        self._point.set_data([result.penetration[index]], [stress])
+        if texts:
+            caption, _, lost = scene.caption.partition("; ")
+            self._texts[0].set_text(caption)
+            self._texts[1].set_text(scene.announcement or lost)
+            self._texts[1].set_color("#D55E00" if scene.announcement else "k")
+
+    # ------------------------------------------------------------------ a frame of the page
+
+    def moved(self, scene: Scene) -> dict[str, Any]:
+        """Return what a page moves for a frame, in tenths of a point.
+
+        ``y``: the surface at the positions ``x``, the first value and then differences; ``c``: ends
+        of the contact patches in units of the spacing of ``x``, in thousandths; ``p``: the point.
+        """
+        index, result = scene.state, self._result
+        _, y = self._tenths(self._shape, self._mm, 1e6 * scene.surface)
+        stress = result.mean_stress[index : index + 1] / result.problem.stress_scale
+        point = self._tenths(self._curve, result.penetration[index : index + 1], stress)
+        spacing = self._scenes.x[1]
+        return {
+            "y": [int(v) for v in np.diff(y, prepend=0)],
+            "c": np.rint(1e3 * scene.patches / spacing).astype(int).ravel().tolist(),
+            "p": [int(v[0]) for v in point],
+            "s": scene.caption,
+            "j": scene.announcement,
+            "n": int(scene.is_notable),
+        }
+
+    def svg(self) -> str:
+        """Return the figure as SVG, without its head."""
+        stream = io.StringIO()
+        with style(), mpl.rc_context(_LOOK):
+            # an empty line has no path that could be moved
+            self._contact.set_data(self._mm[:2], self._mm[:2])
+            self.figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        text = stream.getvalue()
+        return text[text.index("<svg") :]
+
+    def _tenths(self, axes: Axes, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return points of a panel in tenths of a point of the page, y downwards."""
+        display = axes.transData.transform(np.column_stack([x, y])) * 72 / self.figure.dpi
+        return np.rint(_TENTH * display[:, 0]), np.rint(_TENTH * (72 * _HEIGHT - display[:, 1]))
