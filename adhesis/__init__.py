@@ -18,8 +18,10 @@ from adhesis._version import __version__ as __version__
 from adhesis.solver import views as _views
 
 if TYPE_CHECKING:
+    from adhesis._campaign import Campaign
     from adhesis._open import open as open
     from adhesis.ensemble.errors import InputError
+    from adhesis.ensemble.loop.saved import load
     from adhesis.ensemble.trace.answer import loss_of_trace
     from adhesis.ensemble.trace.prepare import prepare_trace
     from adhesis.ensemble.trace.read import read_trace
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 # The same list for the running program; a test compares the two.
 _MODULES = {
+    "Campaign": "_campaign",
     "ContactState": "solver.method",
     "Control": "solver.model.control",
     "Fields": "solver.method",
@@ -57,6 +60,7 @@ _MODULES = {
     "PathResult": "solver.loading.path",
     "Problem": "solver.model.problem",
     "Profile": "solver.model.profile",
+    "load": "ensemble.loop.saved",
     "loss_of_trace": "ensemble.trace.answer",
     "make_method": "solver.registry",
     "open": "_open",
@@ -71,6 +75,7 @@ _MODULES = {
 }
 
 __all__ = [
+    "Campaign",
     "ContactState",
     "Control",
     "Fields",
@@ -86,6 +91,7 @@ __all__ = [
     "PathResult",
     "Problem",
     "Profile",
+    "load",
     "loss_of_trace",
     "make_method",
     "prepare_trace",

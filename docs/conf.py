@@ -86,8 +86,20 @@ def public_name(app: Any, env: Any, node: Any, content: Any) -> Any:
     )
 
 
+def film(app: Any, error: Exception | None) -> None:
+    """Write the film of docs/python.md beside its page."""
+    if error is not None or app.builder.format != "html":
+        return
+    profile = adhesis.self_affine_profile(0.8, period=2e-3, n0=2, ratio=12, seed=3, h_rms=1e-6)
+    problem = adhesis.Problem(profile, adhesis.HalfSpace(1e6, 0.5), 0.02)
+    method = adhesis.make_method("auto", problem)
+    loop = adhesis.run_loop(method, max_penetration=0.8, load_steps=20)
+    loop.film(Path(app.outdir, "film.html"), frames=60)
+
+
 def setup(app: Any) -> None:
-    """Connect the three."""
+    """Connect the four."""
+    app.connect("build-finished", film)
     app.connect("source-read", start_page)
     app.connect("autodoc-process-docstring", plain, priority=400)  # ahead of napoleon
     app.connect("missing-reference", public_name)

@@ -204,6 +204,10 @@ class Method(ABC):
         args, options = self._built_from
         return partial(type(self), *args, **options)
 
+    def __repr__(self) -> str:
+        """One line: the name, and what it solves."""
+        return f"<method {self.name!r} for {self.problem!r}>"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return self.recipe, ()
 

@@ -1,4 +1,4 @@
-"""Figures and films of a result: the mechanics declare them, the public package makes them.
+"""Figures, films, tables and files of a result: declared here, made outside of the mechanics.
 
 ``adhesis`` names the module that makes them in :data:`maker` when it is imported; that module, and
 matplotlib with it, is loaded when a result is first shown.
@@ -12,15 +12,19 @@ from typing import Any
 
 
 def _unset() -> Any:
-    raise ImportError("import adhesis first: it names the module that draws results")
+    raise ImportError("import adhesis first: it names the module that shows results")
 
 
 maker: Callable[[], Any] = _unset
-"""Return the module that makes figures and films; ``adhesis/__init__.py`` sets it."""
+"""Return the module that makes them; ``adhesis/__init__.py`` sets it."""
 
 
 class Viewed:
-    """Figure and film of a loop or path."""
+    """Figure, film, tables and file of a loop or path."""
+
+    def _repr_html_(self) -> str:
+        """Return the main numbers and the figure, for notebooks."""
+        return str(maker().page(self))
 
     def plot(self) -> Any:
         """Draw mean stress and contact fraction against penetration.
@@ -93,3 +97,83 @@ class Viewed:
         <Film: 9 frames, 2 jumps>
         """
         return maker().film(self, path, frames=frames, progress=progress)
+
+    def to_dataframe(self, of: str = "states") -> Any:
+        """Return the states or the jumps as a table.
+
+        Parameters
+        ----------
+        of : {"states", "jumps"}
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row for each, in the order of the path; ``attrs["units"]`` holds the unit of every
+            column.
+
+        Raises
+        ------
+        ValueError
+            If ``of`` is neither.
+
+        References
+        ----------
+        docs/python.md, "Tables and files"
+
+        Examples
+        --------
+        >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
+        >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+        >>> loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
+        >>> loop.to_dataframe("jumps").kind.tolist()
+        ['snap-in', 'pull-off']
+        >>> loop.to_dataframe().attrs["units"]["mean_stress"]
+        'Pa'
+        """
+        return maker().to_dataframe(self, of)
+
+    def to_xarray(self) -> Any:
+        """Return everything but the contact states as a labelled dataset.
+
+        Returns
+        -------
+        xarray.Dataset
+            Arrays along ``state``, ``jump`` (names begin with ``jump_``) and ``harmonic`` (the
+            profile), each with its ``units``; single numbers are attributes.
+
+        References
+        ----------
+        docs/python.md, "Tables and files"
+
+        Examples
+        --------
+        >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
+        >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+        >>> loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
+        >>> loop.to_xarray().jump_energy_drop.units
+        'J/m²'
+        """
+        return maker().to_xarray(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write everything but the contact states to a netCDF file; :func:`adhesis.load` reads it.
+
+        Parameters
+        ----------
+        path : path
+            Its name ends in ``.nc``.
+
+        Raises
+        ------
+        InputError
+            If the name ends otherwise.
+        OSError
+            If the file cannot be written.
+        TypeError
+            If it is no path.
+
+        References
+        ----------
+        docs/python.md, "Tables and files"
+        """
+        maker().save(self, path)

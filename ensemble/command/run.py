@@ -114,7 +114,7 @@ def execute(
     except InputError as error:
         if comm is None:
             raise
-        if comm.rank == 0:
+        if comm.rank == 0 and not launch.hand_over(BAD_INPUT, f"adhesis run: {error}"):
             write_line(f"adhesis run: {error}")
         if not wait_for_all(comm, _ALL_ARRIVE):  # the error is of this rank alone
             _end_job(comm, BAD_INPUT, f"adhesis run: {error}" if comm.rank else "")

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
@@ -92,6 +92,14 @@ class CampaignResults:
         if DAMAGED in status:
             self._counts["damaged"] = int(np.sum(status == DAMAGED))
         self.plot = Plots(lambda: self.averages)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Forget what was read; the file itself is closed after each access anyway."""
+        for name in [n for n, v in vars(type(self)).items() if isinstance(v, cached_property)]:
+            self.__dict__.pop(name, None)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{number} {name}" for name, number in self._counts.items())

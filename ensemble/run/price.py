@@ -94,6 +94,10 @@ class Price:
     pilot_seconds: float
     stop: str = ""
 
+    def __str__(self) -> str:
+        """Return the lines of ``adhesis run --dry-run``."""
+        return as_text(self)
+
     @property
     def left(self) -> int:
         """Tasks still to do; with ``[stop]`` an estimate."""

@@ -12,6 +12,7 @@ import numpy as np
 from adhesis.ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
 from adhesis.ensemble.trace.pool import Pool, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.solver import views
 from adhesis.solver.checks import (
     ACCURACY,
     Bounds,
@@ -116,6 +117,10 @@ class Answer(ByValue):
             f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
         )
 
+    def _repr_html_(self) -> str:
+        """Return the main numbers and the figure of the loop, for notebooks."""
+        return str(views.maker().trace_page(self))
+
     def result(self, name: str) -> Result | None:
         """Numbers of a loop, or None if it failed or was not run."""
         found = self.results.get(name)
@@ -157,6 +162,7 @@ def loss_of_trace(
     accuracy: float = 1e-3,
     quick: bool = False,
     processes: int | None = None,
+    progress: bool = False,
     watch: Watch | None = None,
 ) -> Answer:
     """Run the loop of a prepared trace and its variants on the cores at hand.
@@ -179,6 +185,8 @@ def loss_of_trace(
         Without the two tables.
     processes : int, optional
         Side by side; without it one for each core, 0 for none beside this one.
+    progress : bool
+        Whether a bar shows how many of the loops are done, in a terminal or notebook.
     watch : callable, optional
         Called with the :class:`~adhesis.ensemble.trace.pool.Pool` about once a second.
 
@@ -201,9 +209,13 @@ def loss_of_trace(
     function("watch", watch)
     if processes is not None:
         processes = whole("processes", processes, _PROCESSES)
-    return run_plan(
-        prepared, cycle, make_plan(prepared, cycle, quick=quick, processes=processes), watch
-    )
+    plan = make_plan(prepared, cycle, quick=quick, processes=processes)
+    if not flag("progress", progress):
+        return run_plan(prepared, cycle, plan, watch)
+    from adhesis.ensemble.trace.progress_bar import bar_of
+
+    with bar_of(len(plan.runs), watch) as shown:
+        return run_plan(prepared, cycle, plan, shown)
 
 
 def make_cycle(

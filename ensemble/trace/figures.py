@@ -150,6 +150,12 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
     )
 
 
+def draw_loop(answer: Answer) -> Figure:
+    """Draw the answer's own loop."""
+    with style():
+        return _loop(answer)[0]
+
+
 def _loop(answer: Answer) -> tuple[Figure, str]:
     states: dict[str, Any] = answer.main["states"]
     branch = np.array(states["branch"])

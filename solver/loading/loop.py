@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from time import process_time
 from typing import TypeVar
 
+from adhesis.solver import views
 from adhesis.solver.checks import (
     FAR_DISPLACEMENT,
     LOAD_STEPS,
@@ -30,6 +32,31 @@ HOW_METHOD = "make_method(name, problem)"
 
 Progress = Callable[[Branch, float, ContactState], None]
 """Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
+
+
+@contextmanager
+def progress_of(progress: Progress | bool | None, top: float) -> Iterator[Progress | None]:
+    """Return what is called after each load step: what was given, or for True a progress bar.
+
+    Parameters
+    ----------
+    progress : callable or bool, optional
+    top : float
+        The largest turning point, at which the bar is full.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    """
+    if progress is True:
+        with views.maker().progress_bar(top) as bar:
+            yield bar
+    elif progress is False:
+        yield None
+    else:
+        yield function("progress", progress)
+
 
 # After so many times the loading stroke, unloading skips load steps that are shorter than a share
 # of the control's natural range (h_max at fixed separation) or of the way since first touch; loops
@@ -69,7 +96,7 @@ def run_loop(
     max_penetration: float | None = None,
     max_stress: float | None = None,
     load_steps: int,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     on_state: Callable[[Branch, ContactState], None] | None = None,
 ) -> LoopResult:
     """Load from first touch to the turning point, then unload until detached.
@@ -83,8 +110,8 @@ def run_loop(
         Under a load, instead: p̄ in Pa, positive.
     load_steps : int
         Equal steps of the loading branch; unloading goes on with the same step.
-    progress : callable, optional
-        See :data:`Progress`.
+    progress : callable or bool, optional
+        True shows a bar, in a terminal or notebook; a function is called as :data:`Progress` says.
     on_state : callable, optional
         Called with every state of the path, in order (for fields at chosen penetrations).
 
@@ -104,17 +131,17 @@ def run_loop(
     control = instance("method", method, Method, HOW_METHOD).problem.control
     turning_point = turning_of(method.problem, max_penetration, max_stress)
     turning_point, load_steps = check_cycle(turning_point, load_steps, control)
-    function("progress", progress)
     function("on_state", on_state)
     started = process_time()
     record = Record(on_state)
     axis = Axis(turning_point, load_steps)
     state = method.detached(method.problem.profile.h_max)
-    record.visit("loading", False, state)
-    load = recorder(method, record, "loading", state, progress)
-    for i in range(load_steps + 1):
-        state = load(axis(i))
-    unload_recorded(method, record, state, axis, turning_point, progress)
+    with progress_of(progress, turning_point) as report:
+        record.visit("loading", False, state)
+        load = recorder(method, record, "loading", state, report)
+        for i in range(load_steps + 1):
+            state = load(axis(i))
+        unload_recorded(method, record, state, axis, turning_point, report)
     return result_of(method, record, turning_point, load_steps, started)
 
 

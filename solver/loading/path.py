@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
-from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, unload
+from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
 from adhesis.solver.loading.loop_result import estimated_error
 from adhesis.solver.loading.path_record import Axis, Record
 from adhesis.solver.method import ContactState, Method, MethodReport, PathError
@@ -233,7 +233,7 @@ def run_path(
     *,
     load_steps: int,
     out: bool = True,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     on_state: Callable[[Branch, ContactState], None] | None = None,
 ) -> PathResult:
     """Follow a path from first touch through the turning points, and out of contact.
@@ -268,7 +268,6 @@ def run_path(
     instance("method", method, Method, HOW_METHOD)
     points = check_path(turning_points, load_steps, method.problem)
     load_steps = int(load_steps)
-    function("progress", progress)
     function("on_state", on_state)
     if flag("out", out) and len(points) % 2 == 0:
         raise ValueError(
@@ -276,11 +275,12 @@ def run_path(
             "point away"
         )
     started = process_time()
-    walk = _Walk(method, Axis(max(points), load_steps), Record(on_state), progress)
-    for point in points:
-        walk.to(point)
-    if out:
-        walk.out()
+    with progress_of(progress, max(points)) as report:
+        walk = _Walk(method, Axis(max(points), load_steps), Record(on_state), report)
+        for point in points:
+            walk.to(point)
+        if out:
+            walk.out()
     return walk.result(points, load_steps, started)
 
 

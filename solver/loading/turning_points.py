@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from time import process_time
 
-from adhesis.solver.checks import function, instance, row
+from adhesis.solver.checks import instance, row
 from adhesis.solver.loading.loop import (
     HOW_METHOD,
     Progress,
     check_cycle,
+    progress_of,
     turning_of,
     unload_recorded,
 )
@@ -158,7 +159,7 @@ def run_loops(
     max_penetration: Sequence[float] | None = None,
     max_stress: Sequence[float] | None = None,
     load_steps: int,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> tuple[LoopResult, ...]:
     """Run loops that share one loading branch, followed once and left at every turning point.
 
@@ -170,8 +171,9 @@ def run_loops(
         of numbers will do.
     load_steps : int
         Equal steps up to the largest turning point; every unloading branch goes on with that step.
-    progress : callable, optional
-        See :data:`adhesis.solver.loading.loop.Progress`.
+    progress : callable or bool, optional
+        True shows a bar, in a terminal or notebook; a function is called as
+        :data:`adhesis.solver.loading.loop.Progress` says.
 
     Returns
     -------
@@ -198,7 +200,7 @@ def run_loops(
     name = "max_stress" if method.problem.control.is_load else "max_penetration"
     given = turning_of(method.problem, max_penetration, max_stress)
     points = row(name, given, entry="turning point").tolist()
-    function("progress", progress)
     branch = LoadingBranch(method, points, load_steps=load_steps)
-    loops = {turn: branch.loop(turn, progress=progress) for turn in sorted(points)}
+    with progress_of(progress, max(points)) as report:
+        loops = {turn: branch.loop(turn, progress=report) for turn in sorted(points)}
     return tuple(loops[turn] for turn in points)

@@ -20,6 +20,7 @@ import adhesis
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 PUBLIC = [
+    "Campaign",
     "ContactState",
     "Control",
     "Fields",
@@ -35,6 +36,7 @@ PUBLIC = [
     "PathResult",
     "Problem",
     "Profile",
+    "load",
     "loss_of_trace",
     "make_method",
     "prepare_trace",

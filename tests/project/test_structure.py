@@ -83,6 +83,7 @@ SOLVER_FOR_ENSEMBLE = {
     "adhesis.solver.loading.turning_points",
     "adhesis.solver.validate.claims",
     "adhesis.solver.values",
+    "adhesis.solver.views",
     "adhesis.solver.precompile",
 }
 

@@ -1,0 +1,235 @@
+"""Campaigns from Python; what it takes to run one is loaded when one is run."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from adhesis.solver import checks
+
+if TYPE_CHECKING:
+    from adhesis.ensemble.report.opened import CampaignResults
+    from adhesis.ensemble.run.price import Price
+
+_RANKS = checks.Bounds(1, 100_000, whole=True)
+_PILOT = checks.Bounds(0.0, 1e6, without_low=True, unit="s")
+
+
+class Campaign:
+    """A campaign: loops for every Hurst exponent, work of adhesion and realisation.
+
+    Parameters
+    ----------
+    source : dict, str or path
+        The tables of docs/campaign-file.md as a dictionary of dictionaries; or as TOML text, of
+        several lines; or a campaign file. Lengths in m, stresses in Pa, works of adhesion in J/m².
+
+    Attributes
+    ----------
+    text : str
+        The campaign as TOML; the results file keeps it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a key or value breaks a rule; one sentence.
+    TypeError
+        If ``source`` is none of them.
+
+    References
+    ----------
+    docs/python.md, "A campaign"
+
+    Examples
+    --------
+    >>> import adhesis
+    >>> campaign = adhesis.Campaign({
+    ...     "profile": {"period": 2e-3, "n0": 2, "ratio": 6, "h_rms": 1e-6},
+    ...     "material": {"young": 1e6, "poisson": 0.5},
+    ...     "sweep": {"hurst": [0.7, 0.9], "work_of_adhesion": [0.01, 0.04], "realisations": 3},
+    ...     "cycle": {"max_penetration": 0.8, "load_steps": 8},
+    ... })
+    >>> campaign
+    <Campaign: 4 cells, 12 tasks>
+    """
+
+    def __init__(self, source: Mapping[str, Any] | str | os.PathLike[str]) -> None:
+        from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+
+        if isinstance(source, Mapping):
+            self.tables = parse_campaign(_toml(source))
+        elif isinstance(source, str) and "\n" in source:
+            self.tables = parse_campaign(source)
+        else:
+            self.tables = load_campaign(checks.path("source", source))
+        self.text: str = self.tables.text
+
+    def __repr__(self) -> str:
+        cells, tasks = len(self.tables.cells), self.tables.task_count
+        return (
+            f"<Campaign: {checks.counted(cells, 'cell')}, {checks.counted(tasks, 'task')}>"
+        )
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both compute the same."""
+        return isinstance(other, Campaign) and self.tables == other.tables
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def price(self, out: str | os.PathLike[str] | None = None, *, seconds: float = 20.0) -> Price:
+        """Estimate what the campaign costs, from pilot loops; nothing is written.
+
+        Parameters
+        ----------
+        out : path, optional
+            Its results file, if there is one: the loops that are done are not counted again.
+        seconds : float
+            How long pilot loops are run, in s.
+
+        Returns
+        -------
+        adhesis.ensemble.run.price.Price
+            ``seconds`` of CPU time, ``file_bytes``, ``rank_bytes``, ``makespan(workers)`` in s;
+            ``print`` shows it as ``adhesis run --dry-run`` does.
+
+        Raises
+        ------
+        InputError
+            If the results file is damaged, or holds another campaign.
+        ValueError
+            If ``seconds`` is not positive.
+        TypeError
+            If ``out`` is no path, or ``seconds`` no number.
+        """
+        path = None if out is None else checks.path("out", out)
+        seconds = checks.real("seconds", seconds, _PILOT)
+        from adhesis.ensemble.run.price import price
+        from adhesis.ensemble.task.compute import methods_of
+        from adhesis.ensemble.warm import warm_up
+
+        warm_up(methods_of(self.tables, self.tables.tasks()), lambda text: None)
+        return price(self.tables, path, seconds=seconds)
+
+    def run(
+        self,
+        out: str | os.PathLike[str],
+        *,
+        ranks: int = 1,
+        progress: bool = False,
+    ) -> CampaignResults:
+        """Compute what is missing in the results file, and open it.
+
+        Parameters
+        ----------
+        out : path
+            The results file. One of this campaign is resumed, one of a smaller campaign extended.
+        ranks : int
+            1 computes in this process. More start so many MPI ranks on this machine: one more than
+            cores is right, as the first only hands out.
+        progress : bool
+            Whether a line on stderr shows how far the campaign is.
+
+        Returns
+        -------
+        CampaignResults
+            As :func:`adhesis.open` returns it. Failed tasks are counted in its ``repr``.
+
+        Raises
+        ------
+        InputError
+            If the file holds another campaign, is damaged, in use or not writable; or the ranks
+            cannot be started.
+        RuntimeError
+            If the run ended before its last task, by a signal or an error of a rank: what was done
+            is kept, and the same call goes on.
+        ValueError
+            If ``ranks`` is out of range.
+        TypeError
+            If a value is of the wrong type.
+        """
+        path = checks.path("out", out)
+        ranks = checks.whole("ranks", ranks, _RANKS)
+        checks.flag("progress", progress)
+        if ranks == 1:
+            self._run_here(path, progress)
+        else:
+            self._run_ranks(path, ranks)
+        from adhesis._open import open as open_results
+
+        return open_results(path)
+
+    def _run_here(self, path: Path, progress: bool) -> None:
+        from adhesis.ensemble.run.session import run_campaign
+
+        with contextlib.nullcontext() if progress else contextlib.redirect_stderr(io.StringIO()):
+            summary = run_campaign(
+                self.tables, path, say=lambda text: print(text, file=sys.stderr, flush=True)
+            )
+        if summary.stopped:
+            raise RuntimeError(
+                f"the campaign stopped early: {summary.stopped}; {summary.pending} of "
+                f"{summary.total} tasks are left in {path}, and the same call goes on"
+            )
+
+    def _run_ranks(self, path: Path, ranks: int) -> None:
+        from adhesis.ensemble.command.run import BAD_INPUT, DONE, SOME_FAILED
+        from adhesis.ensemble.errors import InputError
+        from adhesis.ensemble.run import launch
+
+        mpirun, most = launch.launcher(), launch.largest_number_of_ranks()
+        if mpirun is None:
+            raise InputError(f"ranks is {ranks}: no mpirun was found, so take ranks=1")
+        if ranks > most:
+            raise InputError(
+                f"ranks is {ranks}: at most {most} are started here, on {launch.cores()} cores"
+            )
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "campaign.toml")
+            file.write_text(self.text, encoding="utf-8")
+            code, sentence = launch.run_ranks(
+                mpirun, ranks, ["run", str(file), "--out", str(path.absolute())]
+            )
+        if code == BAD_INPUT:
+            raise InputError(sentence.removeprefix("adhesis run: ") or "the ranks refused the run")
+        if code not in (DONE, SOME_FAILED):
+            raise RuntimeError(
+                sentence
+                or f"the ranks ended with exit code {code}; what was done is kept in {path}"
+            )
+
+
+def _toml(source: Mapping[str, Any]) -> str:
+    """Return a dictionary of tables as TOML; what it cannot hold becomes a text that is refused."""
+    lines: list[str] = []
+    for name, table in source.items():
+        if not isinstance(table, Mapping):
+            lines.insert(0, f"{_key(name)} = {_value(table)}")
+            continue
+        lines.append(f"[{_key(name)}]")
+        lines += [f"{_key(key)} = {_value(value)}" for key, value in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _key(name: object) -> str:
+    text = str(name)
+    return text if re.fullmatch(r"[\w-]+", text, re.ASCII) else json.dumps(text)
+
+
+def _value(value: Any) -> str:
+    if hasattr(value, "tolist"):  # numbers and arrays of NumPy
+        value = value.tolist()
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return json.dumps(str(value), ensure_ascii=False)

@@ -1,0 +1,239 @@
+"""A loop or path as tables with units, as a labelled dataset, and as a netCDF file."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from adhesis._version import __version__
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.outputs import whole_file
+from adhesis.solver import checks
+from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.path import MinorLoop, PathResult
+from adhesis.solver.method import MethodReport
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.jump import Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Profile
+
+Result = LoopResult | PathResult
+_KINDS: dict[str, type[Result]] = {"loop": LoopResult, "path": PathResult}
+_KIND = "adhesis_result"
+_NOT_KEPT = {"problem", "method", "contact_states", "new_method"}
+_PARTS: dict[str, tuple[str, type]] = {"jumps": ("jump", Jump), "minor_loops": ("minor", MinorLoop)}
+_UNITS = {
+    "separation": "m",
+    "mean_stress": "Pa",
+    "elastic_energy": "J/m",
+    "adhesion_energy": "J/m",
+    "potential": "J/m",
+    "energy": "J/m",
+    "energy_drop": "J/m²",
+    "at_stake": "J/m²",
+    "patch_length": "m",
+    "loss": "J/m²",
+    "loss_from_drops": "J/m²",
+    "energy_change": "J/m²",
+    "stress_change": "Pa",
+    "coefficient_real": "m",
+    "coefficient_imag": "m",
+}
+_COLUMNS = ("penetration", "separation", "mean_stress", "contact_fraction", "patches")
+
+
+@dataclass(frozen=True)
+class SavedReport(MethodReport):
+    """What a method reported of itself before its loop was saved.
+
+    Attributes
+    ----------
+    details : dict
+        Settings and counters by name; each is an attribute as well.
+    """
+
+    details: dict[str, Any] = field(default_factory=dict)
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["details"][name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+
+# ---------------------------------------------------------------------- tables
+
+
+def to_dataframe(result: Result, of: str) -> pd.DataFrame:
+    """Return states or jumps as a table; see :meth:`adhesis.LoopResult.to_dataframe`."""
+    checks.choice("of", of, ("states", "jumps"))
+    if of == "jumps":
+        columns = _columns(Jump, result.jumps)
+        h_max = result.problem.profile.h_max
+        columns["penetration"] = 1.0 - np.asarray(columns["separation"], dtype=float) / h_max
+        if isinstance(result, PathResult):
+            columns["leg"] = result.jump_leg
+    else:
+        names = ("branch", "load_step", *_COLUMNS, "elastic_energy", "adhesion_energy", "energy")
+        columns = {name: getattr(result, name) for name in names}
+        if isinstance(result, PathResult):
+            columns |= {"potential": result.potential, "leg": result.leg}
+    table = pd.DataFrame(columns)
+    table.attrs["units"] = {name: _UNITS.get(name, "") for name in columns}
+    return table
+
+
+def _columns(kind: type, parts: tuple[Any, ...]) -> dict[str, Any]:
+    return {entry.name: [getattr(p, entry.name) for p in parts] for entry in fields(kind)}
+
+
+def to_xarray(result: Result) -> xr.Dataset:
+    """Return a labelled dataset; see :meth:`adhesis.LoopResult.to_xarray`."""
+    variables: dict[str, Any] = {}
+    kind = next(name for name, kind in _KINDS.items() if isinstance(result, kind))
+    about: dict[str, Any] = {_KIND: kind, "adhesis_version": __version__}
+    for entry in fields(result):
+        value = getattr(result, entry.name)
+        if entry.name in _NOT_KEPT:
+            continue
+        if entry.name in _PARTS:
+            dim, part = _PARTS[entry.name]
+            for name, values in _columns(part, value).items():
+                variables[f"{dim}_{name}"] = _variable(dim, name, _typed(values, part, name))
+        elif isinstance(value, np.ndarray):
+            dim = "jump" if entry.name == "jump_leg" else "state"
+            variables[entry.name] = _variable(dim, entry.name, value)
+        else:
+            about[entry.name] = np.array(value) if isinstance(value, tuple) else value
+    problem = result.problem
+    coefficients = problem.profile.coefficients
+    for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
+        name = f"coefficient_{name}"
+        variables[name] = _variable("harmonic", name, np.array(values))
+    half_space = problem.half_space
+    about |= {
+        "period": problem.profile.period,
+        "young": half_space.young,
+        "poisson": half_space.poisson,
+        "work_of_adhesion": problem.work_of_adhesion,
+        "stiffness": problem.control.stiffness,
+        "method": json.dumps(asdict(result.method), default=lambda v: v.tolist()),
+    }
+    return xr.Dataset(variables, attrs=about)
+
+
+def _typed(values: list[Any], part: type, name: str) -> Any:
+    """Return a column as an array, also of no parts: with the type that its entries have."""
+    annotation = str(next(entry.type for entry in fields(part) if entry.name == name))
+    kinds = {"float": float, "int": np.int64, "bool": bool}
+    return np.array(values, dtype=kinds.get(annotation, str))
+
+
+def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str]]:
+    return dim, values, {"units": _UNITS.get(name, "1")}
+
+
+# ---------------------------------------------------------------------- files
+
+
+def save(result: Result, path: str | os.PathLike[str]) -> None:
+    """Write a netCDF file; see :meth:`adhesis.LoopResult.save`."""
+    path = checks.path("path", path)
+    if path.suffix != ".nc":
+        raise InputError(f"path is {path}: the name must end in .nc")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "result.nc")
+        to_xarray(result).to_netcdf(file, engine="h5netcdf")
+        with whole_file(path) as stream:
+            stream.write(file.read_bytes())
+
+
+def load(path: str | os.PathLike[str]) -> Result:
+    """Read a loop or path that ``save`` has written.
+
+    Parameters
+    ----------
+    path : path
+        A netCDF file, of this or an earlier version of adhesis.
+
+    Returns
+    -------
+    LoopResult or PathResult
+        Equal to what was saved; without its contact states, so that it cannot be filmed.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, or no such file.
+    TypeError
+        If ``path`` is no path.
+
+    References
+    ----------
+    docs/python.md, "Tables and files"
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import adhesis
+    >>> profile, half_space = adhesis.single_wave(1e-6, 1e-3), adhesis.HalfSpace(1e6, 0.5)
+    >>> problem = adhesis.Problem(profile, half_space, 0.01)
+    >>> method = adhesis.make_method("sharp", problem)
+    >>> loop = adhesis.run_loop(method, max_penetration=0.5, load_steps=4)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     loop.save(Path(folder, "loop.nc"))
+    ...     adhesis.load(Path(folder, "loop.nc")) == loop
+    True
+    """
+    path = checks.path("path", path)
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as file:
+            found = file.load()
+        return _result(found)
+    except FileNotFoundError:
+        raise InputError(f"path is {path}: there is no such file") from None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"path is {path}: it is no loop or path that adhesis has saved ({type(error).__name__})"
+        ) from error
+
+
+def _result(found: xr.Dataset) -> Result:
+    kind = _KINDS[found.attrs[_KIND]]
+    about = found.attrs
+    values: dict[str, Any] = {}
+    for entry in fields(kind):
+        name = entry.name
+        if name in _PARTS:
+            dim, part = _PARTS[name]
+            names = [entry.name for entry in fields(part)]
+            columns = [found[f"{dim}_{entry}"].values.tolist() for entry in names]
+            rows = zip(*columns, strict=True)
+            values[name] = tuple(part(**dict(zip(names, row, strict=True))) for row in rows)
+        elif name in found:
+            array = found[name].values
+            values[name] = array.astype(str) if array.dtype.kind == "O" else array
+        elif name == "turning_points":
+            values[name] = tuple(np.atleast_1d(about[name]).tolist())
+        elif name in about and name not in _NOT_KEPT:
+            values[name] = np.asarray(about[name]).item()
+    coefficients = found["coefficient_real"].values + 1j * found["coefficient_imag"].values
+    report = json.loads(about["method"])
+    method = SavedReport(report.pop("name"), report.pop("chosen"), report)
+    problem = Problem(
+        Profile(coefficients=coefficients, period=float(about["period"])),
+        HalfSpace(float(about["young"]), float(about["poisson"])),
+        float(about["work_of_adhesion"]),
+        Control(float(about["stiffness"])),
+    )
+    return kind(problem=problem, method=method, **values)

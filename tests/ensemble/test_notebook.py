@@ -1,0 +1,292 @@
+"""Results as a notebook's user handles them: shown, as tables, saved, copied, with a bar."""
+
+from __future__ import annotations
+
+import copy
+import html
+import multiprocessing
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import adhesis
+from adhesis import (
+    Control,
+    HalfSpace,
+    InputError,
+    LoopResult,
+    PathResult,
+    Problem,
+    run_loop,
+    run_loops,
+    run_path,
+    self_affine_profile,
+    single_wave,
+)
+from adhesis.ensemble.trace.prepare import prepare_trace
+from adhesis.ensemble.trace.read import Trace
+from adhesis.solver.references.exact_wave import ExactWave
+
+WAVE = single_wave(1e-6, 1e-3)
+
+
+def wave_method(control: Control | None = None) -> ExactWave:
+    problem = Problem(WAVE, HalfSpace(1e6, 0.5), 1e-3, control or Control())
+    return ExactWave(problem, states_per_step=4)
+
+
+LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
+    "loop": lambda: run_loop(wave_method(), max_penetration=0.5, load_steps=4),
+    "under a stiffness": lambda: run_loop(
+        wave_method(Control(1e9)), max_penetration=0.5, load_steps=4
+    ),
+    "under a load": lambda: run_loop(wave_method(Control(0.0)), max_stress=400.0, load_steps=4),
+    "without adhesion": lambda: run_loop(
+        ExactWave(Problem(WAVE, HalfSpace(1e6, 0.5), 0.0)), max_penetration=0.5, load_steps=4
+    ),
+    "path": lambda: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4),
+}
+
+
+@pytest.fixture(scope="module", params=LOOPS)
+def result(request: pytest.FixtureRequest) -> LoopResult | PathResult:
+    return LOOPS[request.param]()
+
+
+# ---------------------------------------------------------------------- shown
+
+
+def test_every_public_object_has_a_short_repr(result):
+    method = wave_method()
+    state = result.contact_states[3]
+    objects: list[Any] = [
+        *(result, result.jumps, state, method, method.recipe, method.fields(state, 64)),
+        *(WAVE, method.problem, method.problem.half_space, Control(), result.method),
+        *(method.follow(method.detached(1e-6), 0.9e-6), *method.openings(state)),
+        *getattr(result, "minor_loops", ()),
+        *(result.film(frames=2),),
+    ]
+    for thing in objects:
+        assert len(repr(thing)) < 800, type(thing)
+        assert " at 0x" not in repr(thing)
+
+
+def test_a_notebook_shows_the_main_numbers_and_the_figure(result):
+    page = result._repr_html_()
+    value = result.work if isinstance(result, PathResult) else result.loss
+    assert f"{value:.5g}" in html.unescape(page)
+    assert "data:image/png;base64," in page
+    assert len(page) < 200_000
+    figure = result.plot()
+    assert isinstance(figure, Figure)
+    assert [axes.get_xlabel() for axes in figure.axes] == ["penetration Δ/h_max"] * 2
+
+
+# ---------------------------------------------------------------------- tables and files
+
+
+def test_tables_hold_every_state_and_jump_with_units(result):
+    states, jumps = result.to_dataframe(), result.to_dataframe("jumps")
+    assert len(states) == len(result.separation)
+    assert states.mean_stress.to_numpy() == pytest.approx(result.mean_stress, abs=0)
+    assert states.energy.to_numpy() == pytest.approx(result.energy, abs=0)
+    assert len(jumps) == len(result.jumps)
+    assert jumps.energy_drop.sum() == pytest.approx(result.loss_from_drops)
+    for table in (states, jumps):
+        assert set(table.attrs["units"]) == set(table.columns)
+    assert states.attrs["units"]["mean_stress"] == "Pa"
+    assert states.attrs["units"]["separation"] == "m"
+    assert jumps.attrs["units"]["energy_drop"] == "J/m²"
+    with pytest.raises(ValueError, match="of is 'patches': it must be"):
+        result.to_dataframe("patches")
+
+
+def test_the_dataset_has_units_and_the_single_numbers(result):
+    data = result.to_xarray()
+    assert data.sizes["state"] == len(result.separation)
+    assert all("units" in data[name].attrs for name in data.data_vars)
+    assert data.mean_stress.units == "Pa"
+    assert data.jump_energy_drop.units == "J/m²"
+    assert data.attrs["loss_from_drops"] == result.loss_from_drops
+    assert data.attrs["young"] == 1e6
+
+
+def test_what_was_saved_is_loaded_as_it_was(result, tmp_path):
+    file = tmp_path / "result.nc"
+    result.save(file)
+    found = adhesis.load(file)
+    assert found == result
+    assert hash(found) == hash(result)
+    assert repr(found) == repr(result)
+    assert found.audit_residual == result.audit_residual
+    assert found.method.states_per_step == result.method.states_per_step
+    assert found.seconds == result.seconds
+    assert found.plot().axes
+    assert found == pickle.loads(pickle.dumps(found))
+    with pytest.raises(ValueError, match="read from a file"):
+        found.film()
+
+
+def test_other_files_are_refused(tmp_path, result):
+    text, other = tmp_path / "a.nc", tmp_path / "b.nc"
+    text.write_text("no netCDF")
+    result.to_xarray().drop_attrs().to_netcdf(other, engine="h5netcdf")
+    for call, error, message in (
+        (lambda: adhesis.load(tmp_path / "c.nc"), InputError, "there is no such file"),
+        (lambda: adhesis.load(text), InputError, "it is no loop or path that adhesis has saved"),
+        (lambda: adhesis.load(other), InputError, "it is no loop or path that adhesis has saved"),
+        (lambda: adhesis.load(3), TypeError, "path is 3"),
+        (lambda: result.save("loop.h5"), InputError, "the name must end in .nc"),
+        (lambda: result.save(3), TypeError, "path is 3"),
+    ):
+        with pytest.raises(error, match=message):
+            call()
+
+
+# ---------------------------------------------------------------------- copies and processes
+
+
+def same(result: LoopResult | PathResult) -> LoopResult | PathResult:
+    return result
+
+
+def test_results_are_copied_pickled_and_sent_to_spawned_processes():
+    results = [make() for make in LOOPS.values()]
+    for result in results:
+        assert copy.copy(result) == copy.deepcopy(result) == result
+        assert pickle.loads(pickle.dumps(result)).contact_states == result.contact_states
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.map(same, results) == results
+        method = wave_method()
+        loop = pool.apply(run_loop, (method,), {"max_penetration": 0.5, "load_steps": 4})
+    assert loop == results[0]
+
+
+# ---------------------------------------------------------------------- progress
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        lambda **more: run_loop(wave_method(), max_penetration=0.5, load_steps=4, **more),
+        lambda **more: run_loops(wave_method(), max_penetration=[0.3, 0.5], load_steps=4, **more),
+        lambda **more: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4, **more),
+    ],
+    ids=["run_loop", "run_loops", "run_path"],
+)
+def test_a_bar_on_stderr_follows_the_path_and_changes_nothing(run, capsys):
+    silent = run()
+    assert run(progress=False) == silent
+    assert capsys.readouterr() == ("", "")
+    assert run(progress=True) == silent
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "unloading" in shown.err
+    assert "0 patches" in shown.err
+    with pytest.raises(TypeError, match="progress is 3"):
+        run(progress=3)
+
+
+def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys):
+    step = 1e-3 / 400
+    x = step * np.arange(400)
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=2, h_rms=1e-6)
+    prepared = prepare_trace(Trace(Path("t.txt"), profile.at(x), step))
+    seen = []
+    answer = adhesis.loss_of_trace(
+        *(prepared,),
+        half_space=HalfSpace(1e6, 0.5),
+        work_of_adhesion=0.02,
+        load_steps=3,
+        quick=True,
+        processes=0,
+        progress=True,
+        watch=lambda pool: seen.append(len(pool.done)),
+    )
+    runs = len(answer.plan.runs)
+    assert seen[-1] == runs
+    assert f"{runs}/{runs}" in capsys.readouterr().err
+    page = answer._repr_html_()
+    assert "<th>loss</th>" in page
+    assert "data:image/png;base64," in page
+    assert len(repr(answer)) < 200
+    assert pickle.loads(pickle.dumps(answer)) == answer
+
+
+# ---------------------------------------------------------------------- campaigns
+
+TABLES: dict[str, Any] = {
+    "profile": {"period": 2e-3, "n0": 2, "ratio": 4, "h_rms": 1e-6},
+    "material": {"young": 1e6, "poisson": 0.5},
+    "sweep": {"hurst": [0.7, np.float64(0.9)], "work_of_adhesion": [0.02], "realisations": 1},
+    "cycle": {"max_penetration": np.array([0.4, 0.6]), "load_steps": np.int64(4)},
+}
+
+
+@pytest.fixture(scope="module")
+def campaign() -> adhesis.Campaign:
+    return adhesis.Campaign(TABLES)
+
+
+def test_a_campaign_is_the_same_from_a_dictionary_a_text_and_a_file(campaign, tmp_path):
+    file = tmp_path / "my.toml"
+    file.write_text(campaign.text)
+    for other in (adhesis.Campaign(file), adhesis.Campaign(str(file))):
+        assert other == campaign
+    assert adhesis.Campaign(campaign.text) == campaign
+    assert pickle.loads(pickle.dumps(campaign)) == campaign
+    assert repr(campaign) == "<Campaign: 4 cells, 4 tasks>"
+
+
+@pytest.mark.parametrize(
+    ("source", "error", "text"),
+    [
+        ({"profil": {}}, InputError, "'profil' is unknown; the tables are"),
+        ({**TABLES, "cycle": {"load_steps": 4}}, InputError, "max_penetration is missing"),
+        ({**TABLES, "cycle": 3}, InputError, "cycle is 3: it must be a table"),
+        ({**TABLES, "a b": {"c\nd": None}}, InputError, "'a b' is unknown"),
+        ("no.toml", InputError, "no.toml cannot be read"),
+        (3, TypeError, "source is 3"),
+    ],
+)
+def test_what_is_no_campaign_is_refused(source, error, text):
+    with pytest.raises(error, match=text):
+        adhesis.Campaign(source)
+
+
+def test_a_campaign_is_priced_run_resumed_and_opened(campaign, tmp_path, capsys):
+    file = tmp_path / "my.h5"
+    price = campaign.price(seconds=0.1)
+    assert price.tasks == price.left == 4
+    assert "4 tasks to do in 4 cells" in str(price)
+    assert not file.exists()
+    with campaign.run(file) as results:
+        assert results.losses.shape[0] == 4
+        assert bool((results.dataset.loss > 0).all())
+        drops = results.jumps.energy_drop.sum()
+        assert drops == pytest.approx(float(results.dataset.loss_from_drops.sum()))
+    assert capsys.readouterr() == ("", "")
+    assert "4 done" in repr(campaign.run(file, progress=True))  # nothing is left to do
+    assert "4" in capsys.readouterr().err
+    assert campaign.price(file).left == 0
+    other = adhesis.Campaign(campaign.text.replace("young = 1000000.0", "young = 2e6"))
+    with pytest.raises(InputError, match="young"):
+        other.run(file)
+    with pytest.raises(ValueError, match="ranks is 0"):
+        campaign.run(file, ranks=0)
+    with pytest.raises(ValueError, match="seconds is -1"):
+        campaign.price(seconds=-1)
+
+
+@pytest.mark.mpi
+def test_ranks_compute_the_same_rows(campaign, tmp_path):
+    alone, ranks = campaign.run(tmp_path / "1.h5"), campaign.run(tmp_path / "2.h5", ranks=2)
+    assert alone.dataset.loss.identical(ranks.dataset.loss)
+    other = adhesis.Campaign(campaign.text.replace("young = 1000000.0", "young = 2e6"))
+    with pytest.raises(InputError, match="young"):
+        other.run(tmp_path / "2.h5", ranks=2)
