@@ -17,6 +17,7 @@ from adhesis.ensemble.trace.worker import Job
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName
+from adhesis.solver.values import ByValue
 
 # Loops beyond this many waves are compared at a coarser cut-off when a doubt is measured.
 _MOST_WAVES_OF_VARIANTS = 8000
@@ -56,8 +57,8 @@ class Run:
     max_penetration: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(ByValue):
     """Runs, jobs and expected cost.
 
     Attributes

@@ -23,6 +23,7 @@ from adhesis.ensemble.trace.units import (
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
+from adhesis.solver.values import ByValue
 
 FEWEST_POINTS = 32
 _COLUMN = checks.Bounds(1, 1_000_000, whole=True)
@@ -41,8 +42,8 @@ _BEYOND, _BEYOND_KNOWN = 5.0, 0.2
 _SENTINELS = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 
 
-@dataclass(frozen=True, eq=False)
-class Trace:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trace(ByValue):
     """A measured trace on equal steps.
 
     Attributes

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.run.launch import end_with_parent
+from adhesis.solver.values import ByValue
 
 if TYPE_CHECKING:
     from adhesis.solver.registry import MethodName
@@ -34,8 +35,8 @@ def failure(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-@dataclass(frozen=True)
-class Job:
+@dataclass(frozen=True, eq=False, repr=False)
+class Job(ByValue):
     """One loop: everything that the solver needs, in SI units."""
 
     name: str

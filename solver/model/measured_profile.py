@@ -13,6 +13,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from adhesis.solver.model.profile import Array, Profile, profile_from_heights
+from adhesis.solver.values import ByValue
 
 Continuation = Literal["taper", "blend", "mirror"]
 CONTINUATIONS: tuple[Continuation, ...] = get_args(Continuation)
@@ -121,8 +122,8 @@ def band_limited(heights: Array, period: float, shortest: float) -> Profile:
 # ---------------------------------------------------------------------- spectrum
 
 
-@dataclass(frozen=True, eq=False)
-class TraceSpectrum:
+@dataclass(frozen=True, eq=False, repr=False)
+class TraceSpectrum(ByValue):
     """Power spectrum of a level trace, averaged over bands of wave numbers.
 
     Attributes
