@@ -68,8 +68,13 @@ class Campaign:
             self.tables = parse_campaign(_toml(source))
         elif isinstance(source, str) and "\n" in source:
             self.tables = parse_campaign(source)
+        elif isinstance(source, str | os.PathLike):
+            self.tables = load_campaign(Path(source))
         else:
-            self.tables = load_campaign(checks.path("source", source))
+            raise TypeError(
+                f"source is a {type(source).__name__}: it must be a dictionary of tables, TOML "
+                "text or the path of a campaign file"
+            )
         self.text: str = self.tables.text
 
     def __repr__(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import doctest
 import html
 import multiprocessing
 import pickle
@@ -22,14 +23,17 @@ from adhesis import (
     LoopResult,
     PathResult,
     Problem,
+    _campaign,
     run_loop,
     run_loops,
     run_path,
     self_affine_profile,
     single_wave,
 )
+from adhesis.ensemble.loop import saved
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.read import Trace
+from adhesis.solver import views
 from adhesis.solver.references.exact_wave import ExactWave
 
 WAVE = single_wave(1e-6, 1e-3)
@@ -251,7 +255,7 @@ def test_a_campaign_is_the_same_from_a_dictionary_a_text_and_a_file(campaign, tm
         ({**TABLES, "cycle": 3}, InputError, "cycle is 3: it must be a table"),
         ({**TABLES, "a b": {"c\nd": None}}, InputError, "'a b' is unknown"),
         ("no.toml", InputError, "no.toml cannot be read"),
-        (3, TypeError, "source is 3"),
+        (3, TypeError, "source is a int: it must be a dictionary of tables, TOML "),
     ],
 )
 def test_what_is_no_campaign_is_refused(source, error, text):
@@ -290,3 +294,10 @@ def test_ranks_compute_the_same_rows(campaign, tmp_path):
     other = adhesis.Campaign(campaign.text.replace("young = 1000000.0", "young = 2e6"))
     with pytest.raises(InputError, match="young"):
         other.run(tmp_path / "2.h5", ranks=2)
+
+
+@pytest.mark.parametrize("module", [_campaign, saved, views], ids=lambda module: module.__name__)
+def test_the_examples_of_the_docstrings_are_right(module):
+    done = doctest.testmod(module)
+    assert done.failed == 0
+    assert done.attempted >= 3

@@ -691,6 +691,16 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         ValueError,
         "assignment destination is read-only",
     ),
+    # campaigns and files
+    ("Campaign", lambda: adhesis.Campaign(3), TypeError, "source is a int: it must be a dict"),
+    (
+        "Campaign",
+        lambda: adhesis.Campaign({"sweeps": {}}),
+        InputError,
+        "campaign: 'sweeps' is unknown; the tables are",
+    ),
+    ("load", lambda: adhesis.load(3), TypeError, "path is 3: it must be a path"),
+    ("load", lambda: adhesis.load("no.nc"), InputError, "path is no.nc: there is no such file"),
     # traces
     (
         "prepare_trace",
