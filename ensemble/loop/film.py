@@ -237,7 +237,7 @@ class _Drawing:
             rows = np.where(result.branch == branch, y, np.nan)
             axes.plot(x, rows, color="k", ls=LINE_OF_BRANCH[branch], lw=1.0, label=branch)
         places = np.array(jump_places(result), dtype=int)
-        axes.plot(x[places], y[places], "o", ms=2, mfc="#D55E00", mew=0, alpha=0.7, label="jumps")
+        axes.plot(x[places], y[places], "o", ms=3, mfc="#D55E00", mew=0, label="jumps")
         axes.axhline(0, color="0.7", lw=0.5, zorder=0)
         (self._point,) = axes.plot(x[:1], y[:1], "o", ms=8, mfc="#0072B2", mec="w")
         self._point.set_gid(_POINT)
