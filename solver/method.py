@@ -30,10 +30,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -52,9 +52,14 @@ __all__ = [
     "Fields",
     "Method",
     "MethodReport",
+    "PatchTension",
     "Path",
     "PathError",
 ]
+
+
+# Nodes of fields in which tension is looked for, where a method has no grid of its own.
+_PER_WAVE, _FEWEST = 16, 256
 
 
 class PathError(RuntimeError):
@@ -139,6 +144,24 @@ class Opening(ByValue):
 
     x: Array
     gap: Array
+
+
+class PatchTension(NamedTuple):
+    """A local maximum of tension inside a patch.
+
+    Attributes
+    ----------
+    state : int
+        Number of the state, of those that were given.
+    position : float
+        x in m.
+    tension : float
+        In Pa, positive.
+    """
+
+    state: int
+    position: float
+    tension: float
 
 
 @dataclass(frozen=True)
@@ -253,6 +276,31 @@ class Method(ABC):
     def openings(self, state: ContactState) -> list[Opening]:
         """Return the opening of every gap of ``state``; none for a state without contact."""
 
+    def largest_tension(self, states: Sequence[ContactState]) -> PatchTension | None:
+        """Find the largest local maximum of tension inside patches, away from their edges.
+
+        Taken from the fields at nodes; a method that knows its stress better overrides this.
+
+        Parameters
+        ----------
+        states : sequence of ContactState
+            States of this method, each in contact.
+
+        Returns
+        -------
+        PatchTension or None
+            None if no state has one: tension falls from the edges inwards, or there is none.
+        """
+        waves = self.problem.profile.highest_harmonic
+        n = self.nodes or max(_FEWEST, 1 << (_PER_WAVE * waves - 1).bit_length())
+        best: PatchTension | None = None
+        for number, state in enumerate(states):
+            fields = self.fields(state, n)
+            found = _maximum_at_nodes(fields)
+            if found is not None and (best is None or found[1] > best.tension):
+                best = PatchTension(number, found[0] % self.problem.profile.period, found[1])
+        return best
+
     @abstractmethod
     def report(self) -> MethodReport:
         """What was chosen and what it cost so far: resolution, tolerances, counters."""
@@ -260,3 +308,20 @@ class Method(ABC):
     def detached(self, separation: float) -> ContactState:
         """State without contact at ``separation`` (m)."""
         return ContactState(separation, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+
+
+def _maximum_at_nodes(fields: Fields) -> tuple[float, float] | None:
+    """Return place and value of the largest local maximum of tension inside patches.
+
+    A parabola through the node and its neighbours, all of them in contact, refines it.
+    """
+    contact, tension = fields.gap <= 0, -fields.stress
+    before, after = np.roll(tension, 1), np.roll(tension, -1)
+    inside = contact & np.roll(contact, 1) & np.roll(contact, -1)
+    top = np.flatnonzero(inside & (tension > before) & (tension >= after) & (tension > 0))
+    if not top.size:
+        return None
+    i = int(top[np.argmax(tension[top])])
+    shift = 0.5 * (before[i] - after[i]) / (before[i] - 2 * tension[i] + after[i])
+    position = fields.x[i] + shift * (fields.x[1] - fields.x[0])
+    return float(position), float(tension[i] - 0.25 * (before[i] - after[i]) * shift)

@@ -16,6 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import choice, counted, reals
+from adhesis.solver.interior import (
+    InteriorTension,
+    edge_range,
+    interior_tension,
+    narrowest_length,
+    range_summary,
+    range_warnings,
+    valid_range,
+)
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import ContactState, Method, MethodReport
 from adhesis.solver.model.control import Control
@@ -88,6 +97,11 @@ class LoopResult(ByValue, Viewed):
         The states themselves, with the edges of every patch; empty for a loop from a file.
     new_method : callable or None
         Builds the method anew, whose ``fields`` and ``openings`` take these states.
+    interior : InteriorTension or None
+        Largest local maximum of tension inside patches, and where it occurred; None if no patch
+        has one (docs/zero-range.md).
+    narrowest_length : float
+        Shortest length in m that decides where edges stand (:mod:`adhesis.solver.interior`).
 
     References
     ----------
@@ -118,6 +132,8 @@ class LoopResult(ByValue, Viewed):
     method: MethodReport = field(compare=False)
     contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
     new_method: Callable[[], Method] | None = field(default=None, compare=False)
+    interior: InteriorTension | None = None
+    narrowest_length: float = float("nan")
 
     def __repr__(self) -> str:
         """Two lines: what was followed, and its loss; the first warnings are counted only."""
@@ -125,7 +141,8 @@ class LoopResult(ByValue, Viewed):
             f"LoopResult(turning_point={self.turning_point:g}, {self.load_steps} load steps, "
             f"{len(self.separation)} states, method {self.method.name!r},\n"
             f"  loss={self.loss:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
-            f"{counted(len(self.jumps), 'jump')}, {counted(len(self.warnings), 'warning')})"
+            f"valid_range={self.valid_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
+            f"{counted(len(self.warnings), 'warning')})"
         )
 
     @property
@@ -167,7 +184,26 @@ class LoopResult(ByValue, Viewed):
                 f"the numerical error of the loss, {self.loss_error:.2g} J/m² of {self.loss:.3g} "
                 f"J/m², is larger than {most:g} of it, the relative error allowed"
             )
+        found += range_warnings(self.problem, self.valid_range, self.loss, self.contact_fraction)
         return tuple(found)
+
+    @property
+    def largest_interior_tension(self) -> float:
+        """Largest local maximum of tension inside patches, in Pa; 0 if there is none."""
+        return self.interior.tension if self.interior is not None else 0.0
+
+    @property
+    def valid_range(self) -> float:
+        """Range of adhesion in m below which the zero-range limit holds, γ/σ_in.
+
+        Infinite if no patch is in tension inside (docs/zero-range.md).
+        """
+        return valid_range(self.problem, self.interior)
+
+    @property
+    def edge_range(self) -> float:
+        """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
+        return edge_range(self.problem, self.narrowest_length)
 
     @property
     def races(self) -> int:
@@ -219,6 +255,7 @@ class LoopResult(ByValue, Viewed):
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²",
+                f"range      {range_summary(self)}",
                 f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
                 f"pull-off   {self.pull_off_stress:.4g} Pa, "
                 f"out of contact at Δ/h_max = {self.pull_off_penetration:.4g}",
@@ -327,6 +364,8 @@ def result_of(
     if not problem.control.is_fixed:
         max_penetration = problem.penetration(separation[turn])
     drops = float(sum(jump.energy_drop for jump in record.jumps))
+    report = method.report()  # of the path alone
+    interior = interior_tension(method, record)
     return LoopResult(
         problem=problem,
         turning_point=turning_point,
@@ -349,9 +388,11 @@ def result_of(
         work_gained=gained,
         work_spent=loss + gained,
         seconds=process_time() - started,
-        method=method.report(),
+        method=report,
         contact_states=tuple(record.states),
         new_method=method.recipe,
+        interior=interior,
+        narrowest_length=narrowest_length(problem, record),
     )
 
 

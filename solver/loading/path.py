@@ -21,6 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
+from adhesis.solver.interior import (
+    InteriorTension,
+    edge_range,
+    interior_tension,
+    narrowest_length,
+    range_warnings,
+    valid_range,
+)
 from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
 from adhesis.solver.loading.loop_result import estimated_error
 from adhesis.solver.loading.path_record import Axis, Record
@@ -127,6 +135,11 @@ class PathResult(ByValue, Viewed):
         The states themselves, with the edges of every patch; empty for a path from a file.
     new_method : callable or None
         Builds the method anew, whose ``fields`` and ``openings`` take these states.
+    interior : InteriorTension or None
+        Largest local maximum of tension inside patches, and where it occurred; None if no patch
+        has one (docs/zero-range.md).
+    narrowest_length : float
+        Shortest length in m that decides where edges stand (:mod:`adhesis.solver.interior`).
 
     References
     ----------
@@ -158,6 +171,8 @@ class PathResult(ByValue, Viewed):
     method: MethodReport = field(compare=False)
     contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
     new_method: Callable[[], Method] | None = field(default=None, compare=False)
+    interior: InteriorTension | None = None
+    narrowest_length: float = float("nan")
 
     def __repr__(self) -> str:
         """Two lines: what was followed, and its work."""
@@ -167,9 +182,33 @@ class PathResult(ByValue, Viewed):
             f"PathResult({points}{', out' if self.ends_out else ''}; {self.load_steps} load steps, "
             f"{len(self.separation)} states, method {self.method.name!r},\n"
             f"  work={self.work:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
-            f"{counted(len(self.jumps), 'jump')}, "
+            f"valid_range={self.valid_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
             f"{counted(len(self.minor_loops), 'minor loop')})"
         )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what makes the work doubtful; none for most paths."""
+        lost = self.loss_from_drops
+        return tuple(range_warnings(self.problem, self.valid_range, lost, self.contact_fraction))
+
+    @property
+    def largest_interior_tension(self) -> float:
+        """Largest local maximum of tension inside patches, in Pa; 0 if there is none."""
+        return self.interior.tension if self.interior is not None else 0.0
+
+    @property
+    def valid_range(self) -> float:
+        """Range of adhesion in m below which the zero-range limit holds, γ/σ_in.
+
+        Infinite if no patch is in tension inside (docs/zero-range.md).
+        """
+        return valid_range(self.problem, self.interior)
+
+    @property
+    def edge_range(self) -> float:
+        """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
+        return edge_range(self.problem, self.narrowest_length)
 
     @property
     def energy(self) -> Array:
@@ -396,6 +435,8 @@ class _Walk:
         work = record.work(problem)
         drops = float(sum(jump.energy_drop for jump in record.jumps))
         states = record.states
+        report = self.method.report()  # of the path alone
+        interior = interior_tension(self.method, record)
         change = (states[-1].potential - states[0].potential) / problem.profile.period
         separation = record.column("separation")
         return PathResult(
@@ -421,7 +462,9 @@ class _Walk:
             energy_change=change,
             loss_error=estimated_error(record, work - change - drops, problem),
             seconds=process_time() - started,
-            method=self.method.report(),
+            method=report,
             contact_states=tuple(states),
             new_method=self.method.recipe,
+            interior=interior,
+            narrowest_length=narrowest_length(problem, record),
         )

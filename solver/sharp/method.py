@@ -9,6 +9,7 @@ energy at fixed separation (``jump``).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
@@ -20,6 +21,7 @@ from adhesis.solver.method import (
     Method,
     MethodReport,
     Opening,
+    PatchTension,
     Path,
     PathError,
 )
@@ -35,11 +37,13 @@ from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
+from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States, hold_of
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
+from adhesis.solver.sharp.tension import largest_tension
 from adhesis.solver.sharp.tolerances import (
     CORRECTED,
     FIELD_ACCURACY,
@@ -177,6 +181,17 @@ class SharpMethod(Method):
         if state.patches:
             field = self.edges.field(state.internal.gaps, self.states.place(state))
         return fields_of(self.problem, field, state.separation, n)
+
+    @one_at_a_time
+    @on_one_thread
+    def largest_tension(self, states: Sequence[ContactState]) -> PatchTension | None:
+        """Find the largest local maximum of tension inside patches; see the contract."""
+
+        def field_of(number: int) -> GapField:
+            state = states[number]
+            return self.edges.field(state.internal.gaps, self.states.place(state))
+
+        return largest_tension(self.problem, field_of, len(states))
 
     @one_at_a_time
     def openings(self, state: ContactState) -> list[Opening]:

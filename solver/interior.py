@@ -1,0 +1,224 @@
+"""Where the zero-range limit ends: the largest tension inside patches, and the ranges it allows.
+
+A zero range of adhesion is an infinite strength: inside a contact nothing opens, whatever the
+tension there. An interface of range δ gives way near σ_th = γ/δ. So with σ_in the largest local
+maximum of tension inside patches, away from their edges, where tension is singular, the limit holds
+for ranges below
+
+    valid_range = γ/σ_in.
+
+At an edge a range δ smears the singularity over a cohesive zone of the length (π/8)(K/σ_th)² =
+(π/4) E* δ²/γ (Dugdale, with K² = 2E*γ). It has to be short beside the narrowest length l that
+decides where edges stand, which holds for ranges well below
+
+    edge_range = sqrt(4 γ l/(π E*)).
+
+l is the least of λ_min and of the patches and gaps beside the edges that move in the jumps which
+make up nine tenths of all drops, as long as these are before the jump.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from adhesis.solver.loading.path_record import Record
+from adhesis.solver.method import ContactState, Method
+from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+
+DOUBTFUL_RANGE = 1e-9
+"""``valid_range`` below which a loss is doubtful, in m: real adhesion has 0.2 to 10 nm."""
+
+DOUBTFUL_LOSS = 20.0
+"""Loss over γ A_max/A0 above which a loss is doubtful (docs/zero-range.md)."""
+
+# Tension is looked at before so many jumps of unloading, those with the largest drops: what carries
+# the largest tension is what gives way with a large drop. And at so many states of the whole path.
+_JUMPS, _SAMPLES = 16, 6
+_MOST_OF_LOSS = 0.9
+_SAME = 1e-9  # of the period: edges that differ by less have not moved
+
+
+@dataclass(frozen=True)
+class InteriorTension:
+    """Largest local maximum of tension inside patches, away from their edges, on a path.
+
+    Attributes
+    ----------
+    tension : float
+        σ_in in Pa, positive.
+    position : float
+        x in m.
+    branch : {"loading", "unloading"}
+    penetration : float
+        Δ/h_max of the state.
+
+    References
+    ----------
+    docs/zero-range.md
+    """
+
+    tension: float
+    position: float
+    branch: Branch
+    penetration: float
+
+
+def interior_tension(method: Method, record: Record) -> InteriorTension | None:
+    """Find the largest tension inside patches on a path; None if there is none.
+
+    Looked at are the states before the sixteen jumps of unloading with the largest drops, and six
+    states evenly spaced on the path. Without adhesion nothing is in tension.
+    """
+    if method.problem.work_of_adhesion == 0:
+        return None
+    starts = [
+        (jump.energy_drop, place)
+        for jump, place in zip(record.jumps, jump_places(record), strict=True)
+        if jump.branch == "unloading"
+    ]
+    starts.sort(key=lambda entry: -entry[0])
+    spaced = np.linspace(0, len(record.states) - 1, _SAMPLES + 2)[1:-1].astype(int)
+    places = sorted({*(place for _, place in starts[:_JUMPS]), *spaced.tolist()})
+    places = [place for place in places if record.states[place].patches]
+    found = method.largest_tension([record.states[place] for place in places])
+    if found is None:
+        return None
+    place = places[found.state]
+    separation = record.states[place].separation
+    return InteriorTension(
+        tension=found.tension,
+        position=found.position,
+        branch=record.branches[place],
+        penetration=float(method.problem.penetration(separation)),
+    )
+
+
+def jump_places(record: Record) -> list[int]:
+    """Return the place among the states of the one from which each jump starts."""
+    out = []
+    place = 0
+    states = record.states
+    for jump in record.jumps:
+        while place < len(states) - 2 and not _joins(jump, states[place], states[place + 1]):
+            place += 1
+        out.append(place)
+    return out
+
+
+def _joins(jump: Jump, before: ContactState, after: ContactState) -> bool:
+    return (
+        before.contact_fraction == jump.contact_before
+        and after.contact_fraction == jump.contact_after
+        and before.separation == jump.separation
+    )
+
+
+def narrowest_length(problem: Problem, record: Record) -> float:
+    """Return the shortest length in m that decides where edges stand; see the module."""
+    shortest = problem.profile.shortest_wavelength
+    order = sorted(
+        zip(record.jumps, jump_places(record), strict=True), key=lambda one: -one[0].energy_drop
+    )
+    rest = _MOST_OF_LOSS * sum(jump.energy_drop for jump, _ in order)
+    for jump, place in order:
+        if rest <= 0:
+            break
+        rest -= jump.energy_drop
+        before, after = record.states[place].edges, record.states[place + 1].edges
+        shortest = min(shortest, _narrowest_moved(before, after, problem.profile.period))
+    return shortest
+
+
+def _narrowest_moved(before: Array, after: Array, period: float) -> float:
+    """Return the least length of the patches and gaps of ``before`` beside edges that move."""
+    if not len(before):
+        return math.inf
+    places = np.sort(after.ravel() % period)
+    places = np.concatenate([places[-1:] - period, places, places[:1] + period])
+    edges = before.ravel() % period
+    right = np.searchsorted(places, edges).clip(1, max(len(places) - 1, 1))
+    if len(places) < 2:
+        moved = np.ones(edges.shape, dtype=bool)
+    else:
+        nearest = np.minimum(np.abs(edges - places[right - 1]), np.abs(edges - places[right]))
+        moved = nearest > _SAME * period
+    patch = before[:, 1] - before[:, 0]
+    gap = np.append(before[1:, 0], before[0, 0] + period) - before[:, 1]  # right of each patch
+    left, right_ = moved.reshape(-1, 2).T
+    lengths = (patch[left | right_], gap[right_], np.roll(gap, 1)[left])
+    return float(np.concatenate(lengths).min(initial=math.inf))
+
+
+def valid_range(problem: Problem, interior: InteriorTension | None) -> float:
+    """Return γ/σ_in in m; infinite without tension inside patches."""
+    return math.inf if interior is None else problem.work_of_adhesion / interior.tension
+
+
+def edge_range(problem: Problem, narrowest: float) -> float:
+    """Return the range in m whose cohesive zone is as long as ``narrowest`` (m)."""
+    return math.sqrt(
+        4 * problem.work_of_adhesion * narrowest / (math.pi * problem.half_space.modulus)
+    )
+
+
+class HasRanges(Protocol):
+    """A loop or a path."""
+
+    @property
+    def interior(self) -> InteriorTension | None: ...
+
+    @property
+    def valid_range(self) -> float: ...
+
+    @property
+    def edge_range(self) -> float: ...
+
+
+def range_summary(result: HasRanges) -> str:
+    """Return in a line for a terminal below which ranges of adhesion the zero-range limit holds."""
+    interior = result.interior
+    if interior is None:
+        return "no tension inside patches"
+    return (
+        f"adhesion of a range below {result.valid_range:.3g} m is of zero range here: largest "
+        f"tension inside patches {interior.tension:.3g} Pa, on {interior.branch} at Δ/h_max = "
+        f"{interior.penetration:.4g}; at edges {result.edge_range:.3g} m"
+    )
+
+
+def unexplained(
+    work_of_adhesion: float, loss: float, largest_contact_fraction: float
+) -> tuple[bool, float]:
+    """Return whether a loss is more than adhesion explains, and its ratio to γ A_max/A0."""
+    adhesion = work_of_adhesion * largest_contact_fraction
+    ratio = loss / adhesion if adhesion > 0 else 0.0
+    return ratio > DOUBTFUL_LOSS, ratio
+
+
+def range_warnings(
+    problem: Problem, range_: float, loss: float, contact_fraction: Sequence[float] | Array
+) -> list[str]:
+    """Return the sentences of doubt where a loss is that of the zero-range limit alone."""
+    out = []
+    if range_ < DOUBTFUL_RANGE:
+        out.append(
+            f"valid_range is {range_:.2g} m: the zero-range limit holds only for ranges of "
+            f"adhesion below it, and below {DOUBTFUL_RANGE:g} m hardly any interface has one, so "
+            "patches would open from inside and lose less (docs/zero-range.md)"
+        )
+    largest = float(np.max(contact_fraction, initial=0.0))
+    doubtful, ratio = unexplained(problem.work_of_adhesion, loss, largest)
+    if doubtful:
+        out.append(
+            f"the loss is {ratio:.3g} times the work of adhesion of the largest contact, more "
+            f"than the {DOUBTFUL_LOSS:g} that adhesion explains: it is elastic energy of valleys "
+            "that the rule against opening inside a contact holds closed (docs/zero-range.md)"
+        )
+    return out
