@@ -22,9 +22,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import ContactState, Method
@@ -172,13 +173,19 @@ class HasRanges(Protocol):
     """A loop or a path."""
 
     @property
-    def interior(self) -> InteriorTension | None: ...
+    def interior(self) -> InteriorTension | None:
+        """Largest tension inside patches."""
+        ...
 
     @property
-    def valid_range(self) -> float: ...
+    def valid_range(self) -> float:
+        """Range allowed by it, in m."""
+        ...
 
     @property
-    def edge_range(self) -> float: ...
+    def edge_range(self) -> float:
+        """Range allowed at edges, in m."""
+        ...
 
 
 def range_summary(result: HasRanges) -> str:
@@ -193,13 +200,17 @@ def range_summary(result: HasRanges) -> str:
     )
 
 
-def unexplained(
-    work_of_adhesion: float, loss: float, largest_contact_fraction: float
-) -> tuple[bool, float]:
-    """Return whether a loss is more than adhesion explains, and its ratio to γ A_max/A0."""
-    adhesion = work_of_adhesion * largest_contact_fraction
-    ratio = loss / adhesion if adhesion > 0 else 0.0
-    return ratio > DOUBTFUL_LOSS, ratio
+def beyond_limit(
+    valid_range: Any, loss: Any, work_of_adhesion: Any, largest_contact_fraction: Any
+) -> NDArray[np.bool_]:
+    """Return which losses are those of the zero-range limit alone; values or arrays of one shape.
+
+    Their valid range is below :data:`DOUBTFUL_RANGE`, or they are more than :data:`DOUBTFUL_LOSS`
+    times the work of adhesion of the largest contact.
+    """
+    most = DOUBTFUL_LOSS * np.asarray(work_of_adhesion) * np.asarray(largest_contact_fraction)
+    above = (np.asarray(loss) > most) & (np.asarray(work_of_adhesion) > 0)
+    return np.asarray((np.asarray(valid_range) < DOUBTFUL_RANGE) | above)
 
 
 def range_warnings(
@@ -214,8 +225,9 @@ def range_warnings(
             "patches would open from inside and lose less (docs/zero-range.md)"
         )
     largest = float(np.max(contact_fraction, initial=0.0))
-    doubtful, ratio = unexplained(problem.work_of_adhesion, loss, largest)
-    if doubtful:
+    gamma = problem.work_of_adhesion
+    if beyond_limit(math.inf, loss, gamma, largest):
+        ratio = loss / (gamma * largest)
         out.append(
             f"the loss is {ratio:.3g} times the work of adhesion of the largest contact, more "
             f"than the {DOUBTFUL_LOSS:g} that adhesion explains: it is elastic energy of valleys "

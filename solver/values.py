@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import Field, fields
 from typing import Any
 
 import numpy as np
 
 _MANY = 4  # entries of a tuple that are shown
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None for one that JSON does not have: infinity and NaN."""
+    return value if math.isfinite(value) else None
 
 
 class ByValue:

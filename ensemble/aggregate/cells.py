@@ -29,6 +29,7 @@ _PER_TASK = (
     *("largest_contact_fraction", "work_gained", "work_spent", "full_contact_energy"),
     *("wall_time", "cpu_time", "states", "jump_count"),
     *("loss_error", "races", "energy_at_stake"),
+    *("valid_range", "edge_range", "largest_interior_tension"),
 )
 _WITH_INTERVAL = (
     "loss",

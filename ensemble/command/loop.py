@@ -91,12 +91,13 @@ def execute(args: argparse.Namespace) -> int:
     if args.film is not None:
         with writing.output("--film", args.film):
             _film(results, args.film, args.quiet)
-    loops: tuple[LoopResult, ...] = ()
+    loops: tuple[LoopResult | PathResult, ...]
     if isinstance(results, PathResult):
+        loops = (results,)
         print(path_summary(results))
     else:
         loops = results
-        print("\n\n".join(map(loop_summary, loops)))
+        print("\n\n".join(map(loop_summary, results)))
     for path in writing.written:
         print(f"wrote       {path}")
     doubts = list(dict.fromkeys([*warnings, *(text for loop in loops for text in loop.warnings)]))

@@ -16,11 +16,13 @@ import numpy as np
 
 from adhesis.ensemble.outputs import whole_file
 from adhesis.solver.checks import counted
+from adhesis.solver.interior import range_summary
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.problem import Problem
+from adhesis.solver.values import finite
 
 _STATE_KEYS = ("branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy")
 _MORE_STATE_KEYS = ("separation", "elastic_energy", "adhesion_energy", "load_step")
@@ -47,6 +49,7 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
         "audit_residual": result.audit_residual,
         "loss_error": result.loss_error,
         "races": result.races,
+        **_ranges(result),
         "warnings": list(result.warnings),
         "energy_at_stake": result.energy_at_stake,
         "work_gained": result.work_gained,
@@ -96,7 +99,8 @@ def path_document(result: PathResult, warnings: Sequence[str] = ()) -> dict[str,
         "energy_change": result.energy_change,
         "audit_residual": result.audit_residual,
         "loss_error": result.loss_error,
-        "warnings": list(warnings),
+        **_ranges(result),
+        "warnings": [*warnings, *result.warnings],
         "minor_loops": [
             asdict(part) | {"audit_residual": part.audit_residual} for part in result.minor_loops
         ],
@@ -126,6 +130,17 @@ def _scene(problem: Problem) -> dict[str, Any]:
         "young": problem.half_space.young,
         "poisson": problem.half_space.poisson,
         "work_of_adhesion": problem.work_of_adhesion,
+    }
+
+
+def _ranges(result: LoopResult | PathResult) -> dict[str, Any]:
+    """Ranges of adhesion below which the zero-range limit holds; None where nothing bounds them."""
+    interior = result.interior
+    return {
+        "valid_range": finite(result.valid_range),
+        "edge_range": finite(result.edge_range),
+        "largest_interior_tension": result.largest_interior_tension,
+        "interior_tension": None if interior is None else asdict(interior),
     }
 
 
@@ -165,6 +180,7 @@ def path_summary(result: PathResult) -> str:
         "to the largest",
         f"work        {result.work:.6g} J/m², of which {result.energy_change:.6g} J/m² are stored",
         _audit(result),
+        _range(result),
     ]
     for part in result.minor_loops:
         end = (
@@ -197,6 +213,7 @@ def loop_summary(result: LoopResult) -> str:
             f"largest contact fraction {result.contact_fraction.max():.4g}, "
             f"most patches {result.patches.max()}",
             f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
+            _range(result),
             _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "
             f"{counted(result.races, 'jump')} raced, {result.energy_at_stake:.3g} J/m² at stake",
@@ -205,6 +222,10 @@ def loop_summary(result: LoopResult) -> str:
             f"method      {result.method.name}, {result.seconds:.1f} s",
         )
     )
+
+
+def _range(result: LoopResult | PathResult) -> str:
+    return f"range       {range_summary(result)}"
 
 
 def _audit(result: LoopResult | PathResult) -> str:

@@ -14,7 +14,9 @@ from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.precision import as_percent
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.axes import cell_name, lines_along, place, together
-from adhesis.ensemble.task.doubt import bound, doubtful
+from adhesis.ensemble.report.tables.losses import least
+from adhesis.ensemble.task.doubt import BEYOND_LIMIT, bound, doubtful
+from adhesis.solver.interior import beyond_limit
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
@@ -199,6 +201,7 @@ def quality(data: Aggregate) -> list[str]:
             f"their estimated error exceeds the accuracy asked for, {100 * most:.2g} % of the "
             f"loss: {_listed(wrong)}."
         )
+    out += _limit(data)
     steep = [cell_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
     if steep:
         out.append(
@@ -221,6 +224,41 @@ def quality(data: Aggregate) -> list[str]:
         out.append(
             f"{cut} loops detached below Δ/h_max = {below}, where the stored unloading curve ends: "
             "their curves are cut, their losses are complete."
+        )
+    return out
+
+
+def _limit(data: Aggregate) -> list[str]:
+    """Sentences on the ranges of adhesion below which the zero-range limit holds."""
+    found = [
+        (value, cell)
+        for cell in data.cells
+        if (value := least(cell.values["valid_range"])) is not None
+    ]
+    if not found:
+        return []
+    low, cell = min(found, key=lambda entry: entry[0])
+    out = [
+        f"The zero-range limit holds for ranges of adhesion below {low:.3g} m: the least "
+        f"valid_range of all loops, at {cell_name(cell)}."
+    ]
+    beyond = [
+        (int(wrong.sum()), cell)
+        for cell in data.cells
+        if (
+            wrong := beyond_limit(
+                cell.values["valid_range"],
+                cell.values["loss"],
+                cell.work_of_adhesion,
+                cell.values["largest_contact_fraction"],
+            )
+        ).any()
+    ]
+    if beyond:
+        count = sum(number for number, _ in beyond)
+        out.append(
+            f"WARNING: {count} of {data.done} losses are doubtful, for {BEYOND_LIMIT}: "
+            f"{_listed([cell_name(cell) for _, cell in beyond])}."
         )
     return out
 

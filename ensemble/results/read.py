@@ -22,7 +22,6 @@ from adhesis.ensemble.results.schema import (
     DAMAGED,
     DATASETS,
     DONE,
-    LATER_DATASETS,
     NOT_NEEDED,
     ORIGIN,
     ORIGIN_LENGTH,
@@ -35,6 +34,8 @@ from adhesis.ensemble.results.schema import (
     datasets,
     encode_text,
     file_size,
+    has_checksums,
+    lacking,
     origin_of,
     scales,
     shape_of,
@@ -50,6 +51,12 @@ _LOOKS = 3
 _MOST_NAMED = 10
 # What is wrong with a file of version 1.0, after its name.
 NO_CHECKSUMS = "was written before rows had checksums: damage of its rows cannot be found"
+VALID_RANGE = "valid_range"
+# What a file of version 1.1 does not say, after its name.
+NO_RANGES = (
+    f"was written before rows had {VALID_RANGE}: below which ranges of adhesion its losses hold is "
+    "not known"
+)
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 class Results:
@@ -73,6 +80,8 @@ class Results:
         The root attributes (docs/results-file.md).
     has_checksums : bool
         Whether damage of its rows can be found; not so in files of version 1.0.
+    lacking : set of str
+        Datasets of the present version that the file does not hold: it was written before them.
 
     Raises
     ------
@@ -96,9 +105,10 @@ class Results:
             with _damage(self.path):
                 self._check_size()
                 self.attributes = self._root_attributes()
-                self.has_checksums = check_version(
+                version = check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
+                self.has_checksums, self.lacking = has_checksums(version), lacking(version)
                 if self.has_checksums != (sound is True):
                     raise ValueError("head")
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
@@ -144,10 +154,10 @@ class Results:
 
     def _check_layout(self) -> None:
         """Compare shapes and types with those of the campaign, before anything of them is read."""
-        if file_size(self.campaign, self.part) > os.path.getsize(self.path):
+        if file_size(self.campaign, self.part, self.lacking) > os.path.getsize(self.path):
             raise ValueError("truncated")
         wanted = scales(self.campaign, self.part)
-        known = [d for d in self._datasets if self.has_checksums or d.name not in LATER_DATASETS]
+        known = [d for d in self._datasets if d.name not in self.lacking]
         names = [scale.name for scale in wanted] + [d.name for d in known]
         missing = [name for name in names if name not in self._file]
         if missing:
@@ -228,7 +238,8 @@ class Results:
     def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Return a dataset, or some rows of it.
 
-        Checksum and origin of the rows of a file that has none are made up.
+        What the file lacks, as it was written before, is made up: the fill value, the origin from
+        the root attributes, and the checksum as a file of the present version would have it.
 
         Parameters
         ----------
@@ -236,10 +247,19 @@ class Results:
         rows : slice or ascending int array, optional
             All rows if not given. Memory is that of the result.
         """
-        if not self.has_checksums and name in LATER_DATASETS:
+        if name in self.lacking or (self.lacking and name == CHECKSUM.name):
             every = np.arange(len(self))
             chosen = every if rows is None else every[rows]
-            return self._checksums(chosen) if name == CHECKSUM.name else self._origins(chosen)
+            if name == CHECKSUM.name:
+                return self._checksums(chosen)
+            if name == ORIGIN.name:
+                return self._origins(chosen)
+            dataset = next(d for d in self._datasets if d.name == name)
+            return np.full(chosen.size, dataset.fill, dataset.dtype)
+        return self._stored(name, rows)
+
+    def _stored(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
+        """Return a dataset, or some rows of it, as the file holds it."""
         with _damage(self.path):
             dataset = self._file[name]
             if rows is None or isinstance(rows, slice):
@@ -280,11 +300,18 @@ class Results:
 
     def doubts(self) -> tuple[str, ...]:
         """Return a sentence for each reason not to take the rows for sound, whole, and alike."""
-        out = [] if self.has_checksums else [f"{self.path} {NO_CHECKSUMS}"]
+        out = list(self.age())
         if damage := self.damage():
             out.append(f"{damage}; damaged rows are not used")
         if mixed := mixture(self.origins()):
             out.append(f"{self.path} {mixed}")
+        return tuple(out)
+
+    def age(self) -> tuple[str, ...]:
+        """Return a sentence for each thing that the file lacks, as it was written before it."""
+        out = [] if self.has_checksums else [f"{self.path} {NO_CHECKSUMS}"]
+        if VALID_RANGE in self.lacking:
+            out.append(f"{self.path} {NO_RANGES}")
         return tuple(out)
 
     def _checked_status(self) -> NDArray[np.uint8]:
@@ -305,7 +332,7 @@ class Results:
         """Whether rows that are not pending cannot be what was written."""
         out = status > NOT_NEEDED
         if self.has_checksums:
-            out |= self.column(CHECKSUM.name, rows) != self._checksums(rows)
+            out |= self._stored(CHECKSUM.name, rows) != self._checksums(rows, self.lacking)
             return out
         for dataset in self._datasets:
             names = dataset.attributes.get("flag_values")
@@ -314,10 +341,12 @@ class Results:
                 out |= np.any((values < dataset.fill) | (values >= len(names)), axis=1)
         return out
 
-    def _checksums(self, rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+    def _checksums(
+        self, rows: NDArray[np.intp], without: frozenset[str] = frozenset()
+    ) -> NDArray[np.uint32]:
         """Compute the checksums of some rows (ascending) from what they hold."""
         kept = self.column(KEPT)
-        return row_checksums(self.column, self._sizes, kept, rows)
+        return row_checksums(self.column, self._sizes, kept, rows, without)
 
     def _origins(self, rows: NDArray[np.intp]) -> NDArray[np.bytes_]:
         """Take the versions that laid the file out for those that computed its rows."""

@@ -29,7 +29,7 @@ from adhesis.ensemble.task.dataset import (
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_scales
 
 FILE_TYPE = "adhesis-results"
-FILE_VERSION = (1, 1)
+FILE_VERSION = (1, 2)
 # Versions, beside that of adhesis, on which the last bits of a loop depend.
 _COMPUTING = ("numpy", "scipy", "numba", "llvmlite", "fftw", "processor")
 # Files of this version and later ones have checksums.
@@ -50,8 +50,16 @@ ROOT_ATTRIBUTES = (
 )
 
 
-def _task(name: str, dtype: str, unit: str, meaning: str, **attributes: object) -> Dataset:
-    return Dataset(name, ("task",), dtype, unit, meaning, attributes)
+def _task(
+    name: str,
+    dtype: str,
+    unit: str,
+    meaning: str,
+    *,
+    since: tuple[int, int] = (1, 0),
+    **attributes: object,
+) -> Dataset:
+    return Dataset(name, ("task",), dtype, unit, meaning, attributes, since=since)
 
 
 # What the task is, known before it runs.
@@ -62,10 +70,13 @@ TASK_DATASETS: tuple[Dataset, ...] = (
     _task("seed", "i8", "1", "seed of the profile's phases"),
 )
 STATUS = _task("status", "u1", "1", "state of the task", **flags(_STATES, "u1"))
-CHECKSUM = _task("checksum", "u4", "1", "CRC-32 of the row; not of a pending one")
+CHECKSUM = _task(
+    *("checksum", "u4", "1", "CRC-32 of the row; not of a pending one"), since=_WITH_CHECKSUMS
+)
 ORIGIN = _task(
     *("computed_by", f"S{ORIGIN_LENGTH}", "1"),
     "versions and processor that computed the task (UTF-8)",
+    since=_WITH_CHECKSUMS,
 )
 # How it went; the status is written last.
 RUN_DATASETS: tuple[Dataset, ...] = (
@@ -77,11 +88,19 @@ RUN_DATASETS: tuple[Dataset, ...] = (
 )
 # What a run writes; everything else in the file never changes.
 ROW_DATASETS: tuple[Dataset, ...] = RUN_DATASETS + RESULT_DATASETS
-# Datasets that files of version 1.0 lack: readers make them up of the rest.
-LATER_DATASETS = frozenset((CHECKSUM.name, ORIGIN.name))
 # The datasets of every campaign; one for each further axis comes to them.
 DATASETS: tuple[Dataset, ...] = TASK_DATASETS + RUN_DATASETS + RESULT_DATASETS
 _NAMES = frozenset(dataset.name for dataset in DATASETS)
+
+
+def lacking(version: tuple[int, int]) -> frozenset[str]:
+    """Return the datasets that files of a version do not hold yet."""
+    return frozenset(dataset.name for dataset in DATASETS if dataset.since > version)
+
+
+def has_checksums(version: tuple[int, int]) -> bool:
+    """Return whether files of a version have checksums."""
+    return version >= _WITH_CHECKSUMS
 
 
 def axis_datasets(campaign: Campaign) -> tuple[Dataset, ...]:
@@ -133,12 +152,15 @@ def shape_of(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:
     return (sizes[dataset.dims[0]], *row_shape(dataset, sizes))
 
 
-def file_size(campaign: Campaign, part: Part = WHOLE) -> int:
-    """Bytes of a campaign's results file, without headers."""
+def file_size(
+    campaign: Campaign, part: Part = WHOLE, without: frozenset[str] = frozenset()
+) -> int:
+    """Bytes of a campaign's results file, without headers and the datasets ``without``."""
     sizes = sizes_of(scales(campaign, part))
     return sum(
         int(np.prod(shape_of(dataset, sizes), dtype=object)) * np.dtype(dataset.dtype).itemsize
         for dataset in datasets(campaign)
+        if dataset.name not in without
     )
 
 
@@ -157,8 +179,8 @@ def origin_of(versions: Mapping[str, Any]) -> str:
     return ", ".join((by, *others))
 
 
-def check_version(path: object, file_type: object, version: object) -> bool:
-    """Return whether a file of this version has checksums.
+def check_version(path: object, file_type: object, version: object) -> tuple[int, int]:
+    """Return the version of a file.
 
     Raises
     ------
@@ -174,4 +196,4 @@ def check_version(path: object, file_type: object, version: object) -> bool:
             f"{path} has file version {shown}: this adhesis reads versions {FILE_VERSION[0]}.0 to "
             f"{FILE_VERSION[0]}.{FILE_VERSION[1]}"
         )
-    return numbers >= _WITH_CHECKSUMS
+    return (numbers[0], numbers[1])

@@ -18,14 +18,23 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
-from adhesis.ensemble.results.read import NO_CHECKSUMS, Results, mixture, named_rows
+from adhesis.ensemble.results.read import (
+    NO_CHECKSUMS,
+    NO_RANGES,
+    VALID_RANGE,
+    Results,
+    mixture,
+    named_rows,
+)
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from adhesis.ensemble.task.doubt import doubtful
+from adhesis.ensemble.task.doubt import BEYOND_LIMIT, doubtful
+from adhesis.solver.interior import beyond_limit
+from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
-_READ = ("wall_time", "loss", "loss_dimensionless", "audit_residual", "loss_error")
+_LIMIT = ("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
 
@@ -37,7 +46,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     dict
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
         dict for each row that does not have its checksum (it counts as nothing else), and
-        ``checksums``, whether the file has any; ``computed_by``, the number of done rows by the
+        ``checksums`` and ``valid_ranges``, whether the file has any; ``computed_by``, the number of done rows by the
         versions and the processor that computed them; ``seconds`` per done task (``mean``,
         ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each cell (a
         value of each of the ``axes``) with
@@ -48,6 +57,8 @@ def read_status(path: Path | str) -> dict[str, Any]:
         sentence (``precision``);
         ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
         checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the worst first;
+        ``beyond_limit``, one for each loss that is that of the zero-range limit alone
+        (:func:`adhesis.solver.interior.beyond_limit`), the least valid range first;
         ``last_row``, when the file was last written to (as ``time.time()`` counts), None before the
         first row.
 
@@ -69,12 +80,14 @@ def read_status(path: Path | str) -> dict[str, Any]:
             "loss_dimensionless",
             "audit_residual",
             "loss_error",
+            *("valid_range", "largest_contact_fraction"),
         )
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
         damaged = results.damaged()
         has_checksums, origins = results.has_checksums, results.origins()
+        has_ranges = VALID_RANGE not in results.lacking
     times = column["wall_time"][state == DONE]
     failures = [
         {
@@ -93,9 +106,11 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "not_needed": int(np.sum(state == NOT_NEEDED)),
         "damaged": named(column, damaged),
         "checksums": has_checksums,
+        "valid_ranges": has_ranges,
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
+        "beyond_limit": _beyond_limit(state, column),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
         "groups": _groups(state, column, axes, stop),
@@ -123,6 +138,21 @@ def _doubtful(
                 name: column[name][row].item()
                 for name in (*_TASK, "loss", "audit_residual", "loss_error")
             },
+        }
+        for row in rows.tolist()
+    ]
+
+
+def _beyond_limit(
+    state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
+) -> list[dict[str, Any]]:
+    rows = np.flatnonzero(beyond_limit(*(column[name] for name in _LIMIT)) & (state == DONE))
+    rows = rows[np.argsort(column["valid_range"][rows], kind="stable")]
+    return [
+        {
+            "row": row,
+            **{name: column[name][row].item() for name in (*_TASK, "loss")},
+            "valid_range": finite(column["valid_range"][row].item()),
         }
         for row in rows.tolist()
     ]
@@ -213,6 +243,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     ]
     if not status["checksums"]:
         lines.append(f"the file {NO_CHECKSUMS}")
+    if not status["valid_ranges"]:
+        lines.append(f"the file {NO_RANGES}")
     if mixed := mixture(status["computed_by"]):
         lines.append(f"the file {mixed}")
     if seconds := status["seconds"]:
@@ -230,6 +262,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines += ["", *damage_lines(status["damaged"])]
     if status["doubtful"]:
         lines += ["", *_doubt_lines(status["doubtful"])]
+    if status["beyond_limit"]:
+        lines += ["", *_limit_lines(status["beyond_limit"])]
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"])]
     return printable("\n".join(lines))
@@ -268,6 +302,17 @@ def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
         )
     if len(doubts) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(doubts) - _MOST_FAILURES_SHOWN} more (--json lists all)")
+    return lines
+
+
+def _limit_lines(rows: list[dict[str, Any]]) -> list[str]:
+    lines = [f"{len(rows)} losses are doubtful: {BEYOND_LIMIT}"]
+    for d in rows[:_MOST_FAILURES_SHOWN]:
+        known = d["valid_range"]
+        shown = "unknown" if known is None else f"{known:.2g} m"
+        lines.append(f"  {_task(d)}: valid_range {shown}, loss {d['loss']:.3g} J/m²")
+    if len(rows) > _MOST_FAILURES_SHOWN:
+        lines.append(f"  … and {len(rows) - _MOST_FAILURES_SHOWN} more (--json lists all)")
     return lines
 
 

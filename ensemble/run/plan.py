@@ -17,7 +17,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.read import NO_CHECKSUMS, Results
+from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.batches import Batches
@@ -191,11 +191,11 @@ def prepare(
                 "spectra would change (they follow the highest n0 · ratio of the campaign)"
             )
         before = len(old)
-        if not old.has_checksums:
-            say(f"{old.path} {NO_CHECKSUMS}; the run copies its rows into a file that has them")
+        for sentence in old.age():
+            say(f"{sentence}; the run copies its rows into a file of the present version")
         if difference.grown:
             check_cells(tasks)
-        if difference.grown or not old.has_checksums:
+        if difference.grown or old.lacking:
             create(path, campaign, part=part, versions=versions(), grown_from=old)
             if old.damaged().size:
                 say(f"{old.damage()}{_AGAIN}")

@@ -37,6 +37,7 @@ class Counts:
     done: int = 0
     failed: int = 0
     doubtful: int = 0
+    beyond_limit: int = 0
 
 
 class ProgressLine:

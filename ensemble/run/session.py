@@ -31,6 +31,7 @@ from adhesis.ensemble.task.compute import Runner, check_task, methods_of
 from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
+from adhesis.solver.interior import beyond_limit
 from adhesis.solver.loading.loop import Progress
 
 
@@ -47,6 +48,8 @@ class Told:
         See :mod:`adhesis.ensemble.task.doubt`.
     steered : float
         The quantity of ``[stop]``.
+    beyond_limit : bool
+        See :func:`adhesis.solver.interior.beyond_limit`.
     """
 
     loss: float
@@ -54,6 +57,7 @@ class Told:
     loss_error: float
     doubtful: bool
     steered: float
+    beyond_limit: bool = False
 
 
 class RowWriter(Protocol):
@@ -139,6 +143,9 @@ class Summary:
     doubtful : int
         Losses, of those computed now, whose own checks say that they are wrong
         (:mod:`adhesis.ensemble.task.doubt`).
+    beyond_limit : int
+        Losses, of those computed now, that are those of the zero-range limit alone
+        (:func:`adhesis.solver.interior.beyond_limit`).
     stopped : str or None
         Why it stopped before the last task.
     precisions : tuple of (str, Precision)
@@ -152,6 +159,7 @@ class Summary:
     failed_now: int
     seconds: float
     doubtful: int
+    beyond_limit: int
     stopped: str | None
     precisions: tuple[tuple[str, Precision], ...] = ()
 
@@ -375,6 +383,7 @@ class _Session:
             failed_now=self._counts.failed,
             seconds=time.monotonic() - self._started,
             doubtful=self._counts.doubtful,
+            beyond_limit=self._counts.beyond_limit,
             stopped=stopped if done + failed < self._counts.total else None,
             precisions=() if batches is None else tuple(batches.precisions),
         )
@@ -395,21 +404,24 @@ class _Session:
             self._writer.write_result(outcome.task, outcome.result, outcome.rank)
         else:
             self._writer.write_failure(outcome.task, outcome.error, outcome.seconds, outcome.rank)
-        return replace(outcome, result=self._told(outcome.result))
+        return replace(outcome, result=self._told(outcome.result, self._plan.tasks[outcome.task]))
 
-    def _told(self, row: Row | None) -> Told | None:
+    def _told(self, row: Row | None, task: Task) -> Told | None:
         if row is None:
             return None
         loss, residual = float(row["loss"]), float(row["audit_residual"])
         error = float(row["loss_error"])
         wrong = doubtful(self._campaign.solver.accuracy, loss, residual, error)
         steered = float(row[self._campaign.stop.quantity])
-        return Told(loss, residual, error, bool(wrong), steered)
+        contact = row["largest_contact_fraction"]
+        beyond = beyond_limit(row["valid_range"], loss, task.work_of_adhesion, contact)
+        return Told(loss, residual, error, bool(wrong), steered, bool(beyond))
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         if outcome.error is None:
             self._counts.done += 1
             told: Told = outcome.result
+            self._counts.beyond_limit += told.beyond_limit
             if told.doubtful:
                 self._counts.doubtful += 1
                 what = str(self._plan.tasks[outcome.task])

@@ -12,6 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from adhesis.solver.interior import DOUBTFUL_LOSS, DOUBTFUL_RANGE
+
+BEYOND_LIMIT = (
+    f"valid_range is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "
+    "work of adhesion of the largest contact, so that an interface of finite range would open from "
+    "inside and lose less (docs/zero-range.md)"
+)
+"""Why losses are doubtful that are those of the zero-range limit alone."""
+
 
 def bound(accuracy: float) -> float:
     """Return the relative error above which a loss is doubtful: the accuracy asked for."""

@@ -30,8 +30,9 @@ def _task(
     unit: str,
     meaning: str,
     value: Callable[[LoopResult], Any] | None = None,
+    since: tuple[int, int] = (1, 0),
 ) -> Dataset:
-    return Dataset(name, ("task",), dtype, unit, meaning, {}, value)
+    return Dataset(name, ("task",), dtype, unit, meaning, {}, value, since)
 
 
 def _curves(branch: Branch) -> tuple[Dataset, ...]:
@@ -77,6 +78,34 @@ def _drops(loop: LoopResult, *, small_scale: bool) -> float:
 TIMES = (
     _task("wall_time", FLOAT, "s", "wall time"),
     _task("cpu_time", FLOAT, "s", "CPU time"),
+)
+# Below which ranges of adhesion the zero-range limit holds.
+_RANGES = (
+    _task(
+        *("valid_range", FLOAT, "m", "range of adhesion below which the zero-range limit holds"),
+        lambda loop: loop.valid_range,
+        since=(1, 2),
+    ),
+    _task(
+        *("edge_range", FLOAT, "m", "range whose cohesive zone is as long as what pins edges"),
+        lambda loop: loop.edge_range,
+        since=(1, 2),
+    ),
+    _task(
+        *("largest_interior_tension", FLOAT, "Pa", "largest tension inside patches"),
+        lambda loop: loop.largest_interior_tension,
+        since=(1, 2),
+    ),
+    _task(
+        *("interior_tension_position", FLOAT, "m", "position of that tension"),
+        lambda loop: np.nan if loop.interior is None else loop.interior.position,
+        since=(1, 2),
+    ),
+    _task(
+        *("interior_tension_penetration", FLOAT, "1", "penetration/h_max at that tension"),
+        lambda loop: np.nan if loop.interior is None else loop.interior.penetration,
+        since=(1, 2),
+    ),
 )
 # Of each loop, one number.
 NUMBERS = (
@@ -127,6 +156,7 @@ NUMBERS = (
         *("energy_at_stake", FLOAT, "J m-2", "energy between the ends of those jumps"),
         lambda loop: loop.energy_at_stake,
     ),
+    *_RANGES,
     _task(
         *("work_gained", FLOAT, "J m-2", "work gained on loading per nominal area"),
         lambda loop: loop.work_gained,

@@ -133,6 +133,27 @@ class Answer(ByValue):
         assert found is not None
         return found
 
+    @property
+    def valid_range(self) -> float | None:
+        """Least range in m, of the answer's loop and its variants, below which the limit holds.
+
+        The zero-range limit: docs/zero-range.md. None if no loop has tension inside patches.
+        """
+        found = (one["valid_range"] for one in self._alike())
+        return min((value for value in found if value is not None), default=None)
+
+    @property
+    def largest_interior_tension(self) -> float:
+        """Largest tension inside patches, of the answer's loop and its variants, in Pa."""
+        return float(max(one["largest_interior_tension"] for one in self._alike()))
+
+    def _alike(self) -> list[Result]:
+        """Numbers of the loops whose material and turning point are the answer's."""
+        tables = ("work of adhesion", "turning point")
+        names = [run.name for run in self.plan.runs if run.group not in tables]
+        found = (self.result(name) for name in names)
+        return [one for one in found if one is not None]
+
     def group(self, name: str) -> list[tuple[str, str, Result]]:
         """Name, words and numbers of the loops of one doubt or table that came to their end."""
         rows = []
@@ -331,6 +352,7 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
             f"the loss is known to {100 * loss.relative:.0f} % only: measure a longer trace, or "
             "several"
         )
+    found += answer.main["range_warnings"]
     races = answer.main["races"]
     if races:
         found.append(
@@ -387,6 +409,8 @@ def document(answer: Answer) -> dict[str, Any]:
         "loss": _plain(answer.loss),
         "pull_off_stress": _plain(answer.pull_off_stress),
         "contact_fraction": _plain(answer.contact_fraction),
+        "valid_range": answer.valid_range,
+        "largest_interior_tension": answer.largest_interior_tension,
         "loop": dict(answer.main),
         "runs": runs,
         "plan": {

@@ -42,6 +42,7 @@ def summary(answer: Answer) -> str:
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
         f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
+        f"range       {_range(answer)}",
         "doubts      "
         + ", ".join(f"{name} {_percent(share)}" for name, share in answer.loss.doubts.items())
         + " of the loss (standard uncertainties; the half-width of the interval is "
@@ -49,6 +50,16 @@ def summary(answer: Answer) -> str:
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
     return printable("\n".join(lines))
+
+
+def _range(answer: Answer) -> str:
+    """Say below which range of adhesion the zero-range limit holds."""
+    if answer.valid_range is None:
+        return "no tension inside patches"
+    return (
+        f"adhesion of a range below {length_text(answer.valid_range, 3)} is of zero range here: "
+        f"largest tension inside patches {1e-6 * answer.largest_interior_tension:.3g} MPa"
+    )
 
 
 def write_page(answer: Answer, folder: Path) -> None:
@@ -127,6 +138,7 @@ def _blocks(answer: Answer) -> list[Block]:
         ("figure", "spectrum"),
         ("h2", "The loop"),
         ("figure", "loop"),
+        ("p", f"Range: {_range(answer)} (least of the loop and its variants)."),
         ("h2", "How far it can be trusted"),
         (
             "p",

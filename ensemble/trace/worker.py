@@ -74,12 +74,14 @@ def main() -> None:
 
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop; returns its numbers, and its states as lists."""
+    from adhesis.solver.interior import range_warnings
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.method import Branch, ContactState
     from adhesis.solver.model.half_space import HalfSpace
     from adhesis.solver.model.problem import Problem
     from adhesis.solver.model.profile import Profile
     from adhesis.solver.registry import make_method
+    from adhesis.solver.values import finite
 
     last = time.monotonic()
 
@@ -106,6 +108,12 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
         "audit_residual": loop.audit_residual,
         "loss_error": _number(loop, "loss_error"),
         "races": _number(loop, "races"),
+        "valid_range": finite(loop.valid_range),
+        "edge_range": finite(loop.edge_range),
+        "largest_interior_tension": loop.largest_interior_tension,
+        "range_warnings": range_warnings(
+            problem, loop.valid_range, loop.loss, loop.contact_fraction
+        ),
         "energy_at_stake": _number(loop, "energy_at_stake"),
         "pull_off_stress": loop.pull_off_stress,
         "pull_off_penetration": loop.pull_off_penetration,

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.solver.method import PatchTension
 from adhesis.solver.model.problem import Problem
@@ -110,8 +111,8 @@ def largest_tension(
     candidates.sort(key=lambda entry: -entry[0])
     best: PatchTension | None = None
     unit = problem.half_space.modulus / 2
-    for tension, state, node in candidates:
-        if best is not None and tension * unit <= best.tension:
+    for value, state, node in candidates:
+        if best is not None and value * unit <= best.tension:
             break
         found = refined(state).maximum(node * step, step)
         if found is not None and (best is None or found[1] * unit > best.tension):
@@ -120,7 +121,9 @@ def largest_tension(
     return best
 
 
-def _at_nodes(field: GapField, full: Array, harmonic: Array, n: int) -> Array:
+def _at_nodes(
+    field: GapField, full: NDArray[np.complex128], harmonic: NDArray[np.int64], n: int
+) -> Array:
     """Tension at the nodes -1 … n of n equally spaced ones, NaN outside contact."""
     step = 2 * np.pi / n
     opening = np.zeros(n)

@@ -19,7 +19,7 @@ from adhesis.ensemble.report.findings import missing
 from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
-from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING
+from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, PENDING, lacking
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import differences, write_campaign
@@ -286,21 +286,28 @@ def test_a_row_that_a_run_empties_while_it_is_read_is_not_called_damaged(path, m
     assert len(looks) == 2
 
 
-# ---------------------------------------------------------------- files of version 1.0
+# ---------------------------------------------------------------- files of earlier versions
 
 
-def test_a_file_without_checksums_is_read_resumed_and_merged_with_a_sentence(
-    damage, path, tmp_path, capsys
+@pytest.mark.parametrize(
+    ("version", "sentence"),
+    [
+        ((1, 0), "was written before rows had checksums"),
+        ((1, 0), "was written before rows had valid_range"),
+        ((1, 1), "was written before rows had valid_range"),
+    ],
+)
+def test_a_file_of_an_earlier_version_is_read_resumed_and_merged_with_a_sentence(
+    damage, path, tmp_path, capsys, version, sentence
 ):
-    age(path)
-    sentence = "was written before rows had checksums"
+    age(path, version)
     assert main(["verify", str(path)]) == 0
-    assert sentence in capsys.readouterr().out
+    assert ("before rows had checksums" in capsys.readouterr().out) == (version < (1, 1))
     assert sentence in as_text(read_status(path))
     assert any(sentence in told for told in missing(aggregate(path)))
     merged = merge([path], tmp_path / "all.h5")
-    assert sentence in merged.doubts[0]
-    into = age(shutil.copy(damage.sound, tmp_path / "into.h5"))
+    assert any(sentence in told for told in merged.doubts)
+    into = age(shutil.copy(damage.sound, tmp_path / "into.h5"), version)
     merge([path], into)
     said: list[str] = []
     run_campaign(damage.campaign, path, say=said.append, engine=fake_engine(""))
@@ -308,8 +315,19 @@ def test_a_file_without_checksums_is_read_resumed_and_merged_with_a_sentence(
     for file in (path, tmp_path / "all.h5", into):
         with Results(file) as results:
             assert results.has_checksums
+            assert not results.lacking
             assert results.status().tolist() == [DONE] * 7 + [FAILED]
-        assert differences(file, damage.sound) == []
+            assert np.isnan(results.column("valid_range")).all()
+        assert set(differences(file, damage.sound)) == lacking((1, 1))
+    # a whole file of the present version and an older one hold the same rows
+    assert merge([path, damage.sound], tmp_path / "both.h5").done == 7
+
+
+def test_damage_of_a_file_of_version_1_1_is_found(path):
+    age(path, (1, 1))
+    changed(path, _set("loss", 3, 1.0))
+    with Results(path) as results:
+        assert results.damaged().tolist() == [3]
 
 
 @pytest.mark.parametrize("case", [c for c in ROWS if ROWS[c][0] in ("status", "jump_kind")])

@@ -12,7 +12,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import HEAD, write_head
 from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.schema import LATER_DATASETS, axis_datasets, kept_rows
+from adhesis.ensemble.results.schema import axis_datasets, has_checksums, kept_rows, lacking
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import GAP_EDGES, field_plan
 from adhesis.solver.model.jump import JUMP_KINDS
@@ -101,6 +101,11 @@ def rows(campaign: Campaign, seed: int = 7) -> dict[str, np.ndarray]:
         "loss_large_scale": (1 - share) * drops,
         "audit_residual": audit,
         "loss_error": 1e-4 * loss,
+        "valid_range": 1e-2 * h_max,
+        "edge_range": 2e-2 * h_max,
+        "largest_interior_tension": gamma / (1e-2 * h_max),
+        "interior_tension_position": np.full(n, 0.25 * campaign.profile.period),
+        "interior_tension_penetration": np.full(n, 0.1),
         "races": (np.arange(n) % 7 == 3).astype(np.int32),
         "energy_at_stake": np.where(np.arange(n) % 7 == 3, 0.02 * loss, 0.0),
         "pull_off_penetration": pull_off[:, 0],
@@ -175,23 +180,25 @@ def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
     return sign(path)
 
 
-def sign(path: Path) -> Path:
+def sign(path: Path, without: frozenset[str] = frozenset()) -> Path:
     """Give a results file and its rows the checksums of what they hold, as if all were written."""
     with h5py.File(path, "r+") as file:
         sizes = {name: data.size for name, data in file.items() if data.is_scale}
         file["checksum"][...] = row_checksums(
             lambda name, rows: file[name][rows],
-            *(sizes, file[KEPT][:], np.arange(file["task"].size)),
+            *(sizes, file[KEPT][:], np.arange(file["task"].size), without),
         )
     write_head(path)
     return path
 
 
-def age(path: Path) -> Path:
-    """Make a results file one of version 1.0, as if written before there were checksums."""
+def age(path: Path, version: tuple[int, int] = (1, 0)) -> Path:
+    """Make a results file one of an earlier version; before 1.1 there were no checksums."""
+    without = lacking(version)
     with h5py.File(path, "r+") as file:
-        for name in LATER_DATASETS:
+        for name in without:
             del file[name]
-        file.attrs["file_version"] = np.array([1, 0], "i4")
-        del file.attrs[HEAD]
-    return path
+        file.attrs["file_version"] = np.array(version, "i4")
+        if not has_checksums(version):
+            del file.attrs[HEAD]
+    return sign(path, without) if has_checksums(version) else path

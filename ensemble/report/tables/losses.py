@@ -56,6 +56,9 @@ def losses(data: Aggregate) -> Table:
         TableColumn("audit_residual_largest", "audit", percent),
         TableColumn("races", "races", plain, only_if_any=True),
         TableColumn("energy_at_stake_dimensionless_mean"),
+        TableColumn("valid_range_least [m]", "range (nm)", number(unit=1e-9), only_if_any=True),
+        TableColumn("edge_range_least [m]"),
+        TableColumn("largest_interior_tension [Pa]"),
         TableColumn("loss_small_scale_mean [J/m^2]"),
         TableColumn("loss_small_scale_sem [J/m^2]"),
         TableColumn("loss_large_scale_mean [J/m^2]"),
@@ -138,6 +141,9 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         float(np.max(np.abs(audit))) if cell.done else None,
         _sum(cell.values["races"]),
         found["energy_at_stake_dimensionless"].mean,
+        least(cell.values["valid_range"]),
+        least(cell.values["edge_range"]),
+        largest(cell.values["largest_interior_tension"]),
         found["loss_small_scale"].mean,
         found["loss_small_scale"].sem,
         found["loss_large_scale"].mean,
@@ -163,6 +169,18 @@ def papers_loss(cell: Cell) -> float | None:
     if not paper.is_cell_of(cell):
         return None
     return paper.table_1(cell.hurst, cell.work_of_adhesion)
+
+
+def least(values: Array) -> float | None:
+    """Return the least of the known values; None if none is finite."""
+    known = values[np.isfinite(values)]
+    return float(known.min()) if known.size else None
+
+
+def largest(values: Array) -> float | None:
+    """Return the largest of the known values; None if none is finite."""
+    known = values[np.isfinite(values)]
+    return float(known.max()) if known.size else None
 
 
 def _sum(values: Array) -> int | None:
