@@ -42,6 +42,7 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import BRANCHES, Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
+from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.runtime.threads import new_lock
 from adhesis.solver.values import ByValue
 
@@ -315,13 +316,12 @@ def _maximum_at_nodes(fields: Fields) -> tuple[float, float] | None:
 
     A parabola through the node and its neighbours, all of them in contact, refines it.
     """
-    contact, tension = fields.gap <= 0, -fields.stress
-    before, after = np.roll(tension, 1), np.roll(tension, -1)
-    inside = contact & np.roll(contact, 1) & np.roll(contact, -1)
-    top = np.flatnonzero(inside & (tension > before) & (tension >= after) & (tension > 0))
-    if not top.size:
+    tension = np.where(fields.gap <= 0, -fields.stress, np.nan)
+    found = highest_peaks(tension, 1)
+    if not found:
         return None
-    i = int(top[np.argmax(tension[top])])
-    shift = 0.5 * (before[i] - after[i]) / (before[i] - 2 * tension[i] + after[i])
+    i = found[0]
+    before, here, after = tension[i - 1], tension[i], tension[(i + 1) % len(tension)]
+    shift = 0.5 * (before - after) / (before - 2 * here + after)
     position = fields.x[i] + shift * (fields.x[1] - fields.x[0])
-    return float(position), float(tension[i] - 0.25 * (before[i] - after[i]) * shift)
+    return float(position), float(here - 0.25 * (before - after) * shift)

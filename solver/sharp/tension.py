@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from adhesis.solver.method import PatchTension
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
+from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.opening_series import Opening, fine_opening
 
@@ -103,11 +104,8 @@ def largest_tension(
     candidates: list[tuple[float, int, int]] = []  # tension, state, node
     for state in range(count):
         tension = _at_nodes(field_of(state), full, harmonic, n)
-        # outside contact it is NaN, and no comparison holds
-        here, before, after = tension[1:-1], tension[:-2], tension[2:]
-        nodes = np.flatnonzero((here > before) & (here >= after) & (here > 0))
-        nodes = nodes[np.argsort(-here[nodes], kind="stable")[:_CANDIDATES]]
-        candidates += [(float(here[node]), state, int(node)) for node in nodes]
+        nodes = highest_peaks(tension, _CANDIDATES)
+        candidates += [(float(tension[node]), state, node) for node in nodes]
     candidates.sort(key=lambda entry: -entry[0])
     best: PatchTension | None = None
     unit = problem.half_space.modulus / 2
@@ -124,7 +122,7 @@ def largest_tension(
 def _at_nodes(
     field: GapField, full: NDArray[np.complex128], harmonic: NDArray[np.int64], n: int
 ) -> Array:
-    """Tension at the nodes -1 … n of n equally spaced ones, NaN outside contact."""
+    """Tension at n equally spaced nodes, NaN outside contact."""
     step = 2 * np.pi / n
     opening = np.zeros(n)
     free = []
@@ -140,15 +138,10 @@ def _at_nodes(
         nodes %= n
         opening[nodes] = value
         free.append(nodes)
-    tension = np.empty(n + 2)
     relief = np.fft.rfft(opening)
     relief *= harmonic
     relief += full
-    inner = tension[1:-1]
-    inner[:] = np.fft.irfft(relief, n)
-    inner += field.pressure
-    np.negative(inner, out=inner)
+    tension = -(np.fft.irfft(relief, n) + field.pressure)
     for nodes in free:
-        inner[nodes] = np.nan
-    tension[0], tension[-1] = inner[-1], inner[0]
+        tension[nodes] = np.nan
     return tension

@@ -1,0 +1,46 @@
+"""Local maxima of a periodic row of values that stand out from what lies beside them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+
+LEAST_PROMINENCE = 0.01
+"""A maximum stands out by this share of its height at least: above the errors of the values."""
+
+
+def highest_peaks(values: Array, most: int) -> list[int]:
+    """Return the places of the highest positive maxima, the highest first.
+
+    The prominence of a maximum is its height above the higher one of the two minima between which
+    it is the largest value; it is no maximum unless its neighbours have values.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Periodic; NaN where there is nothing.
+    most : int
+        So many maxima at most.
+    """
+    nothing = np.flatnonzero(np.isnan(values))
+    start = int(nothing[0]) if nothing.size else 0
+    row = np.concatenate([values[start:], values[:start], values[start : start + 1]])
+    here, before, after = row[1:-1], row[:-2], row[2:]
+    tops = 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0))
+    found: list[int] = []
+    for top in tops[np.argsort(-row[tops], kind="stable")].tolist():
+        sides = row[:top][::-1], row[top + 1 :]
+        base = max(_least_before_higher(side, row[top]) for side in sides)
+        if row[top] - base >= LEAST_PROMINENCE * row[top]:
+            found.append((start + top) % len(values))
+            if len(found) == most:
+                break
+    return found
+
+
+def _least_before_higher(values: Array, height: float) -> float:
+    """Return the least value before one that is higher than ``height``, or is none."""
+    ends = ~(values <= height)
+    stop = int(ends.argmax()) if ends.any() else len(values)
+    return float(values[:stop].min(initial=height))

@@ -1,0 +1,270 @@
+"""The range of adhesion below which the zero-range limit holds: largest tension inside patches."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from adhesis import (
+    HalfSpace,
+    LoopResult,
+    Method,
+    Problem,
+    Profile,
+    make_method,
+    run_loop,
+    run_loops,
+    run_path,
+    self_affine_profile,
+    single_wave,
+)
+from adhesis.solver.interior import _narrowest_moved, beyond_limit
+from adhesis.solver.peaks import highest_peaks
+from adhesis.solver.references.exact_wave import ExactWave
+from tests.support.explicit_solution import explicit_openings, explicit_solution
+
+PERIOD = 2e-3
+
+
+def rough(ratio: int = 8, seed: int = 0) -> Profile:
+    return self_affine_profile(0.8, period=PERIOD, n0=2, ratio=ratio, seed=seed, h_rms=1e-6)
+
+
+def method_of(profile: Profile, young: float, gamma: float = 0.04, name="sharp") -> Method:
+    return make_method(name, Problem(profile, HalfSpace(young, 0.5), gamma))
+
+
+@cache
+def loop_of(young: float, ratio: int = 8, seed: int = 0, gamma: float = 0.04) -> LoopResult:
+    return run_loop(
+        method_of(rough(ratio, seed), young, gamma), max_penetration=0.9, load_steps=20
+    )
+
+
+def two_troughs() -> Profile:
+    """Two waves in a period, one trough deeper than the other."""
+    return Profile(PERIOD, np.array([0.0, 0.15 * np.exp(0.5j), 0.5]) * 1e-6)
+
+
+def nearly_full_contact():
+    """A state with the shallower trough closed and the deeper one nearly so."""
+    method = method_of(two_troughs(), 1e6, 0.05)
+    state = method.detached(method.problem.profile.h_max)
+    for penetration in (0.0, 0.5, 0.9, 0.97):
+        state = method.follow(state, method.problem.separation(penetration)).states[-1]
+    assert state.patches == 1
+    return method, state
+
+
+def test_a_closed_trough_carries_the_tension_of_full_contact():
+    """σ = σ_full + p̄ in closed form, but for the narrow gap far away."""
+    method, state = nearly_full_contact()
+    profile, modulus = method.problem.profile, method.problem.half_space.modulus
+    x = np.linspace(0, PERIOD, 4096, endpoint=False)
+    m = np.arange(3)
+    wave = np.exp(1j * np.multiply.outer(x, m) * profile.q0)
+    full = modulus * (wave @ (m * profile.q0 * profile.coefficients)).real
+    tension = -(full + state.mean_stress)
+    inside = (x - state.edges[0, 0]) % PERIOD < state.edges[0, 1] - state.edges[0, 0]
+    trough = inside & (tension > np.roll(tension, 1)) & (tension >= np.roll(tension, -1))
+    place = np.flatnonzero(trough)[np.argmax(tension[trough])]
+    found = method.largest_tension([state])
+    assert found is not None
+    assert found.tension == pytest.approx(tension[place], rel=0.03)
+    assert found.position == pytest.approx(x[place], abs=0.02 * PERIOD)
+
+
+def test_the_tension_is_that_of_an_independent_solution():
+    """From the openings of the Riemann-Hilbert solution, with the kernel of the half-space."""
+    method, state = nearly_full_contact()
+    profile, unit = method.problem.profile, method.problem.half_space.modulus / 2
+    gaps = state.internal.gaps
+    theta, opening = explicit_openings(profile, gaps, state.separation * profile.q0)
+    half = (gaps[0, 1] - gaps[0, 0]) / 2
+    angle = np.linspace(0, np.pi, theta.shape[1])  # θ = centre - half cos
+    weight = half * np.sin(angle) * np.pi / (theta.shape[1] - 1)
+    m = np.arange(1, 3)
+
+    def full(places):
+        phase = np.exp(1j * np.multiply.outer(np.asarray(places), m))
+        return 2 * (phase @ (m * profile.coefficients[1:] * profile.q0)).real
+
+    pressure = state.mean_stress / unit
+    constants, _ = explicit_solution(full, gaps, state.separation * profile.q0, 96)
+    # its basis has each factor sin(·/2) half as large as the product of the edges has
+    assert abs(constants[0]) / 2 == pytest.approx(abs(pressure), rel=1e-6)
+    found = method.largest_tension([state])
+    assert found is not None
+    places = found.position * profile.q0 + np.linspace(-0.02, 0.02, 5)
+    kernel = np.sin((places[:, None] - theta[0]) / 2) ** -2
+    tension = (kernel @ (opening[0] * weight)) / (4 * np.pi) - full(places) - pressure
+    assert found.tension == pytest.approx(unit * tension[2], rel=1e-5)
+    assert tension.argmax() == 2  # a maximum indeed
+
+
+@pytest.mark.parametrize("name", ["exact", "sharp", "grid"])
+def test_tension_falls_from_the_edges_of_a_single_wave(name):
+    problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+    method = ExactWave(problem) if name == "exact" else make_method(name, problem)
+    loop = run_loop(method, max_penetration=0.8, load_steps=10)
+    assert loop.interior is None
+    assert (loop.largest_interior_tension, loop.valid_range) == (0.0, math.inf)
+    assert not any("zero-range" in text for text in loop.warnings)
+
+
+@pytest.mark.parametrize(
+    ("young", "valid_range"),
+    [(1e7, 125e-9), (1e9, 3.46e-9)],
+)
+def test_valid_range_of_two_scenes_measured_apart(young, valid_range):
+    """γ/σ_in from the fields on 16 nodes a wave of sixty states, which is good to a tenth."""
+    assert loop_of(young, 25).valid_range == pytest.approx(valid_range, rel=0.1)
+
+
+@pytest.mark.parametrize(("young", "seed"), [(1e6, 1), (1e7, 1), (1e8, 0), (1e9, 2)])
+def test_no_state_that_is_left_out_has_more_tension(young, seed):
+    method, states = method_of(rough(seed=seed), young), []
+    loop = run_loop(
+        method,
+        max_penetration=0.9,
+        load_steps=20,
+        on_state=lambda branch, state: states.append(state),
+    )
+    everywhere = method.largest_tension([state for state in states if state.patches])
+    assert everywhere is not None
+    assert loop.largest_interior_tension == pytest.approx(everywhere.tension, rel=0.02)
+
+
+def test_where_and_when_are_those_of_a_state_of_the_loop():
+    loop = loop_of(1e8)
+    found = loop.interior
+    assert found is not None
+    here = (loop.branch == found.branch) & (loop.penetration == found.penetration)
+    assert here.any()
+    assert found.branch == "unloading"
+    assert 0 <= found.position < PERIOD
+    assert loop.valid_range == loop.problem.work_of_adhesion / found.tension
+
+
+def test_grid_and_sharp_agree():
+    sharp = loop_of(1e8, 4, 1)
+    method = method_of(rough(4, 1), 1e8, name="grid")
+    grid = run_loop(method, max_penetration=0.9, load_steps=20)
+    assert grid.valid_range == pytest.approx(sharp.valid_range, rel=0.03)
+    assert sharp.interior is not None
+    assert grid.interior is not None
+    assert grid.interior.position == pytest.approx(sharp.interior.position, abs=1e-3 * PERIOD)
+
+
+def test_nodes_find_what_the_series_finds():
+    """The way that every method has, which knows fields alone."""
+    method, states = method_of(rough(), 1e8), []
+    run_loop(
+        method,
+        max_penetration=0.9,
+        load_steps=10,
+        on_state=lambda branch, state: states.append(state),
+    )
+    some = [state for state in states if state.patches][::10]
+    exact, at_nodes = method.largest_tension(some), Method.largest_tension(method, some)
+    assert exact is not None
+    assert at_nodes is not None
+    assert at_nodes.state == exact.state
+    assert at_nodes.tension == pytest.approx(exact.tension, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "times"),
+    [
+        (lambda p: p.mirrored(), 1.0),
+        (lambda p: p.shifted(0.3 * PERIOD), 1.0),
+        (lambda p: p.scaled(2.0, 2.0), 2.0),
+    ],
+    ids=["mirror", "shift", "scale"],
+)
+def test_ranges_keep_the_symmetries_of_the_problem(change, times):
+    """A profile twice as large in all lengths, with γ twice as large, has the same stresses."""
+    method = method_of(change(rough()), 1e8, 0.04 * times)
+    loop, reference = run_loop(method, max_penetration=0.9, load_steps=20), loop_of(1e8)
+    assert loop.valid_range == pytest.approx(times * reference.valid_range, rel=1e-3)
+    assert loop.edge_range == pytest.approx(times * reference.edge_range, rel=1e-3)
+
+
+def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
+    """One sentence for the range, one for a loss that adhesion cannot explain."""
+    assert loop_of(1e7).warnings == ()
+    stiff = loop_of(1e11, 4)
+    range_, loss = stiff.warnings
+    assert range_.startswith(f"valid_range is {stiff.valid_range:.2g} m")
+    assert "times the work of adhesion of the largest contact" in loss
+
+
+def test_either_reason_makes_a_loss_doubtful():
+    wrong = beyond_limit([0.9e-9, 1.1e-9, math.inf, math.nan], [0.1, 0.1, 0.3, 0.1], 0.02, 0.5)
+    assert wrong.tolist() == [True, False, True, False]
+    assert not beyond_limit(math.inf, 1.0, 0.0, 0.5)  # nothing adheres
+
+
+def test_without_adhesion_nothing_bounds_the_range():
+    loop = run_loop(method_of(rough(), 1e7, 0.0), max_penetration=0.5, load_steps=4)
+    assert loop.interior is None
+    assert loop.valid_range == math.inf
+    assert loop.warnings == ()
+
+
+def test_a_path_and_loops_with_one_loading_branch_know_it_too():
+    method, loop = method_of(rough(), 1e8), loop_of(1e8)
+    path = run_path(method, [0.9], load_steps=20)
+    assert path.interior == loop.interior
+    assert path.narrowest_length == loop.narrowest_length
+    assert path.warnings == ()
+    assert loop.interior is not None
+    (shared,) = run_loops(method, max_penetration=[0.9], load_steps=20)
+    assert shared == loop
+    assert replace(path, interior=replace(loop.interior, tension=1e9)).warnings
+
+
+def test_the_cohesive_zone_of_the_edge_range_is_as_long_as_the_narrowest_length():
+    """Dugdale: (π/8)(K/σ_th)² with K² = 2E*γ and σ_th = γ/δ."""
+    loop = loop_of(1e8)
+    modulus, gamma = loop.problem.half_space.modulus, loop.problem.work_of_adhesion
+    strength = gamma / loop.edge_range
+    zone = np.pi / 8 * 2 * modulus * gamma / strength**2
+    assert zone == pytest.approx(loop.narrowest_length)
+    assert loop.narrowest_length <= loop.problem.profile.shortest_wavelength
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "narrowest"),
+    [
+        ([[0.1, 0.2], [0.5, 0.8]], [[0.5, 0.8]], 0.1),  # a patch is lost
+        ([[0.1, 0.2], [0.5, 0.8]], [[0.1, 0.2], [0.6, 0.8]], 0.3),  # one edge recedes
+        ([[0.1, 0.4], [0.45, 0.8]], [[0.1, 0.8]], 0.05),  # a gap closes
+        ([[0.3, 0.95]], [[0.3, 1.2]], 0.35),  # over the end of the period
+        ([[0.9, 1.1]], [[0.9, 1.1]], math.inf),  # nothing moves
+        ([[0.1, 0.3]], np.empty((0, 2)), 0.2),  # pull-off
+        (np.empty((0, 2)), [[0.1, 0.3]], math.inf),  # first touch
+    ],
+)
+def test_the_narrowest_length_is_beside_an_edge_that_moves(before, after, narrowest):
+    assert _narrowest_moved(np.array(before), np.array(after), 1.0) == pytest.approx(narrowest)
+
+
+@pytest.mark.parametrize(
+    ("values", "peaks"),
+    [
+        ([9, 2, 5, 2, 9, np.nan, np.nan], [2]),  # between two edges
+        ([3, 9, np.nan, np.nan, 9, 2, 5], [6]),  # over the end of the period
+        ([9, 2, 5, 4, 7, 2, 9, np.nan], [4, 2]),  # the highest first
+        ([9, 5, 4.99, 5, 9, np.nan], []),  # falls from both edges
+        ([9, 5, 5.01, 5, 9, np.nan], []),  # stands out by less than a hundredth
+        ([np.nan, 5, np.nan, 3, 2, np.nan], []),  # its neighbours have no values
+        ([-3, -4, -2, -5, -1, np.nan], []),  # compression
+    ],
+)
+def test_peaks_stand_out_from_what_lies_beside_them(values, peaks):
+    assert highest_peaks(np.array(values, dtype=float), 5) == peaks
