@@ -69,6 +69,9 @@ PARTS = {
     "structure": Part(
         ("docs/figures/structure.py OUT/structure.png",), "structure.png", "figures"
     ),
+    "zero-range": Part(
+        ("docs/figures/zero_range.py OUT/zero_range.png",), "zero_range.png", "figures"
+    ),
     "measured": Part(
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),
