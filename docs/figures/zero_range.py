@@ -15,6 +15,7 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.ticker import NullFormatter
 
 from adhesis import HalfSpace, LoopResult, Problem, make_method, run_loop, self_affine_profile
 
@@ -68,6 +69,8 @@ def draw(narrow: np.ndarray, paper: np.ndarray, path: Path) -> None:
         ylabel="valid_range · E* h' / γ",
         title="One curve for one shape of spectrum",
     )
+    left.set_yticks([0.2, 0.5, 1, 2], ["0.2", "0.5", "1", "2"])
+    left.yaxis.set_minor_formatter(NullFormatter())
     left.legend(frameon=False, fontsize=8)
     left.grid(alpha=0.3)
 
@@ -82,11 +85,10 @@ def draw(narrow: np.ndarray, paper: np.ndarray, path: Path) -> None:
     )
     lines = right.contour(modulus[:, 0], slope, found.T, RANGES, colors="#333333", linewidths=1)
     names = {value: f"{1e9 * value:g} nm" for value in RANGES}
-    right.clabel(lines, fmt=names, fontsize=8)
     profile = self_affine_profile(0.8, seed=1, h_rms=1e-6, **PAPER)
     right.plot(1e6 / 0.75, np.sqrt(profile.m2), "^", color="#c4472b", ms=8)
     right.annotate(
-        "the paper", (1e6 / 0.75, np.sqrt(profile.m2)), (8, 6), textcoords="offset points"
+        "the paper", (1e6 / 0.75, np.sqrt(profile.m2)), (-24, 9), textcoords="offset points"
     )
     right.plot(2e11 / 0.91, np.sqrt(profile.m2), "s", color="#333333", ms=6)
     right.annotate(
@@ -99,6 +101,8 @@ def draw(narrow: np.ndarray, paper: np.ndarray, path: Path) -> None:
         ylabel="rms slope h'",
         title=f"valid_range at γ = {GAMMA:g} J/m², λ_min = {1e6 * wave:.2g} µm",
     )
+    figure.canvas.draw()  # labels are placed along the lines as they are at last
+    right.clabel(lines, fmt=names, fontsize=8)
     figure.savefig(path, dpi=160)
 
 

@@ -31,6 +31,8 @@ _PER_TASK = (
     *("loss_error", "races", "energy_at_stake"),
     *("valid_range", "edge_range", "largest_interior_tension"),
 )
+# Of these the least or the largest of a cell counts; a range may be infinite.
+_NOT_AVERAGED = frozenset(("valid_range", "edge_range", "largest_interior_tension"))
 _WITH_INTERVAL = (
     "loss",
     "loss_dimensionless",
@@ -80,7 +82,8 @@ class Cell:
         ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
         spent per largest contact area, in J/m²).
     estimates : dict of Estimate
-        The same, averaged. Only losses, pull-off and largest contact have an interval.
+        The same, averaged, but for ``valid_range``, ``edge_range`` and
+        ``largest_interior_tension``. Only losses, pull-off and largest contact have an interval.
     curves : dict of Curve
         ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
         (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,
@@ -185,7 +188,7 @@ def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
     share = found["small_scale_share"]
     low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval knows no bounds
     found["small_scale_share"] = replace(share, low=float(low), high=float(high))
-    rest = [name for name in values if name not in found]
+    rest = [name for name in values if name not in found and name not in _NOT_AVERAGED]
     plain = estimates(np.array([values[name] for name in rest]), with_interval=False)
     return found | dict(zip(rest, plain, strict=True))
 

@@ -65,6 +65,9 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
     assert data["jumps"][1]["penetration"] == pytest.approx(1 - 1.25204901072, abs=1e-6)
     drops = [j["energy_drop"] for j in data["jumps"]]
     assert drops == pytest.approx([WAVE.loop.touch_drop, WAVE.loop.fold_drop], rel=1e-6)
+    # tension falls from the edges of a wave: nothing bounds the range, and JSON has no infinity
+    assert (data["valid_range"], data["interior_tension"]) == (None, None)
+    assert data["largest_interior_tension"] == 0.0
     # The same states, as objects and as columns.
     assert len(data["states"]) == len(data["penetration"]) > 40
     for key in STATE_KEYS:
@@ -183,6 +186,31 @@ def test_self_affine_profile_through_a_real_method(tmp_path, capsys):
     assert data["patches"][-1] == 0
     assert abs(data["audit_residual"]) < 0.05
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("young", "cycle", "code"),
+    [
+        (1e7, ("--max-penetration", "0.5,0.9"), 0),
+        (1e11, ("--max-penetration", "0.9"), 1),
+        (1e11, ("--path", "0.9,out"), 1),
+    ],
+)
+def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
+    young, cycle, code, tmp_path, capsys
+):
+    out = tmp_path / "loop.json"
+    words = ("--hurst", 0.8, "--seed", 0, "--period", 2e-3, "--n0", 2, "--ratio", 4)
+    more = ("--load-steps", 10, "--strict", "--quiet", "--json", out)
+    assert run(*words, "--young", young, *cycle, *more) == code
+    data, text = json.loads(out.read_text()), capsys.readouterr()
+    assert (data["valid_range"] < 1e-9) == (code == 1)
+    assert data["valid_range"] == data["work_of_adhesion"] / data["largest_interior_tension"]
+    assert data["interior_tension"]["branch"] == "unloading"
+    assert f"range below {data['valid_range']:.3g} m is of zero range" in text.out
+    assert [f"adhesis loop: {warning}" for warning in data["warnings"]] == text.err.splitlines()
+    assert bool(data["warnings"]) == (code == 1)
+    assert not any(turn["warnings"] for turn in data.get("turns", []))
 
 
 # ---------------------------------------------------------------------- refusals

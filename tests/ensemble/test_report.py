@@ -39,6 +39,7 @@ from adhesis.ensemble.report.tables import losses as loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.table import number
 from adhesis.ensemble.report.write import write_report
+from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
 from tests.support.synthetic_results import campaign, rows, write
 
@@ -722,6 +723,31 @@ def test_doubtful_losses_and_steep_profiles_are_said(tmp_path):
     assert "slope exceeds" in steep
     assert "γ = 0.02" in steep
     assert "γ = 0.01" not in steep
+
+
+def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
+    plan = campaign(hurst=(0.7,), gamma=(0.01, 0.02), realisations=4)
+    values = rows(plan)
+    values["audit_residual"][:] = 1e-5
+    values["largest_contact_fraction"][:] = 0.5
+    sound = aggregate(write(tmp_path / "sound.h5", plan, values))
+    least = values["valid_range"].min()
+    (sentence,) = (text for text in findings.quality(sound) if "zero-range limit holds" in text)
+    assert f"below {least:.3g} m" in sentence
+    assert not read_status(tmp_path / "sound.h5")["beyond_limit"]
+    values["valid_range"][2] = 0.5e-9
+    values["valid_range"][3] = np.inf
+    values["loss"][6] = 21 * 0.02 * 0.5
+    path = write(tmp_path / "r.h5", plan, values)
+    data, status = aggregate(path), read_status(path)
+    (warning,) = (text for text in findings.quality(data) if "valid_range is below" in text)
+    assert warning.startswith("WARNING: 2 of 8 losses")
+    assert [row["row"] for row in status["beyond_limit"]] == [2, 6]
+    assert "2 losses are doubtful: valid_range is below 1e-09 m" in as_text(status)
+    table = loss_tables.losses(data)
+    names = [column.name for column in table.columns]
+    shown = [row[names.index("valid_range_least [m]")] for row in table.rows]
+    assert shown == pytest.approx([0.5e-9, values["valid_range"][4:].min()])
 
 
 def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, drawn):

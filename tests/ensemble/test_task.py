@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from adhesis.ensemble.task.compute import Runner, make_problem, run_task
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
+from adhesis.solver.interior import InteriorTension
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path_record import Record
@@ -58,6 +61,20 @@ def test_curves_end_in_zeros_after_detachment():
     assert not unloading[n + 3 :].any()
     assert row["audit_residual"] == 0.25
     assert (row["loss_error"], row["races"], row["energy_at_stake"]) == (0.02, 0, 0.0)
+
+
+def test_the_range_of_adhesion_is_in_the_row():
+    campaign = parse_campaign(campaign_text())
+    loop = loop_of(campaign, steps_below_zero=2)
+    names = ("valid_range", "largest_interior_tension", "interior_tension_position")
+    row = loop_row(campaign, loop)
+    np.testing.assert_array_equal([row[name] for name in names], [np.inf, 0.0, np.nan])
+    found = InteriorTension(2e5, 3e-4, "unloading", -0.5)
+    row = loop_row(campaign, replace(loop, interior=found, narrowest_length=1e-6))
+    gamma = loop.problem.work_of_adhesion
+    assert [row[name] for name in names] == [gamma / 2e5, 2e5, 3e-4]
+    assert row["interior_tension_penetration"] == -0.5
+    assert row["edge_range"] > 0
 
 
 def test_curves_are_cut_where_the_axis_ends():

@@ -119,6 +119,16 @@ def test_the_document_says_what_was_read_done_and_found(document: dict[str, Any]
     assert document["loop"]["loss"] == document["loss"]["value"]
 
 
+def test_the_range_is_the_least_of_the_answer_and_its_variants(document: dict[str, Any]) -> None:
+    tables = ("work of adhesion", "turning point")
+    alike = [run for run in document["runs"] if run["group"] not in tables]
+    ranges = [run["valid_range"] for run in alike if run["valid_range"] is not None]
+    assert document["valid_range"] == min(ranges) > 1e-9
+    assert document["largest_interior_tension"] == max(
+        run["largest_interior_tension"] for run in alike
+    )
+
+
 def test_the_page_holds_its_figures_and_needs_nothing_else(folder: Path) -> None:
     made = [*FIGURES, "trace.html", "trace.json", "trace.md"]
     assert sorted(p.name for p in folder.iterdir()) == sorted(made)
