@@ -69,6 +69,7 @@ SOLVER_FOR_ENSEMBLE = {
     "adhesis.solver.checks",
     "adhesis.solver.model.control",
     "adhesis.solver.observables",
+    "adhesis.solver.interior",
     "adhesis.solver.model.jump",
     "adhesis.solver.loading.loop",
     "adhesis.solver.loading.loop_result",
