@@ -292,7 +292,7 @@ def test_foreign_files_are_refused(tmp_path, path):
     with h5py.File(path, "r+") as file:
         file.attrs["file_version"] = np.array([9, 0])
     write_head(path)
-    assert "has file version 9.0: this adhesis reads versions 1.0 to 1.1" in refused(path)
+    assert "has file version 9.0: this adhesis reads versions 1.0 to 1.2" in refused(path)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.5, 0.99])
