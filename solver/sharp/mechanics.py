@@ -19,8 +19,16 @@ from numpy.typing import NDArray
 from adhesis.solver.method import PathError
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.descent.gradient_flow import LOST, MET, NARROW, RESTING, descend
-from adhesis.solver.sharp.descent.local_descent import Start
+from adhesis.solver.sharp.descent.edge_forces import EdgeSystem
+from adhesis.solver.sharp.descent.gradient_flow import (
+    AT_REST,
+    NO_FIELD,
+    REJOINED,
+    VANISHED,
+    descend,
+)
+from adhesis.solver.sharp.descent.local_descent import KnownState
+from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.descent.windowed_descent import descend_many
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.edge_elimination import between_edges
@@ -241,15 +249,15 @@ class EdgeMechanics:
         )
         return known
 
-    def start(self, point: Point | None) -> Start | None:
+    def start(self, point: Point | None) -> KnownState | None:
         """``point`` as the start of a descent in a window; None for few gaps."""
         if point is None or len(point.gaps) < self.many:
             return None
         leads = int(np.argmax(np.abs(point.rate))) // 2
-        return Start(point.gaps, self.about(point), leads)
+        return KnownState(point.gaps, self.about(point), leads)
 
     def _begun(
-        self, start: Start, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
+        self, start: KnownState, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
         track: Track,
     ) -> Point | Array | None:  # fmt: skip
         """As :meth:`relax`, in a window on a known state; gaps to go on from if that is no end."""
@@ -259,11 +267,11 @@ class EdgeMechanics:
         )  # fmt: skip
         if rest is None:
             return None
-        if rest.ended == RESTING:
+        if rest.event == AT_REST:
             if not equal_speeds:
-                track.rest = rest.local
-            elif track.rest is not None and track.rest.shape == rest.local.shape:
-                track.met = bool(np.abs(track.rest - rest.local).max() < _ALIKE * self.wave)
+                track.rest = rest.window_gaps
+            elif track.rest is not None and track.rest.shape == rest.window_gaps.shape:
+                track.met = bool(np.abs(track.rest - rest.window_gaps).max() < _ALIKE * self.wave)
             point = None if track.met else self.equilibrium(rest.gaps, prescribed, reach)
             if point is not None:
                 return point
@@ -277,7 +285,7 @@ class EdgeMechanics:
         *,
         equal_speeds: bool = False,
         track: Track | None = None,
-        start: Start | None = None,
+        start: KnownState | None = None,
     ) -> Point | Array:
         """Descend in energy, what is prescribed being fixed, to the next minimum.
 
@@ -318,32 +326,32 @@ class EdgeMechanics:
                 if rest is not None:
                     return rest
         while left > 0:
-            panels = self.source.panels
+            system = EdgeSystem(law, RULES, self.source.panels)
+            begin = gaps
             if len(gaps) < self.many:
-                begin = gaps
-                gaps, ended, fields, tangents, kinds, way, track.astray, taken = descend(
-                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels, other,
-                    track.astray,
+                found = descend(
+                    gaps, prescribed, left, kinds, equal_speeds, system,
+                    Comparison(other, track.astray, 0),
                 )  # fmt: skip
+                track.astray = found.has_left
                 if not equal_speeds:
-                    track.ways.append(way)
-                    moved = outward(gaps) * (gaps - begin).ravel()
-                    track.stages.append(Stage(moved, taken))
+                    track.ways.append(found.trajectory)
+                    moved = outward(begin) * (found.gaps - begin).ravel()
+                    track.stages.append(Stage(moved, found.interaction))
             else:
                 track.whole = False
-                gaps, ended, fields, tangents, kinds = descend_many(
-                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels
-                )
-            self.count.fields += fields
-            self.count.descent_steps += fields
-            self.count.derivatives += tangents
-            left -= fields
-            if ended == MET:
+                found = descend_many(gaps, prescribed, left, kinds, equal_speeds, system)
+            gaps, kinds, event = found.gaps, found.kinds, found.event
+            self.count.fields += found.fields
+            self.count.descent_steps += found.fields
+            self.count.derivatives += found.tangents
+            left -= found.fields
+            if event == REJOINED:
                 track.met = True
                 return np.empty((0, 2))
-            if ended == LOST:
+            if event == NO_FIELD:
                 raise NoState("there is no field of these edges", prescribed)
-            if ended == NARROW:
+            if event == VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
@@ -353,7 +361,7 @@ class EdgeMechanics:
                         raise FullContact
                     # at fixed separation the last gap never closes, however narrow it gets
                     law = law._replace(smallest=min(law.smallest, 0.05 * float(length[0])))
-            if ended == RESTING:
+            if event == AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1

@@ -7,7 +7,8 @@ import pytest
 
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian, leaving_step
+from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
+from adhesis.solver.sharp.descent.saddle import leaving_step
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, moved_gaps, tangent_of
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.gap.conformal_map import map_gaps

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.local_descent import Start
+from adhesis.solver.sharp.descent.local_descent import KnownState
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics, FullContact, NoState, Track
@@ -179,7 +179,7 @@ class Jumps:
         *,
         equal_speeds: bool = False,
         track: Track | None = None,
-        start: Start | None = None,
+        start: KnownState | None = None,
     ) -> Point | None:
         reach = CORRECTED * self.edges.wave
         while len(gaps):
