@@ -17,8 +17,8 @@ from __future__ import annotations
 
 # Lengths are in longest steps of a running edge, 0.05 λ_min: unchecked steps above 0.1 λ_min
 # leap over pinned minima. How often a length decides a loss: benchmarks/descent_steps.py.
-UNCHECKED_ALONE = 2.0  # longest steps (0.1 λ_min); a step of one edge that runs alone is not checked
-# for a minimum up to here, steps of several up to 1. Longer ones are checked by a cubic of the force.
+UNCHECKED_ALONE = 2.0  # longest steps (0.1 λ_min); up to here a step of one edge that runs alone
+# is not checked for a minimum, up to 1 that of several. The check is a cubic of the force.
 LONGEST_STRIDE = 3.0  # longest steps (0.15 λ_min); checked steps of several edges
 LONGEST_STRIDE_ALONE = 6.0  # longest steps (0.3 λ_min); checked steps of one edge. 0.45 λ_min leapt
 # over a minimum in 3 of 12 loops of benchmarks/few_gaps.py; 0.3 missed less than unchecked 0.1.

@@ -26,6 +26,7 @@ from adhesis.solver.sharp.descent.step_size import (
     after_rejection,
     after_turn,
     initial_size,
+    next_lengths,
     running_edges,
     with_running,
 )
@@ -111,16 +112,15 @@ def share_to_minimum(state: State, now: Forces, rows: ForceRows, rules: Rules) -
 
 
 @compiled
-def accepted_share(state: State, now: Forces, rows: ForceRows, rules: Rules) -> float:
+def accepted_share(state: State, slope: Array, to_minimum: float) -> float:
     """Judge the last step: the share of it that is kept.
 
     It is 1 for a step that is accepted and 0 for one that raised the energy by more than rounding;
-    a long step over a minimum is kept up to that minimum.
+    a long step over a minimum is kept up to that minimum. ``slope`` is dU/dn after the step.
     """
-    share = share_to_minimum(state, now, rows, rules)
-    if share < 1:
-        return share
-    change, work = energy_change(state.slope, now.slope, state.step)
+    if to_minimum < 1:
+        return to_minimum
+    change, work = energy_change(state.slope, slope, state.step)
     rose = change > ENERGY_ROUNDING * work and state.size.share > LEAST_STEP_SHARE
     return 0.0 if rose else 1.0
 
@@ -137,20 +137,21 @@ def taken_back(state: State, share: float) -> State:
 
 
 @compiled
-def accepted(state: State, now: Forces) -> State:
-    """Keep the last step: the edges stand where it led, with the forces there."""
-    _, work = energy_change(state.slope, now.slope, state.step)
+def accepted(state: State, slope: Array) -> State:
+    """Keep the last step: the edges stand where it led, with dU/dn = ``slope``."""
+    _, work = energy_change(state.slope, slope, state.step)
     size = after_fall(state.size) if work > 0 else state.size
-    return State(state.gaps, state.gaps, state.step, now.slope, no_long_step(), size)
+    return State(state.gaps, state.gaps, state.step, slope, no_long_step(), size)
 
 
 # ------------------------------------------------------------------ the next step
 
 
 @compiled
-def resized(state: State, size: StepSize) -> State:
-    """Replace the state of the step-size control."""
-    return State(state.gaps, state.start, state.step, state.slope, state.long, size)
+def bounded(state: State, longest: float) -> tuple[State, StepLengths]:
+    """Choose the lengths that bound the next step, ``longest`` being a full one."""
+    size, lengths = next_lengths(state.size, longest)
+    return State(state.gaps, state.start, state.step, state.slope, state.long, size), lengths
 
 
 @compiled

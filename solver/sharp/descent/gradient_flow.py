@@ -22,25 +22,30 @@ from adhesis.solver.sharp.descent.edge_forces import (
     forces_at,
 )
 from adhesis.solver.sharp.descent.flow_state import (
+    State,
     accepted,
     accepted_share,
+    bounded,
     initial_state,
     moved,
-    resized,
+    share_to_minimum,
     taken_back,
     turned,
 )
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
 from adhesis.solver.sharp.descent.saddle import QuadraticModel, step_off_saddle
-from adhesis.solver.sharp.descent.step_size import keeps_tangent, next_lengths, turns_back
+from adhesis.solver.sharp.descent.step_size import keeps_tangent, turns_back
 from adhesis.solver.sharp.descent.trajectory import (
     Comparison,
+    Trajectory,
     begun,
     compared,
     extended,
+    note_force,
     without_last,
 )
 from adhesis.solver.sharp.equilibrium.griffith import (
+    Law,
     at_least,
     narrowest,
     step_limits,
@@ -75,6 +80,8 @@ class Descent(NamedTuple):
         Fields and tangents that were computed.
     trajectory : array, shape (n, 2L)
         Edges that it went through.
+    forces : array, shape (n - 1,)
+        Norm of dU/dn at each of them but the last.
     has_left : bool
         Whether it has been away from the trajectory that it is compared with.
     interaction : array, shape (2L, 2L)
@@ -87,6 +94,7 @@ class Descent(NamedTuple):
     fields: int
     tangents: int
     trajectory: Array
+    forces: Array
     has_left: bool
     interaction: Array
 
@@ -103,13 +111,9 @@ def descend(
 ) -> Descent:
     """Descend in energy, d being ``prescribed``, until an event.
 
-    Edges move in proportion to their excess energy release rates, by no more than the longest step
-    and a quarter of the gap or patch that they may close. Or, for comparison, with
-    ``equal_speeds``: edges out of equilibrium run, all at the same speed (their limit, twice as
-    long for one that runs alone), and edges near equilibrium follow them by Newton's step.
-
-    The forces are always fresh; a tangent serves several steps while edges run, unless one turns.
-    ``least`` are the least kinds of the gaps, empty for any.
+    No edge moves in a step by more than the longest step, or a quarter of the gap or patch that it
+    may close. Forces are always fresh; a tangent serves several steps while edges run, unless one
+    turns. ``least`` are the least kinds of the gaps, empty for any.
     """
     law, rules = system.law, system.rules
     state = initial_state(gaps)
@@ -119,8 +123,7 @@ def descend(
     solution = without_field(map_gaps(gaps), np.empty(0, dtype=np.int64), law.hold)
     rows = ForceRows(np.zeros((edges, edges)), np.zeros(edges, dtype=np.int64))
     interaction = np.zeros((edges, edges))
-    values = np.zeros(edges)
-    matrix = np.zeros((edges, edges))
+    values, matrix = np.zeros(edges), np.zeros((edges, edges))
     fields, tangents, event = 0, 0, STEP_LIMIT
     while fields < most_fields:
         fields += 1
@@ -131,17 +134,13 @@ def descend(
             event = NO_FIELD
             break
         rows.known[:] = 0
-        share = accepted_share(state, now, rows, rules)
+        share = accepted_share(state, now.slope, share_to_minimum(state, now, rows, rules))
         if share < 1:
-            step = share * state.step
-            state = taken_back(state, share)
-            trajectory = without_last(trajectory)
-            if share > 0:
-                add_interaction(rows.values, step, interaction)
-                trajectory = extended(trajectory, state.gaps)
+            state, trajectory = backed_up(state, share, trajectory, rows, interaction)
             continue
         add_interaction(rows.values, state.step, interaction)
-        state = accepted(state, now)
+        state = accepted(state, now.slope)
+        note_force(trajectory, now.slope)
         if fields % FIELDS_PER_COMPARISON == 0:
             comparison = compared(comparison, state.gaps, law.longest)
             if comparison.matches == COMPARISONS:
@@ -151,8 +150,7 @@ def descend(
         if not keeps:
             tangents += 1
             values, matrix = linearise(now, rows, equal_speeds, system)
-        size, lengths = next_lengths(state.size, law.longest)
-        state = resized(state, size)
+        state, lengths = bounded(state, law.longest)
         model = QuadraticModel(values, matrix, step_limits(solution.table, lengths.reach))
         step = kinetic_step(model, now, equal_speeds, law.faint)
         if keeps and turns_back(step, state.step, lengths.reach):
@@ -170,17 +168,38 @@ def descend(
             break
         state = moved(state, step, now, lengths, model.limit, rows, rules)
         trajectory = extended(trajectory, state.gaps)
-        if narrowest(state.gaps) < law.smallest:
-            add_interaction(rows.values, state.step, interaction)
-            event = VANISHED
+        event = event_after(state.gaps, length, law)
+        if event != STEP_LIMIT:
             break
-        if length < law.near:
-            event = AT_REST
-            break
+    if event == VANISHED:
+        add_interaction(rows.values, state.step, interaction)
     points = trajectory.points[: trajectory.length]
+    forces = trajectory.forces[: trajectory.length - 1]
     return Descent(
-        state.gaps, event, kinds, fields, tangents, points, comparison.has_left, interaction
+        state.gaps, event, kinds, fields, tangents, points, forces, comparison.has_left, interaction
     )
+
+
+@compiled
+def backed_up(
+    state: State, share: float, trajectory: Trajectory, rows: ForceRows, interaction: Array
+) -> tuple[State, Trajectory]:
+    """Take the last step back to a ``share`` of it, and correct the record of the descent."""
+    step = share * state.step
+    state = taken_back(state, share)
+    trajectory = without_last(trajectory)
+    if share > 0:
+        add_interaction(rows.values, step, interaction)
+        trajectory = extended(trajectory, state.gaps)
+    return state, trajectory
+
+
+@compiled
+def event_after(gaps: Array, length: float, law: Law) -> int:
+    """Detect an event after a step of this length; STEP_LIMIT if there is none."""
+    if narrowest(gaps) < law.smallest:
+        return VANISHED
+    return AT_REST if length < law.near else STEP_LIMIT
 
 
 @compiled
@@ -206,7 +225,12 @@ def linearise(
 
 @compiled
 def kinetic_step(model: QuadraticModel, now: Forces, equal_speeds: bool, faint: float) -> Array:
-    """Choose the step of all edges, by linear kinetics or with equal speeds."""
+    """Choose the step of all edges, by linear kinetics or with equal speeds.
+
+    By linear kinetics edges move in proportion to their excess energy release rates. With equal
+    speeds, for comparison, edges out of equilibrium run, all at the same speed (their limit, twice
+    as long for one that runs alone), and edges near equilibrium follow them by Newton's step.
+    """
     if equal_speeds:
         return bound_constrained_step(model.matrix, model.values, -now.residual, model.limit)
     return flow_step(model.values, model.matrix, -now.slope, model.limit, faint)

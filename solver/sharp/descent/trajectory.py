@@ -21,9 +21,18 @@ from adhesis.solver.sharp.tolerances import (
 
 
 class Trajectory(NamedTuple):
-    """Edges that a descent went through: the first ``length`` rows of ``points``."""
+    """Edges that a descent went through: the first ``length`` rows.
+
+    Attributes
+    ----------
+    points : array, shape (n, 2L)
+    forces : array, shape (n,)
+        Norm of dU/dn at each; not known at the last one until its field is solved.
+    length : int
+    """
 
     points: Array
+    forces: Array
     length: int
 
 
@@ -50,25 +59,37 @@ def begun(gaps: Array) -> Trajectory:
     """Begin a trajectory at these gaps."""
     points = np.empty((64, 2 * gaps.shape[0]))
     points[0] = gaps.ravel()
-    return Trajectory(points, 1)
+    return Trajectory(points, np.zeros(64), 1)
 
 
 @compiled
 def extended(trajectory: Trajectory, gaps: Array) -> Trajectory:
     """Add a point to a trajectory."""
-    points, length = trajectory.points, trajectory.length
+    points, forces, length = trajectory.points, trajectory.forces, trajectory.length
     if length == points.shape[0]:
         longer = np.empty((2 * length, points.shape[1]))
         longer[:length] = points
         points = longer
+        more = np.zeros(2 * length)
+        more[:length] = forces
+        forces = more
     points[length] = gaps.ravel()
-    return Trajectory(points, length + 1)
+    return Trajectory(points, forces, length + 1)
+
+
+@compiled
+def note_force(trajectory: Trajectory, slope: Array) -> None:
+    """Note the norm of dU/dn at the last point of a trajectory."""
+    square = 0.0
+    for e in range(slope.shape[0]):
+        square += slope[e] * slope[e]
+    trajectory.forces[trajectory.length - 1] = np.sqrt(square)
 
 
 @compiled
 def without_last(trajectory: Trajectory) -> Trajectory:
     """Drop the last point of a trajectory."""
-    return Trajectory(trajectory.points, trajectory.length - 1)
+    return Trajectory(trajectory.points, trajectory.forces, trajectory.length - 1)
 
 
 @compiled
