@@ -83,6 +83,8 @@ class Track:
         Gaps of a window in which the descent first came to rest.
     stages : list of Stage
         What the edges did, one for every set of gaps on the way.
+    forces : list of array
+        Norm of the forces at the points of each of the ways but its last.
     whole : bool
         Whether the stages are known.
     """
@@ -92,6 +94,7 @@ class Track:
     met: bool = False
     rest: Array | None = None
     stages: list[Stage] = field(default_factory=list)
+    forces: list[Array] = field(default_factory=list)
     whole: bool = True
 
     def of(self, edges: int) -> Array:
@@ -284,13 +287,15 @@ class EdgeMechanics:
         reach: float,
         *,
         equal_speeds: bool = False,
+        shortened: float = 1.0,
         track: Track | None = None,
         start: KnownState | None = None,
     ) -> Point | Array:
         """Descend in energy, what is prescribed being fixed, to the next minimum.
 
         By linear kinetics, which leaves its ``track``; or with ``equal_speeds`` by the rule it is
-        compared with, until that has met the track. From a ``start`` in a window.
+        compared with, or with steps that are ``shortened``, until that has met the track. From a
+        ``start`` in a window.
 
         Returns
         -------
@@ -307,12 +312,13 @@ class EdgeMechanics:
         """
         # Without adhesion the minimum is unique, and the energy's slope vanishes there twice.
         equal_speeds = equal_speeds or self.critical == 0
-        law = self.law
+        law = self.law._replace(longest=shortened * self.law.longest)
+        follows = not equal_speeds and shortened == 1
         left = _DESCENT_LIMIT
         kinds = _ANY
         rests = 0
         track = track or Track()
-        other = track.of(gaps.size if equal_speeds else 0)
+        other = track.of(0 if follows else gaps.size)
         if start is not None and len(gaps) >= self.many:
             track.whole = False
             begun = self._begun(start, gaps, prescribed, reach, equal_speeds, track)
@@ -334,7 +340,8 @@ class EdgeMechanics:
                     Comparison(other, track.astray, 0),
                 )  # fmt: skip
                 track.astray = found.has_left
-                if not equal_speeds:
+                if follows:
+                    track.forces.append(found.forces)
                     track.ways.append(found.trajectory)
                     moved = outward(begin) * (found.gaps - begin).ravel()
                     track.stages.append(Stage(moved, found.interaction))

@@ -21,6 +21,9 @@ from adhesis.solver.sharp.output.contact_states import States, Trace
 _MOST_TOUCHES = 10_000  # nucleations in one jump; more is a bug
 _RAN = 0.05  # an edge that went further than this, in λ_min, ran
 _HELD_BACK = 0.03  # runners that take less than this share of C_c² from each other do not race
+_SADDLE = 8.0  # forces that are so much larger before and after a point have passed a saddle there
+_RAN_WITH = 0.1  # C_c²; forces below are those of the fold at which a jump begins
+_SHORTENED = 0.25  # of the steps, where they are tried again; half as long did not do
 _ELSEWHERE = 0.01  # edges this far apart, in λ_min, are those of different minima
 
 Rival = Point | None | FullContact
@@ -155,7 +158,7 @@ class Jumps:
         """Descend to the next minimum of the energy; None when no contact is left.
 
         Where edges may have raced, a minimum that equal speeds lead to instead is added to
-        ``rivals``, unless there is one.
+        ``rivals``, unless there is one, or one that short steps lead to past a saddle.
         """
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
@@ -165,12 +168,45 @@ class Jumps:
         if not rivals and self._may_have_raced(gaps, point, track):
             try:
                 rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
-            except FullContact as full:
-                rivals.append(full)
-            else:
                 if not track.met and not self._alike(rival, point):
                     rivals.append(rival)
+                    return point
+                went = point is None or point.gaps.shape != gaps.shape
+                beyond = self._beyond_saddle(track) if went and track.whole else None
+                if beyond is not None:
+                    rival = self._relax(gaps, at, shortened=_SHORTENED, track=beyond)
+                    if not beyond.met and not self._alike(rival, point):
+                        rivals.append(rival)
+            except FullContact as full:
+                rivals.append(full)
+            except NoState:
+                pass  # a comparison that does not come to rest is no failure of the path
         return point
+
+    def _beyond_saddle(self, track: Track) -> Track | None:
+        """Find the part of a descent after the last saddle that it passed; None if it passed none.
+
+        Next to a saddle the forces are small, and little decides to which side edges run on. That
+        counts where runners hold each other back, and gaps or patches went.
+        """
+        for way, forces, stage in reversed(
+            list(zip(track.ways, track.forces, track.stages, strict=True))
+        ):
+            if not self._hold_back(stage.way, stage.taken):
+                continue
+            before = np.maximum.accumulate(forces)
+            after = np.maximum.accumulate(forces[::-1])[::-1]
+            ran = before > _RAN_WITH * self.edges.critical**2
+            saddles = np.flatnonzero(ran & (np.minimum(before, after) > _SADDLE * forces))
+            if saddles.size > 0:
+                last = saddles[-1]
+                left = np.flatnonzero(forces[last:] > _SADDLE * forces[last])[0]
+                # segments are compared that are no longer than those of short steps
+                points = way[last + left :]
+                places = np.arange(0, len(points) - 1 + 1e-9, _SHORTENED)
+                fine = [np.interp(places, np.arange(len(points)), edge) for edge in points.T]
+                return Track(ways=[np.ascontiguousarray(np.transpose(fine))], astray=True)
+        return None
 
     def _relax(
         self,
@@ -178,14 +214,16 @@ class Jumps:
         at: float,
         *,
         equal_speeds: bool = False,
+        shortened: float = 1.0,
         track: Track | None = None,
         start: KnownState | None = None,
     ) -> Point | None:
         reach = CORRECTED * self.edges.wave
         while len(gaps):
             found = self.edges.relax(
-                gaps, at, reach, equal_speeds=equal_speeds, track=track, start=start
-            )
+                gaps, at, reach, equal_speeds=equal_speeds, shortened=shortened, track=track,
+                start=start,
+            )  # fmt: skip
             if isinstance(found, Point):
                 return found
             gaps, start = found, None
@@ -199,8 +237,6 @@ class Jumps:
         first order in their ways and with the tangent at the end or, where patches or gaps went,
         along the ``track``, for every set of gaps on it. Of many gaps that is not known.
         """
-        if end is None and len(start) == 1:
-            return False
         if end is None or end.field.gaps.shape != start.shape:
             return not track.whole or any(
                 self._hold_back(stage.way, stage.taken) for stage in track.stages
