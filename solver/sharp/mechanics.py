@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.gradient_flow import LOST, MET, NARROW, RESTING
-from adhesis.solver.sharp.descent.local_descent import Start
-from adhesis.solver.sharp.descent.trajectory import Track
+from adhesis.solver.sharp.descent.gradient_flow import AT_REST, NO_FIELD, REJOINED, VANISHED
+from adhesis.solver.sharp.descent.local_descent import KnownState
+from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, narrowest
 from adhesis.solver.sharp.equilibrium.linear_exterior import About, known_about
@@ -140,12 +140,12 @@ class EdgeMechanics(EdgeProblem):
         )
         return known
 
-    def start(self, point: Point | None) -> Start | None:
+    def start(self, point: Point | None) -> KnownState | None:
         """Return ``point`` as the start of a descent in a window; None for few gaps."""
         if point is None or not self.uses_windows(point.gaps):
             return None
         leads = int(np.argmax(np.abs(point.rate))) // 2
-        return Start(point.gaps, self.about(point), leads)
+        return KnownState(point.gaps, self.about(point), leads)
 
     def relax(
         self,
@@ -154,13 +154,15 @@ class EdgeMechanics(EdgeProblem):
         reach: float,
         *,
         equal_speeds: bool = False,
+        shortened: float = 1.0,
         track: Track | None = None,
-        start: Start | None = None,
+        start: KnownState | None = None,
     ) -> Point | Array:
         """Descend in energy at a prescribed value to the next minimum.
 
-        By linear kinetics, which extends the ``track``; or with ``equal_speeds`` by the rule it is
-        compared with, until that has met the track. From a ``start`` in a window.
+        By linear kinetics, which extends the ``track``; or, to be compared with that, with
+        ``equal_speeds`` or steps that are ``shortened``, until the track is met. From a ``start``
+        in a window.
 
         Returns
         -------
@@ -182,60 +184,65 @@ class EdgeMechanics(EdgeProblem):
             begun = self._relax_in_window(start, gaps, prescribed, reach, equal_speeds, track)
             if isinstance(begun, Point):
                 return begun
-            if track.met:
+            if track.rejoined:
                 return np.empty((0, 2))
             if begun is not None:
                 gaps = begun
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
-        return self._relax(gaps, prescribed, reach, equal_speeds, track)
+        return self._relax(gaps, prescribed, reach, equal_speeds, shortened, track)
 
     def _relax_in_window(
-        self, start: Start, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
+        self, start: KnownState, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
         track: Track,
     ) -> Point | Array | None:  # fmt: skip
         """Descend in a window on a known state; return gaps to go on from if that is no end."""
-        track.whole = False
+        track.is_complete = False
         rest = start.descend(
             gaps, prescribed, self.law, self.source.panels, self.count, self.smallest,
             equal_speeds=equal_speeds,
         )  # fmt: skip
         if rest is None:
             return None
-        if rest.ended == RESTING:
+        if rest.event == AT_REST:
             if not equal_speeds:
-                track.rest = rest.local
-            elif track.rest is not None and track.rest.shape == rest.local.shape:
-                track.met = bool(np.abs(track.rest - rest.local).max() < SAME_REST * self.wave)
-            point = None if track.met else self.equilibrium(rest.gaps, prescribed, reach)
+                track.rest = rest.window_gaps
+            elif track.rest is not None and track.rest.shape == rest.window_gaps.shape:
+                apart = np.abs(track.rest - rest.window_gaps).max()
+                track.rejoined = bool(apart < SAME_REST * self.wave)
+            point = None if track.rejoined else self.equilibrium(rest.gaps, prescribed, reach)
             if point is not None:
                 return point
         return rest.gaps
 
     def _relax(
-        self, gaps: Array, prescribed: float, reach: float, equal_speeds: bool, track: Track
-    ) -> Point | Array:
+        self, gaps: Array, prescribed: float, reach: float, equal_speeds: bool, shortened: float,
+        track: Track,
+    ) -> Point | Array:  # fmt: skip
         """Descend with all gaps."""
         system = self.system(gaps)
-        left, kinds, rests, smallest = DESCENT_LIMIT, _ANY, 0, self.law.smallest
+        law = self.law._replace(longest=shortened * self.law.longest)
+        compare = equal_speeds or shortened < 1
+        left, kinds, rests = DESCENT_LIMIT, _ANY, 0
         while left > 0 and rests <= 2 * RESTS:
             end = system.descend(
-                gaps, prescribed, left, kinds, smallest, track, equal_speeds=equal_speeds
-            )
+                gaps, prescribed, left, kinds, law, track, equal_speeds=equal_speeds,
+                compare=compare,
+            )  # fmt: skip
             gaps, kinds = end.gaps, end.kinds
             left -= end.fields
-            if end.ended == MET:
-                track.met = True
+            if end.event == REJOINED:
+                track.rejoined = True
                 return np.empty((0, 2))
-            if end.ended == LOST:
+            if end.event == NO_FIELD:
                 raise NoState("there is no field of these edges", prescribed)
-            if end.ended == NARROW:
+            if end.event == VANISHED:
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
-                smallest = self._smallest_of_last_gap(gaps, smallest)
-            if end.ended == RESTING:
+                law = law._replace(smallest=self._smallest_of_last_gap(gaps, law.smallest))
+            if end.event == AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1

@@ -28,7 +28,7 @@ from adhesis.solver.precompile import COMPILED_METHODS, _small_loops, small_prob
 from adhesis.solver.registry import make_method
 from adhesis.solver.runtime import jit as compiled
 from adhesis.solver.runtime.uninterrupted import uninterrupted
-from adhesis.solver.sharp.descent.trajectory import Stage
+from adhesis.solver.sharp.descent.track import Stage
 from adhesis.solver.sharp.field.solution import Hold
 from tools.interrupted import Interrupt, interrupted
 

@@ -7,7 +7,8 @@ import pytest
 
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian, leaving_step
+from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
+from adhesis.solver.sharp.descent.saddle import leaving_step
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, moved_gaps, tangent_of
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
@@ -156,6 +157,29 @@ def test_a_race_is_flagged_with_what_is_at_stake():
     assert 0.01 * result.loss < first.at_stake < result.loss
     assert result.races >= 1
     assert result.energy_at_stake == pytest.approx(sum(j.at_stake for j in result.jumps))
+
+
+@pytest.mark.parametrize(
+    ("hurst", "n0", "ratio", "gamma", "seed"),
+    [(0.5, 3, 20, 0.03, 11), (0.8, 2, 16, 0.01, 25)],
+    ids=["a patch goes or stays", "contact is lost or stays on a crest"],
+)
+def test_a_jump_whose_end_the_length_of_the_steps_decides_is_flagged(
+    hurst, n0, ratio, gamma, seed
+):
+    """Equal speeds end where the long steps do; short ones pass a saddle on its other side."""
+    profile = self_affine_profile(hurst, period=1e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
+
+    def follow(share: float):
+        method = SharpMethod(Problem(profile, SOLID, gamma))
+        law = method.edges.law
+        method.edges.law = law._replace(longest=share * law.longest)
+        return run_loop(method, max_penetration=0.9, load_steps=20)
+
+    usual, short = follow(1.0), follow(0.25)
+    assert abs(usual.loss / short.loss - 1) > 1e-3
+    assert usual.races >= 1
+    assert usual.energy_at_stake > abs(usual.loss - short.loss)
 
 
 def test_nothing_races_where_the_rules_agree():

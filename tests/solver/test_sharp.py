@@ -15,7 +15,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.references.single_wave import SingleWave
-from adhesis.solver.sharp.descent.bound_constrained_step import running_step
+from adhesis.solver.sharp.descent.bound_constrained_step import bound_constrained_step
 from adhesis.solver.sharp.method import SharpMethod
 from tests.support.scenes import HALF_SPACE
 
@@ -125,7 +125,7 @@ def test_a_descent_step_is_a_minimum_of_the_model_in_its_box():
             matrix = root @ root.T + np.eye(n)
             d, pull = rng.uniform(0.5, 2, n), rng.normal(size=n)
             limit = rng.uniform(0.05, 0.5, n)
-            step = running_step(matrix, d, pull, limit)
+            step = bound_constrained_step(matrix, d, pull, limit)
             force = d * pull - matrix @ (d * step)
             runs = np.abs(step) > 0.999999 * limit
             assert np.all(np.abs(step) <= limit * (1 + 1e-12))

@@ -12,14 +12,19 @@ from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.history import ComputedJump
 from adhesis.solver.sharp.continuation.races import RaceCheck
-from adhesis.solver.sharp.descent.local_descent import Start
-from adhesis.solver.sharp.descent.trajectory import Track
+from adhesis.solver.sharp.descent.local_descent import KnownState
+from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
-from adhesis.solver.sharp.tolerances import CORRECTED, MOST_NUCLEATIONS, OTHER_MINIMUM
+from adhesis.solver.sharp.tolerances import (
+    CORRECTED,
+    MOST_NUCLEATIONS,
+    OTHER_MINIMUM,
+    SHORTENED_STEPS,
+)
 
 Rival = Point | None | FullContact
 """Where equal speeds led: a minimum, no contact, or full contact (under a load)."""
@@ -150,7 +155,7 @@ class Jumps:
         """Descend to the next minimum of the energy; None when no contact is left.
 
         Where edges may have raced, a minimum that equal speeds lead to instead is added to
-        ``rivals``, unless there is one.
+        ``rivals``, unless there is one, or one that short steps lead to past a saddle.
         """
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
@@ -160,11 +165,18 @@ class Jumps:
         if not rivals and self.races.may_occur(gaps, point, track):
             try:
                 rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
+                if not track.rejoined and not self._alike(rival, point):
+                    rivals.append(rival)
+                    return point
+                beyond = self.races.beyond_saddle(gaps, point, track)
+                if beyond is not None:
+                    rival = self._relax(gaps, at, shortened=SHORTENED_STEPS, track=beyond)
+                    if not beyond.rejoined and not self._alike(rival, point):
+                        rivals.append(rival)
             except FullContact as full:
                 rivals.append(full)
-            else:
-                if not track.met and not self._alike(rival, point):
-                    rivals.append(rival)
+            except NoState:
+                pass  # a comparison that does not come to rest is no failure of the path
         return point
 
     def _relax(
@@ -173,14 +185,16 @@ class Jumps:
         at: float,
         *,
         equal_speeds: bool = False,
+        shortened: float = 1.0,
         track: Track | None = None,
-        start: Start | None = None,
+        start: KnownState | None = None,
     ) -> Point | None:
         reach = CORRECTED * self.edges.wave
         while len(gaps):
             found = self.edges.relax(
-                gaps, at, reach, equal_speeds=equal_speeds, track=track, start=start
-            )
+                gaps, at, reach, equal_speeds=equal_speeds, shortened=shortened, track=track,
+                start=start,
+            )  # fmt: skip
             if isinstance(found, Point):
                 return found
             gaps, start = found, None

@@ -25,6 +25,7 @@ from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import RULES
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
+    BRANCH_WINDOW_HALF_WIDTH,
     CORRECTED,
     EXTERIOR_BEFORE_FOLD,
     EXTERIOR_BEND,
@@ -32,7 +33,6 @@ from adhesis.solver.sharp.tolerances import (
     EXTERIOR_MISSED,
     EXTERIOR_MOTION,
     FOLD_BELIEVED,
-    WINDOW_HALF_WIDTH,
     WINDOW_LEAD_MOTION,
 )
 
@@ -63,7 +63,7 @@ class LocalBranch:
         folds = self._fold_distances
         if lead is None:
             lead = int(np.argmin(np.fmin(WINDOW_LEAD_MOTION * edges.wave / rates, folds)))
-        half = min(WINDOW_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
+        half = min(BRANCH_WINDOW_HALF_WIDTH, (count - 3) // 2)  # two gaps at least lie outside
         self._first = (lead // 2 - half) % count
         self.inside = (self._first + np.arange(2 * half + 1)) % count
         out = np.ones(count, dtype=np.bool_)

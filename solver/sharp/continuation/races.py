@@ -6,11 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.trajectory import Track
+from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.tolerances import HELD_BACK, RAN
+from adhesis.solver.sharp.tolerances import (
+    HELD_BACK,
+    RAN,
+    SADDLE_FORCE,
+    SADDLE_PASSED,
+    SHORTENED_STEPS,
+)
 
 
 class RaceCheck:
@@ -32,10 +38,8 @@ class RaceCheck:
         first order in their ways and with the tangent at the end or, where patches or gaps went,
         along the ``track``, for every set of gaps on it. Of many gaps that is not known.
         """
-        if end is None and len(start) == 1:
-            return False
         if end is None or end.field.gaps.shape != start.shape:
-            return not track.whole or any(
+            return not track.is_complete or any(
                 self._hold_back(stage.way, stage.taken) for stage in track.stages
             )
         gaps = end.field.gaps
@@ -46,6 +50,33 @@ class RaceCheck:
         opening = end.field.solution.opening[runners]
         stiffness = opening[:, None] * self._edges.stiffness(end, runners)
         return self._hold_back(way[runners], (stiffness + stiffness.T) * way[runners])
+
+    def beyond_saddle(self, start: Array, end: Point | None, track: Track) -> Track | None:
+        """Return the part of a descent after the last saddle that it passed, or None.
+
+        Next to a saddle the forces are small, and little decides to which side edges run on. That
+        counts where runners hold each other back, and gaps or patches went.
+        """
+        same_gaps = end is not None and end.gaps.shape == start.shape
+        if same_gaps or not track.is_complete:
+            return None
+        stages = zip(track.ways, track.forces, track.stages, strict=True)
+        for way, forces, stage in reversed(list(stages)):
+            if not self._hold_back(stage.way, stage.taken):
+                continue
+            before = np.maximum.accumulate(forces)
+            after = np.maximum.accumulate(forces[::-1])[::-1]
+            ran = before > SADDLE_FORCE * self._edges.critical**2
+            saddles = np.flatnonzero(ran & (np.minimum(before, after) > SADDLE_PASSED * forces))
+            if saddles.size > 0:
+                last = saddles[-1]
+                left = np.flatnonzero(forces[last:] > SADDLE_PASSED * forces[last])[0]
+                # segments are compared that are no longer than those of short steps
+                points = way[last + left :]
+                places = np.arange(0, len(points) - 1 + 1e-9, SHORTENED_STEPS)
+                fine = [np.interp(places, np.arange(len(points)), edge) for edge in points.T]
+                return Track(ways=[np.ascontiguousarray(np.transpose(fine))], has_left=True)
+        return None
 
     def _runners(self, way: Array) -> NDArray[np.int64]:
         return np.flatnonzero(np.abs(way) > RAN * self._edges.wave)

@@ -1,346 +1,244 @@
-"""Descent along a jump, compiled."""
+"""Descent in energy along a jump: integration of the edges' gradient flow, compiled.
+
+The integrator solves the field, judges the step that led there (``flow_state``), and chooses the
+next one, by linear kinetics (``linear_kinetics``) or by the rule that it is compared with, equal
+speeds (``bound_constrained_step``). Its step-size control is ``step_size``. It ends with an event.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.descent.bound_constrained_step import off_saddle, running_step
-from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian, leaving_step
+from adhesis.solver.sharp.descent.bound_constrained_step import bound_constrained_step
+from adhesis.solver.sharp.descent.edge_forces import (
+    FlowProblem,
+    ForceRows,
+    Forces,
+    add_interaction,
+    forces_at,
+)
+from adhesis.solver.sharp.descent.flow_state import (
+    State,
+    accepted,
+    accepted_share,
+    bounded,
+    initial_state,
+    moved,
+    share_to_minimum,
+    taken_back,
+    turned,
+)
+from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
+from adhesis.solver.sharp.descent.saddle import QuadraticModel, step_off_saddle
+from adhesis.solver.sharp.descent.step_size import keeps_tangent, turns_back
+from adhesis.solver.sharp.descent.trajectory import (
+    Comparison,
+    Trajectory,
+    begun,
+    compared,
+    extended,
+    note_force,
+    without_last,
+)
 from adhesis.solver.sharp.equilibrium.griffith import (
     Law,
     at_least,
-    imbalance,
-    moved_gaps,
     narrowest,
     step_limits,
     symmetric,
     tangent_of,
 )
-from adhesis.solver.sharp.field.cholesky import is_definite
-from adhesis.solver.sharp.field.dense_solver import solve, solve_again
-from adhesis.solver.sharp.field.force_along_step import first_fall, forces_on
-from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.conformal_map import LEFT, map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.field.solution import without_field
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.quadrature import Kinds, choose_kinds
+from adhesis.solver.sharp.tolerances import COMPARISONS, FIELDS_PER_COMPARISON
 
-# Further running steps with one tangent: of an edge that runs alone only the size of its step
-# depends on it, of several the direction, too.
-_REUSES_ALONE = 8
-_REUSES = 2
-# Longer steps, in longest unchecked ones, are looked at for a minimum that they leap over.
-_UNCHECKED_ALONE = 2.0  # of an edge that runs alone
-_STRIDE = 3.0  # longest of all
-_STRIDE_ALONE = 6.0
-_RUNS = 0.25  # edges that move by this share of the longest motion run
-# While others run an edge stands until it is so far from its place, in longest steps of its own:
-# what belongs to gaps that have not changed is not computed anew.
-_STANDS = 0.01
-_NOISE = 1e-3  # a rise of the energy below this share of the work done both ways is rounding
-_TIE = 1e-3  # two ways off a saddle whose gains differ by less are equal
-_LEAST_SHARE = 0.02  # descent steps are not cut below this share of the longest
-# A lone edge that runs to and fro leaps over a minimum that no look at its steps shows.
-_TO_AND_FRO = 8  # turns after which the steps of a descent become shorter,
-_SHORTENED = 0.8  # each time to this share
+# Events that end a descent.
+AT_REST = 0  # the steps have become short: Newton's iteration finds the equilibrium
+VANISHED = 1  # a gap or patch is below the smallest length
+STEP_LIMIT = 2  # the fields that were allowed are used up
+NO_FIELD = 3  # the edges have no field
+REJOINED = 4  # the descent is on the other one's trajectory again
 
-_MET = 0.4  # edges this close to another descent's track, in longest steps, are on it
-_LOOKS = 3  # in so many looks one after the other
-_LOOK_EVERY = 2  # fields
 
-# How a descent ended.
-RESTING, NARROW, UNFINISHED, LOST, MET = 0, 1, 2, 3, 4
+class Descent(NamedTuple):
+    """Result of a descent.
+
+    Attributes
+    ----------
+    gaps : array, shape (L, 2)
+        Where it ended.
+    event : int
+        Why: one of the events of this module.
+    kinds : int array, shape (L,)
+        Kinds of the gaps.
+    fields, tangents : int
+        Fields and tangents that were computed.
+    trajectory : array, shape (n, 2L)
+        Edges that it went through.
+    forces : array, shape (n - 1,)
+        Norm of dU/dn at each of them but the last.
+    has_left : bool
+        Whether it has been away from the trajectory that it is compared with.
+    interaction : array, shape (2L, 2L)
+        Force, as C², that the outward motion of each edge (columns) took from every edge (rows).
+    """
+
+    gaps: Array
+    event: int
+    kinds: Kinds
+    fields: int
+    tangents: int
+    trajectory: Array
+    forces: Array
+    has_left: bool
+    interaction: Array
 
 
 @compiled
 def descend(
     gaps: Array,
     prescribed: float,
-    most: int,
+    most_fields: int,
     least: Kinds,
     equal_speeds: bool,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
-    track: Array,
-    astray: bool,
-) -> tuple[Array, int, int, int, Kinds, Array, bool, Array]:
-    """Descend in energy, d being ``prescribed``, for at most ``most`` steps.
+    system: FlowProblem,
+    comparison: Comparison,
+) -> Descent:
+    """Descend in energy, d being ``prescribed``, until an event.
 
-    Edges move in proportion to their excess energy release rates, by no more than the longest step
-    and a quarter of the gap or patch that they may close. Or, for comparison, with
-    ``equal_speeds``: edges out of equilibrium run, all at the same speed (their limit, twice as
-    long for one that runs alone), and edges near equilibrium follow them by Newton's step.
-
-    While edges run, a tangent serves several steps, of several edges three, unless an edge turns;
-    the openings are always fresh. A step that raised the energy is taken back and halved.
-
-    ``track``, shape (n, 2L), holds the edges that another descent went through. One that has been
-    away from it (``astray``) and comes back to it has met it.
-
-    Returns
-    -------
-    gaps, how it ended, fields, tangents, kinds, passed, astray, taken
-        RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
-        length, UNFINISHED after the last step, LOST where the edges have no field, MET where they
-        are on the track again. ``passed`` is the way of this descent, as ``track``; ``taken`` the
-        force that the outward motion of each edge (columns) took from every edge (rows).
+    No edge moves in a step by more than the longest step, or a quarter of the gap or patch that it
+    may close. Forces are always fresh; a tangent serves several steps while edges run, unless one
+    turns. ``least`` are the least kinds of the gaps, empty for any.
     """
-    edges = 2 * gaps.shape[0]
-    fields = 0
-    tangents = 0
-    reuses = 0
-    runners = 0
-    share = 1.0  # of the longest step; less after a step that raised the energy
-    before = gaps
-    last = np.zeros(edges)
-    force = np.zeros(edges)  # of the energy on each edge, before the last step
-    d = np.zeros(edges)
-    values = np.zeros(edges)
-    matrix = np.zeros((edges, edges))  # tangent, or eigenvectors of the Hessian
+    law, rules = system.law, system.rules
+    state = initial_state(gaps)
+    trajectory = begun(gaps)
     kinds = least
-    stride = 0.0
-    checked = np.empty(0, dtype=np.int64)  # edges that ran far in the last step
-    departed = np.empty(0)  # how their forces changed at its start
-    rows = np.zeros((edges, edges))  # how forces change with the edges, of those edges
-    known = np.zeros(edges, dtype=np.int64)  # that are not zero here
-    passed = np.empty((64, edges))
-    passed[0] = gaps.ravel()
-    count = 1
-    looks = 0
-    turned = 0
-    taken = np.zeros((edges, edges))
-    while fields < most:
+    edges = 2 * gaps.shape[0]
+    solution = without_field(map_gaps(gaps), np.empty(0, dtype=np.int64), law.hold)
+    rows = ForceRows(np.zeros((edges, edges)), np.zeros(edges, dtype=np.int64))
+    interaction = np.zeros((edges, edges))
+    values, matrix = np.zeros(edges), np.zeros((edges, edges))
+    fields, tangents, event = 0, 0, STEP_LIMIT
+    while fields < most_fields:
         fields += 1
-        held = runners > 0 and reuses < (_REUSES_ALONE if runners == 1 else _REUSES)
-        table = map_gaps(gaps)
-        kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
-        if fields == 1:
-            of = solve(gaps, prescribed, law.hold, kinds, 2, rules, panels)
-        else:
-            of = solve_again(gaps, prescribed, law.hold, kinds, rules, panels, of)
-        if not np.isfinite(of.pressure):
-            return gaps, LOST, fields, tangents, kinds, passed[:count], astray, taken
-        residual, drift = imbalance(of, law, panels)
-        known[:] = 0
-        # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²; where the
-        # surfaces overlap, C < 0, contact grows all the same
-        rise = 0.0
-        fall = 0.0
-        fresh = np.empty(edges)
-        for e in range(edges):
-            critical = of.opening[e] - residual[e]
-            fresh[e] = of.opening[e] * abs(of.opening[e]) - critical * critical
-            work = 0.5 * (force[e] + fresh[e]) * last[e]
-            rise += work
-            fall += abs(work)
-        if checked.shape[0] > 0:
-            forces_on(of, checked, rules, rows, known)
-            arrived = _rates(of, residual, drift, last, checked, rows)
-            clear = 1.0
-            for i in range(checked.shape[0]):
-                e = checked[i]
-                onwards = -np.sign(last[e])
-                clear = min(
-                    clear,
-                    first_fall(onwards * force[e], departed[i], onwards * fresh[e], arrived[i]),
-                )
-            checked = np.empty(0, dtype=np.int64)
-            if clear < 1:
-                gaps = moved_gaps(before, clear * last)
-                _take(rows, clear * last, taken)
-                passed[count - 1] = gaps.ravel()
-                stride = 0.0
-                runners = 0
-                last = np.zeros(edges)
-                continue
-        if rise > _NOISE * fall and share > _LEAST_SHARE and fields > 1:
-            gaps = before
-            count -= 1
-            share *= 0.5
-            runners = 0
-            last = np.zeros(edges)
+        kinds = at_least(choose_kinds(map_gaps(state.gaps), law.digits, rules.counts), kinds)
+        now = forces_at(state.gaps, prescribed, kinds, solution, system)
+        solution = now.solution
+        if not np.isfinite(solution.pressure):
+            event = NO_FIELD
+            break
+        rows.known[:] = 0
+        share = accepted_share(state, now.slope, share_to_minimum(state, now, rows, rules))
+        if share < 1:
+            state, trajectory = backed_up(state, share, trajectory, rows, interaction)
             continue
-        if fall > 0:
-            share = min(1.0, 2 * share)
-        _take(rows, last, taken)
-        force = fresh
-        pace = _SHORTENED ** max(turned - _TO_AND_FRO, 0)
-        longest = share * max(pace, _LEAST_SHARE) * law.longest
-        unchecked = _UNCHECKED_ALONE * longest if runners == 1 else longest
-        reach = unchecked
-        if runners > 0:
-            stride = min(max(2 * stride, 1.0), _STRIDE_ALONE if runners == 1 else _STRIDE)
-            reach = max(reach, stride * longest)
-        limit = step_limits(table, reach)
-        if track.shape[0] > 0 and fields % _LOOK_EVERY == 0:
-            away = _distance(gaps.ravel(), track, law.longest)
-            off = away > _MET * law.longest
-            astray = astray or off
-            looks = looks + 1 if astray and not off else 0
-            if looks == _LOOKS:
-                return gaps, MET, fields, tangents, kinds, passed[:count], astray, taken
-        if held:
-            reuses += 1
-        else:
-            tangents += 1
-            reuses = 0
-            tangent, _ = tangent_of(of, drift, rules)
-            for e in range(edges):
-                for f in range(edges):
-                    rows[e, f] = of.opening[e] * tangent[e, f]
-                rows[e, e] += of.opening[e] * drift[e] * (1 - 2 * (e % 2))
-            known[:] = 1
-            if equal_speeds:
-                d, matrix = symmetric(of, tangent, law.overlapping)
-            else:
-                values, matrix = np.linalg.eigh(
-                    hessian(np.maximum(of.opening, 0.0), residual, drift, tangent)
-                )
-        if equal_speeds:
-            step = running_step(matrix, d, -residual, limit)
-        else:
-            step = flow_step(values, matrix, -force, limit, law.faint)
-        if held:
-            turns = False
-            for e in range(edges):
-                if abs(step[e]) > 0.2 * reach and step[e] * last[e] <= 0:
-                    turns = True
-            if turns:
-                turned += 1 if runners == 1 else 0
-                runners = 0
-                last = np.zeros(edges)
-                continue
-        for e in range(edges):
-            # Where surfaces would overlap beside an edge there is nothing to weigh: contact grows.
-            if of.opening[e] < -law.overlapping:
-                step[e] = limit[e]
-        size = np.abs(step).max()
-        if size <= law.coarse and not held:
-            if equal_speeds:
-                if not is_definite(matrix):
-                    step = off_saddle(matrix, d, limit)
-            elif values[0] < 0:
-                way = leaving_step(values, matrix, limit, _places(table, law.origin))
-                fields += 2
-                onwards = _gain(gaps, way, prescribed, kinds, law, rules, panels)
-                backwards = _gain(gaps, -way, prescribed, kinds, law, rules, panels)
-                if max(onwards, backwards) > 0:
-                    step = way if onwards >= backwards * (1 - _TIE) else -way
-            size = np.abs(step).max()
-        if not size < np.inf:
-            return gaps, LOST, fields, tangents, kinds, passed[:count], astray, taken
-        runners = 0
-        if size > 0.5 * longest:
-            running = np.flatnonzero(np.abs(step) > max(_RUNS * size, 0.5 * longest))
-            runners = running.shape[0]
-            for e in range(edges):
-                if abs(step[e]) < _STANDS * limit[e]:
-                    step[e] = 0.0
-            if size > unchecked:
-                if np.any(force[running] * step[running] >= 0):  # pulled along by others
-                    step *= unchecked / size
-                else:
-                    checked = running
-                    forces_on(of, checked, rules, rows, known)
-                    departed = _rates(of, residual, drift, step, checked, rows)
-        before = gaps
-        gaps = moved_gaps(gaps, step)
-        last = step
-        if count == passed.shape[0]:
-            longer = np.empty((2 * count, edges))
-            longer[:count] = passed
-            passed = longer
-        passed[count] = gaps.ravel()
-        count += 1
-        if narrowest(gaps) < law.smallest:
-            _take(rows, last, taken)
-            return gaps, NARROW, fields, tangents, kinds, passed[:count], astray, taken
-        if size < law.near:
-            return gaps, RESTING, fields, tangents, kinds, passed[:count], astray, taken
-    return gaps, UNFINISHED, fields, tangents, kinds, passed[:count], astray, taken
-
-
-@compiled
-def _take(rows: Array, step: Array, taken: Array) -> None:
-    """Add the force that the motion of each edge takes from every edge; ``rows`` as above."""
-    for e in range(step.shape[0]):
-        for f in range(step.shape[0]):
-            taken[e, f] += 2 * rows[e, f] * step[f]
-
-
-@compiled
-def _rates(
-    of: Solution, residual: Array, drift: Array, way: Array, edges: Kinds, rows: Array
-) -> Array:
-    """How the force on each of ``edges``, along its own way, changes along the way of all.
-
-    ``rows`` are those of :func:`forces_on`.
-    """
-    rates = np.empty(edges.shape[0])
-    for i in range(edges.shape[0]):
-        e = edges[i]
-        total = 0.0
-        for f in range(way.shape[0]):
-            total += rows[e, f] * way[f]
-        critical = of.opening[e] - residual[e]
-        rate = critical * drift[e] * (1 - 2 * (e % 2)) * way[e] - np.sign(of.opening[e]) * total
-        rates[i] = 2 * rate * np.sign(way[e])
-    return rates
-
-
-@compiled
-def _distance(at: Array, track: Array, longest: float) -> float:
-    """Largest distance of an edge from the track, where that is nearest; inf if it is far."""
-    least = np.inf
-    for i in range(track.shape[0] - 1):
-        along = 0.0
-        square = 0.0
-        widest = 0.0
-        for e in range(at.shape[0]):
-            way = track[i + 1, e] - track[i, e]
-            off = at[e] - track[i, e]
-            widest = max(widest, abs(way), 0.25 * abs(off))
-            if widest > 1.2 * _STRIDE_ALONE * longest:  # far, or between the tracks of two descents
+        add_interaction(rows.values, state.step, interaction)
+        state = accepted(state, now.slope)
+        note_force(trajectory, now.slope)
+        if fields % FIELDS_PER_COMPARISON == 0:
+            comparison = compared(comparison, state.gaps, law.longest)
+            if comparison.matches == COMPARISONS:
+                event = REJOINED
                 break
-            along += way * off
-            square += way * way
-        if widest > 1.2 * _STRIDE_ALONE * longest or square == 0:
+        keeps = keeps_tangent(state.size)
+        if not keeps:
+            tangents += 1
+            values, matrix = linearise(now, rows, equal_speeds, system)
+        state, lengths = bounded(state, law.longest)
+        model = QuadraticModel(values, matrix, step_limits(solution.table, lengths.reach))
+        step = kinetic_step(model, now, equal_speeds, law.faint)
+        if keeps and turns_back(step, state.step, lengths.reach):
+            state = turned(state)
             continue
-        share = min(max(along / square, 0.0), 1.0)
-        worst = 0.0
-        for e in range(at.shape[0]):
-            way = track[i + 1, e] - track[i, e]
-            worst = max(worst, abs(at[e] - track[i, e] - share * way))
-        least = min(least, worst)
-    return least
+        close_overlaps(step, solution.opening, model.limit, law.overlapping)
+        if not keeps and np.abs(step).max() <= law.coarse:
+            step, tried = step_off_saddle(
+                step, model, state.gaps, prescribed, kinds, equal_speeds, system
+            )
+            fields += tried
+        length = np.abs(step).max()
+        if not length < np.inf:
+            event = NO_FIELD
+            break
+        state = moved(state, step, now, lengths, model.limit, rows, rules)
+        trajectory = extended(trajectory, state.gaps)
+        event = event_after(state.gaps, length, law)
+        if event != STEP_LIMIT:
+            break
+    if event == VANISHED:
+        add_interaction(rows.values, state.step, interaction)
+    points = trajectory.points[: trajectory.length]
+    forces = trajectory.forces[: trajectory.length - 1]
+    return Descent(
+        state.gaps, event, kinds, fields, tangents, points, forces, comparison.has_left, interaction
+    )
 
 
 @compiled
-def _gain(
-    gaps: Array,
-    step: Array,
-    prescribed: float,
-    kinds: Kinds,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
-) -> float:
-    """Force along ``step`` after it, from a state without force: positive where energy falls."""
-    of = solve(moved_gaps(gaps, step), prescribed, law.hold, kinds, 1, rules, panels)
-    residual, _ = imbalance(of, law, panels)
-    gain = 0.0
+def backed_up(
+    state: State, share: float, trajectory: Trajectory, rows: ForceRows, interaction: Array
+) -> tuple[State, Trajectory]:
+    """Take the last step back to a ``share`` of it, and correct the record of the descent."""
+    step = share * state.step
+    state = taken_back(state, share)
+    trajectory = without_last(trajectory)
+    if share > 0:
+        add_interaction(rows.values, step, interaction)
+        trajectory = extended(trajectory, state.gaps)
+    return state, trajectory
+
+
+@compiled
+def event_after(gaps: Array, length: float, law: Law) -> int:
+    """Detect an event after a step of this length; STEP_LIMIT if there is none."""
+    if narrowest(gaps) < law.smallest:
+        return VANISHED
+    return AT_REST if length < law.near else STEP_LIMIT
+
+
+@compiled
+def linearise(
+    now: Forces, rows: ForceRows, equal_speeds: bool, system: FlowProblem
+) -> tuple[Array, Array]:
+    """Linearise the forces about the present edges: values and matrix of the quadratic model."""
+    law, of = system.law, now.solution
+    tangent, _ = tangent_of(of, now.drift, system.rules)
+    edges = tangent.shape[0]
+    for e in range(edges):
+        for f in range(edges):
+            rows.values[e, f] = of.opening[e] * tangent[e, f]
+        rows.values[e, e] += of.opening[e] * now.drift[e] * (1 - 2 * (e % 2))
+    rows.known[:] = 1
+    if equal_speeds:
+        values, matrix = symmetric(of, tangent, law.overlapping)
+    else:
+        opening = np.maximum(of.opening, 0.0)
+        values, matrix = np.linalg.eigh(hessian(opening, now.residual, now.drift, tangent))
+    return values, matrix
+
+
+@compiled
+def kinetic_step(model: QuadraticModel, now: Forces, equal_speeds: bool, faint: float) -> Array:
+    """Choose the step of all edges, by linear kinetics or with equal speeds.
+
+    By linear kinetics edges move in proportion to their excess energy release rates. With equal
+    speeds, for comparison, edges out of equilibrium run, all at the same speed (their limit, twice
+    as long for one that runs alone), and edges near equilibrium follow them by Newton's step.
+    """
+    if equal_speeds:
+        return bound_constrained_step(model.matrix, model.values, -now.residual, model.limit)
+    return flow_step(model.values, model.matrix, -now.slope, model.limit, faint)
+
+
+@compiled
+def close_overlaps(step: Array, opening: Array, limit: Array, overlapping: float) -> None:
+    """Let contact grow as far as it may at edges beside which surfaces would overlap."""
     for e in range(step.shape[0]):
-        gain -= residual[e] * (2 * of.opening[e] - residual[e]) * step[e]
-    return gain
-
-
-@compiled
-def _places(table: Array, origin: float) -> Array:
-    """Distance of every edge to the right of ``origin``, in [0, 2π)."""
-    out = np.empty(2 * table.shape[0])
-    for k in range(table.shape[0]):
-        for side in range(2):
-            out[2 * k + side] = (table[k, LEFT + side] - origin) % (2 * np.pi)
-    return out
+        if opening[e] < -overlapping:
+            step[e] = limit[e]

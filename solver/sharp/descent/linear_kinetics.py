@@ -14,18 +14,18 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
-
-_CLOSE = 0.97  # a step is long enough at this share of the limit
-_AIM = 0.99  # the share that is aimed at
-_TRIES = 60
-_SETTLED = 36.0  # exp(-36) is rounding
-_FAINT = 1e-3  # share of the force below which an unstable mode is not pulled
-_ALIKE = 1e-3  # modes whose stiffness differs by less than this share of the largest are alike
+from adhesis.solver.sharp.tolerances import (
+    FLOW_AIM,
+    FLOW_DECAYED,
+    FLOW_REACHED,
+    FLOW_TRIES,
+    UNSTABLE_FORCE,
+)
 
 
 @compiled
 def hessian(opening: Array, residual: Array, drift: Array, tangent: Array) -> Array:
-    """H_ef = ∂(C_e² - C_c²)/∂n_f from ``tangent`` = ∂(C_e - C_c)/∂n_f; symmetric.
+    """Build H_ef = ∂(C_e² - C_c²)/∂n_f, symmetric, from ``tangent`` = ∂(C_e - C_c)/∂n_f.
 
     ``residual`` is C_e - C_c, ``drift`` the derivative of C_c by θ.
     """
@@ -42,8 +42,8 @@ def hessian(opening: Array, residual: Array, drift: Array, tangent: Array) -> Ar
 
 
 @compiled
-def _progress(values: Array, parts: Array, time: float) -> Array:
-    """(1 - exp(-λτ))/λ times the force in each mode."""
+def mode_motion(values: Array, parts: Array, time: float) -> Array:
+    """Move each mode along the flow for a ``time`` τ: (1 - exp(-λτ))/λ times the force in it."""
     out = np.empty(values.shape[0])
     for i in range(values.shape[0]):
         x = values[i] * time
@@ -51,7 +51,7 @@ def _progress(values: Array, parts: Array, time: float) -> Array:
             out[i] = 0.0
         elif abs(x) < 1e-4:
             out[i] = parts[i] * time * (1 - 0.5 * x)
-        elif x > _SETTLED:
+        elif x > FLOW_DECAYED:
             out[i] = parts[i] / values[i]
         else:
             out[i] = parts[i] * (1 - np.exp(-x)) / values[i]
@@ -60,7 +60,7 @@ def _progress(values: Array, parts: Array, time: float) -> Array:
 
 @compiled_sums
 def _combine(vectors: Array, modes: Array, step: Array) -> None:
-    """Motion of every edge from that of the modes."""
+    """Add up the motion of every edge from that of the modes."""
     for e in range(step.shape[0]):
         total = 0.0
         for i in range(modes.shape[0]):
@@ -69,12 +69,11 @@ def _combine(vectors: Array, modes: Array, step: Array) -> None:
 
 
 @compiled
-def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: float) -> Array:
-    """Motion of the edges until one is at its limit, or all have come to rest.
+def followed_force(values: Array, vectors: Array, force: Array, noise: float) -> Array:
+    """Project the force on the modes, without that on unstable ones which it hardly pulls.
 
-    ``values`` (rising) and ``vectors`` are those of the Hessian. An unstable mode that the force
-    hardly pulls, by less than ``noise`` or a thousandth of the force, is not followed: its pull is
-    that of rounding, and a symmetry would be broken by it.
+    A pull below ``noise``, or a thousandth of the force, is that of rounding, and following it
+    would break a symmetry.
     """
     n = force.shape[0]
     parts = np.zeros(n)
@@ -85,11 +84,41 @@ def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: 
         for i in range(n):
             parts[i] += vectors[e, i] * force[e]
     for i in range(n):
-        if values[i] < 0 and abs(parts[i]) < max(noise, _FAINT * np.sqrt(total)):
+        if values[i] < 0 and abs(parts[i]) < max(noise, UNSTABLE_FORCE * np.sqrt(total)):
             parts[i] = 0.0
-    fastest = 0.0
-    for e in range(n):
-        fastest = max(fastest, abs(force[e]) / limit[e])
+    return parts
+
+
+@compiled
+def has_decayed(values: Array, parts: Array, time: float) -> bool:
+    """Whether all modes that the force pulls have come to rest after a ``time``."""
+    slowest = np.inf
+    for i in range(values.shape[0]):
+        if parts[i] != 0:
+            slowest = min(slowest, values[i])
+    return bool(slowest * time > FLOW_DECAYED)
+
+
+@compiled
+def _largest_share(values: Array, limit: Array) -> float:
+    """Find the largest of the values over their limits."""
+    largest = 0.0
+    for e in range(limit.shape[0]):
+        largest = max(largest, abs(values[e]) / limit[e])
+    return largest
+
+
+@compiled
+def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: float) -> Array:
+    """Follow the linear flow until one edge is at its limit, or all have come to rest.
+
+    ``values`` (rising) and ``vectors`` are those of the Hessian; for ``noise`` see
+    :func:`followed_force`. The time at which the first edge is at its limit is found by
+    extrapolation and then bracketing.
+    """
+    n = force.shape[0]
+    parts = followed_force(values, vectors, force, noise)
+    fastest = _largest_share(force, limit)
     step = np.zeros(n)
     if not fastest > 0:
         return step
@@ -97,66 +126,27 @@ def flow_step(values: Array, vectors: Array, force: Array, limit: Array, noise: 
     high = np.inf
     below = 0.0  # of the limit, at the time ``low``
     above = np.inf
-    time = _AIM / fastest
-    for _ in range(_TRIES):
-        _combine(vectors, _progress(values, parts, time), step)
-        worst = 0.0
-        for e in range(n):
-            worst = max(worst, abs(step[e]) / limit[e])
+    time = FLOW_AIM / fastest
+    for _ in range(FLOW_TRIES):
+        _combine(vectors, mode_motion(values, parts, time), step)
+        worst = _largest_share(step, limit)
         if worst > 1 or not np.isfinite(worst):
             high = time
             above = worst
         else:
             low = time
             below = worst
-            if worst > _CLOSE:
-                return step
-            slowest = np.inf
-            for i in range(n):
-                if parts[i] != 0:
-                    slowest = min(slowest, values[i])
-            if slowest * time > _SETTLED:
+            if worst > FLOW_REACHED or has_decayed(values, parts, time):
                 return step
         if np.isinf(high):
-            time *= min(4.0, max(1.02, _AIM / worst))
+            time *= min(4.0, max(1.02, FLOW_AIM / worst))
         elif not above < 4:
             time = 0.5 * (low + high) if high < 2 * low or low == 0 else np.sqrt(low * high)
         else:
             # between the two times, where the line through both would be at the aim
-            share = (_AIM - below) / (above - below)
+            share = (FLOW_AIM - below) / (above - below)
             time = low + min(max(share, 0.02), 0.98) * (high - low)
     # an edge passes its limit within rounding of the time: a step in the flow's last direction
     for e in range(n):
         step[e] /= worst
     return step
-
-
-@compiled
-def leaving_step(values: Array, vectors: Array, limit: Array, order: Array) -> Array:
-    """Step off a saddle, along its softest modes, up to the limit of an edge.
-
-    One edge leads, outwards; it is the one that moves most freely in these modes, of equal ones the
-    first in ``order`` (positions). Where symmetry makes several modes equally soft, the step is the
-    leading edge's projection on all of them: which of equivalent edges leads does not matter.
-    """
-    n = limit.shape[0]
-    level = min(values[0] + _ALIKE * np.abs(values).max(), 0.0)
-    freedom = np.zeros(n)
-    for i in range(n):
-        if values[i] <= level:
-            for e in range(n):
-                freedom[e] += vectors[e, i] ** 2
-    most = freedom.max()
-    lead = -1
-    for e in range(n):
-        if freedom[e] > 0.99 * most and (lead < 0 or order[e] < order[lead]):
-            lead = e
-    step = np.zeros(n)
-    for i in range(n):
-        if values[i] <= level:
-            for e in range(n):
-                step[e] += vectors[e, i] * vectors[lead, i]
-    worst = 0.0
-    for e in range(n):
-        worst = max(worst, abs(step[e]) / limit[e])
-    return step / worst

@@ -1,10 +1,9 @@
-"""Descent that begins in a window on a known state.
+"""Descent that begins in a window on a known equilibrium.
 
 Where a jump begins all gaps have just been solved, and only a few edges run: at a fold, where a
 seed was put, where a gap closed. So the descent begins in a window there, the other gaps responding
-linearly about the known state (``windowed_descent``), and goes on
-through closing gaps and vanishing patches inside it. Where it comes to rest all gaps are solved
-once more.
+linearly about the known state (``windowed_descent``), and goes on through closing gaps and
+vanishing patches inside it. Where it comes to rest all gaps are solved once more.
 """
 
 from __future__ import annotations
@@ -15,97 +14,110 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.descent.gradient_flow import LOST, NARROW, descend
+from adhesis.solver.sharp.descent.edge_forces import FlowProblem
+from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD, VANISHED, Descent, descend
+from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.griffith import Law
 from adhesis.solver.sharp.equilibrium.linear_exterior import About
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import RULES
+from adhesis.solver.sharp.gap.quadrature import RULES, Kinds
+from adhesis.solver.sharp.tolerances import (
+    LOCAL_WINDOW_FIELDS,
+    LOCAL_WINDOW_MARGIN,
+    LOCAL_WINDOW_WIDEST,
+)
 
-_BESIDE = 4  # gaps of a window on each side of what has changed
-_WIDEST = 24  # changes further apart are not those of one window
-_STEPS = 300  # steps in a window before all gaps are solved again
 
 @dataclass(frozen=True, eq=False)
-class Rest:
-    """Where a descent in a window ended: all gaps, those of the window, and how."""
+class LocalDescent:
+    """Result of a descent in a window: all gaps, those of the window, and the event."""
 
     gaps: Array
-    local: Array
-    ended: int
+    window_gaps: Array
+    event: int
 
 
-class Start:
-    """A solved state that gaps are like, but for one place.
+class KnownState:
+    """A solved equilibrium from which gaps differ in one place only.
 
     Parameters
     ----------
-    known : array, shape (L, 2)
-        Its gaps.
+    gaps : array, shape (L, 2)
+        Gaps of the equilibrium.
     about : About
-    leads : int
-        The gap that leads where no gap is different.
+    leading_gap : int
+        Middle of the window where no gap differs.
     """
 
-    def __init__(self, known: Array, about: About, leads: int) -> None:
-        self._known, self._about, self._leads = known, about, leads
+    def __init__(self, gaps: Array, about: About, leading_gap: int) -> None:
+        self._gaps, self._about, self._leading_gap = gaps, about, leading_gap
         self._windows: dict[tuple[int, int], Window] = {}  # two descents begin in one
 
     def window(self, gaps: Array, law: Law, panels: Panels) -> Window | None:
-        """Window around what is different in ``gaps``; None if that lies in many places."""
-        known = self._known
+        """Open a window around the gaps that differ; None if they lie in many places."""
+        known = self._gaps
         count = len(known)
-        place = np.minimum(np.searchsorted(gaps[:, 0], known[:, 0]), len(gaps) - 1)
-        changed = np.flatnonzero((gaps[place] != known).any(axis=1))
+        nearest = np.minimum(np.searchsorted(gaps[:, 0], known[:, 0]), len(gaps) - 1)
+        changed = np.flatnonzero((gaps[nearest] != known).any(axis=1))
         if changed.size == 0:
-            changed = np.array([self._leads])
-        # the widest run of gaps that are the same lies outside
+            changed = np.array([self._leading_gap])
+        # the longest run of unchanged gaps lies outside
         apart = np.diff(np.append(changed, changed[0] + count))
-        widest = int(np.argmax(apart))
-        begin = int(changed[(widest + 1) % changed.size])
-        width = count - int(apart[widest]) + 1 + 2 * _BESIDE
-        if width > min(_WIDEST, count - 2):
+        longest = int(np.argmax(apart))
+        begin = int(changed[(longest + 1) % changed.size])
+        width = count - int(apart[longest]) + 1 + 2 * LOCAL_WINDOW_MARGIN
+        if width > min(LOCAL_WINDOW_WIDEST, count - 2):
             return None
-        place_of = (begin - _BESIDE) % count, width
-        if place_of not in self._windows:
-            self._windows[place_of] = Window(known, self._about, *place_of, law, panels)
-        return self._windows[place_of]
+        span = (begin - LOCAL_WINDOW_MARGIN) % count, width
+        if span not in self._windows:
+            self._windows[span] = Window(known, self._about, *span, law, panels)
+        return self._windows[span]
 
     def descend(
         self,
         gaps: Array,
-        at: float,
+        prescribed: float,
         law: Law,
         panels: Panels,
         count: Counters,
         smallest: float,
         *,
         equal_speeds: bool,
-    ) -> Rest | None:
-        """Descend at d = ``at`` in a window from ``gaps``; None if there is none, or no field.
+    ) -> LocalDescent | None:
+        """Descend at d = ``prescribed`` in a window; None if there is none, or no field.
 
         Gaps and patches shorter than ``smallest`` are left out on the way; the work is counted.
         """
         window = self.window(gaps, law, panels)
         if window is None or not window.sound:
             return None
-        local, kinds = window.rows(gaps), window.kinds
+        system = FlowProblem(law, RULES, window.panels)
+        inside, kinds = window.rows(gaps), window.kinds
         while True:
-            if len(local) != len(kinds):
-                kinds = np.zeros(len(local), dtype=np.int64)
-            local, ended, fields, tangents, kinds, _, _, _ = descend(
-                local, at, _STEPS, kinds, equal_speeds, law, RULES, window.panels,
-                np.empty((0, local.size)), False,
-            )  # fmt: skip
-            count.fields += fields
-            count.descent_steps += fields
-            count.derivatives += tangents
-            rest = without_small(local, smallest) if ended == NARROW else None
-            if rest is None or len(rest) < 3 or (rest[-1] != local[-1]).any():
+            found = _descend_inside(inside, prescribed, kinds, equal_speeds, system)
+            inside, kinds = found.gaps, found.kinds
+            count.fields += found.fields
+            count.descent_steps += found.fields
+            count.derivatives += found.tangents
+            left = without_small(inside, smallest) if found.event == VANISHED else None
+            if left is None or len(left) < 3 or (left[-1] != inside[-1]).any():
                 break
-            local = rest
-        if ended == LOST:
+            inside = left
+        if found.event == NO_FIELD:
             return None
-        found = window.everywhere(local, kinds, at)
-        return Rest(found, local, ended) if np.isfinite(found).all() else None
+        everywhere = window.everywhere(inside, kinds, prescribed)
+        if not np.isfinite(everywhere).all():
+            return None
+        return LocalDescent(everywhere, inside, found.event)
+
+
+def _descend_inside(
+    inside: Array, prescribed: float, kinds: Kinds, equal_speeds: bool, system: FlowProblem
+) -> Descent:
+    """Descend in a window, from kinds that its gaps may have had before some went."""
+    if len(inside) != len(kinds):
+        kinds = np.zeros(len(inside), dtype=np.int64)
+    alone = Comparison(np.empty((0, inside.size)), False, 0)
+    return descend(inside, prescribed, LOCAL_WINDOW_FIELDS, kinds, equal_speeds, system, alone)

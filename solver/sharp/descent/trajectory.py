@@ -1,57 +1,132 @@
-"""Trajectories of descents, kept so that two descents can be compared."""
+"""Trajectory of a descent in the space of the edges, and its comparison with another one's.
+
+Two descents from the same edges by different kinetics end in the same minimum once the second has
+come back to the trajectory of the first: from there on the first is followed.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.tolerances import (
+    LONGEST_STRIDE_ALONE,
+    ON_TRAJECTORY,
+    SEGMENT_MARGIN,
+    SEGMENT_SHARE,
+)
 
 
-class Stage(NamedTuple):
-    """Part of a descent with one set of gaps.
-
-    Attributes
-    ----------
-    way : array, shape (2L,)
-        Outward motion of every edge.
-    taken : array, shape (2L, 2L)
-        Force, as C², that the motion of each edge (columns) took from every edge (rows).
-    """
-
-    way: Array
-    taken: Array
-
-
-@dataclass
-class Track:
-    """Edges that a descent went through, for another one to be compared with.
+class Trajectory(NamedTuple):
+    """Edges that a descent went through: the first ``length`` rows.
 
     Attributes
     ----------
-    ways : list of arrays, shape (n, 2L)
-        One for every set of gaps on the way.
-    astray, met : bool
-        Whether the other descent has left the track, and come back to it.
-    rest : array, optional
-        Gaps of a window in which the descent first came to rest.
-    stages : list of Stage
-        What the edges did, one for every set of gaps on the way.
-    whole : bool
-        Whether the stages are known.
+    points : array, shape (n, 2L)
+    forces : array, shape (n,)
+        Norm of dU/dn at each; not known at the last one until its field is solved.
+    length : int
     """
 
-    ways: list[Array] = field(default_factory=list)
-    astray: bool = False
-    met: bool = False
-    rest: Array | None = None
-    stages: list[Stage] = field(default_factory=list)
-    whole: bool = True
+    points: Array
+    forces: Array
+    length: int
 
-    def of(self, edges: int) -> Array:
-        """Return the track where there are so many edges."""
-        return np.concatenate(
-            [np.empty((0, edges)), *(w for w in self.ways if w.shape[1] == edges)]
-        )
+
+class Comparison(NamedTuple):
+    """Comparison of a descent with the trajectory of another one.
+
+    Attributes
+    ----------
+    trajectory : array, shape (n, 2L)
+        That of the other descent; no rows for none.
+    has_left : bool
+        Whether this descent has been away from it.
+    matches : int
+        In how many comparisons in a row this descent was on it again.
+    """
+
+    trajectory: Array
+    has_left: bool
+    matches: int
+
+
+@compiled
+def begun(gaps: Array) -> Trajectory:
+    """Begin a trajectory at these gaps."""
+    points = np.empty((64, 2 * gaps.shape[0]))
+    points[0] = gaps.ravel()
+    return Trajectory(points, np.zeros(64), 1)
+
+
+@compiled
+def extended(trajectory: Trajectory, gaps: Array) -> Trajectory:
+    """Add a point to a trajectory."""
+    points, forces, length = trajectory.points, trajectory.forces, trajectory.length
+    if length == points.shape[0]:
+        longer = np.empty((2 * length, points.shape[1]))
+        longer[:length] = points
+        points = longer
+        more = np.zeros(2 * length)
+        more[:length] = forces
+        forces = more
+    points[length] = gaps.ravel()
+    return Trajectory(points, forces, length + 1)
+
+
+@compiled
+def note_force(trajectory: Trajectory, slope: Array) -> None:
+    """Note the norm of dU/dn at the last point of a trajectory."""
+    square = 0.0
+    for e in range(slope.shape[0]):
+        square += slope[e] * slope[e]
+    trajectory.forces[trajectory.length - 1] = np.sqrt(square)
+
+
+@compiled
+def without_last(trajectory: Trajectory) -> Trajectory:
+    """Drop the last point of a trajectory."""
+    return Trajectory(trajectory.points, trajectory.forces, trajectory.length - 1)
+
+
+@compiled
+def compared(comparison: Comparison, gaps: Array, longest: float) -> Comparison:
+    """Compare these gaps with the other trajectory; ``longest`` is the longest step."""
+    if comparison.trajectory.shape[0] == 0:
+        return comparison
+    distance = distance_to(comparison.trajectory, gaps.ravel(), longest)
+    away = distance > ON_TRAJECTORY * longest
+    has_left = comparison.has_left or away
+    matches = comparison.matches + 1 if has_left and not away else 0
+    return Comparison(comparison.trajectory, has_left, matches)
+
+
+@compiled
+def distance_to(trajectory: Array, at: Array, longest: float) -> float:
+    """Measure the largest distance of an edge from a trajectory, at its nearest; inf if far."""
+    longest_segment = SEGMENT_MARGIN * LONGEST_STRIDE_ALONE * longest
+    least = np.inf
+    for i in range(trajectory.shape[0] - 1):
+        along = 0.0
+        square = 0.0
+        widest = 0.0
+        for e in range(at.shape[0]):
+            way = trajectory[i + 1, e] - trajectory[i, e]
+            off = at[e] - trajectory[i, e]
+            widest = max(widest, abs(way), SEGMENT_SHARE * abs(off))
+            if widest > longest_segment:  # far, or between two descents' trajectories
+                break
+            along += way * off
+            square += way * way
+        if widest > longest_segment or square == 0:
+            continue
+        share = min(max(along / square, 0.0), 1.0)
+        worst = 0.0
+        for e in range(at.shape[0]):
+            way = trajectory[i + 1, e] - trajectory[i, e]
+            worst = max(worst, abs(at[e] - trajectory[i, e] - share * way))
+        least = min(least, worst)
+    return least

@@ -1,26 +1,30 @@
 """Descent of many gaps in windows: where edges run, the rest responding linearly; compiled.
 
 In a jump a few edges run at a time. The gaps around them are a window whose edges descend as those
-of few gaps do (``gradient_flow``); all other gaps are what the
-window feels of them (``exterior``), their edges following by their
-tangent. After some steps, or when the window has come to rest, the others are put where their
-tangent leads, everything is solved anew, and the next window is chosen: around the edge that is
-furthest from its balance or, once all are near it, that Newton's step moves most.
+of few gaps do (``gradient_flow``); all other gaps act on it as a linear exterior, their edges
+following by their tangent. After some steps, or when the window has come to rest, the others are
+put where their tangent leads, everything is solved anew, and the next window is chosen: around the
+edge that is furthest from its balance or, once all are near it, that Newton's step moves most.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.descent.edge_forces import FlowProblem
 from adhesis.solver.sharp.descent.gradient_flow import (
-    LOST,
-    NARROW,
-    RESTING,
-    UNFINISHED,
+    AT_REST,
+    NO_FIELD,
+    STEP_LIMIT,
+    VANISHED,
+    Descent,
     descend,
 )
+from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.edge_elimination import newton_step, yielding_gaps
 from adhesis.solver.sharp.equilibrium.griffith import (
     Law,
@@ -31,115 +35,224 @@ from adhesis.solver.sharp.equilibrium.griffith import (
     step_limits,
 )
 from adhesis.solver.sharp.equilibrium.linear_exterior import About, following, open_window
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.hierarchical_solver import Gaps, solve_many
+from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import Panels, with_outside
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.gap.full_contact_stress import with_outside
+from adhesis.solver.sharp.gap.quadrature import Kinds, choose_kinds
+from adhesis.solver.sharp.tolerances import (
+    FAR_FROM_BALANCE,
+    FOLLOWING_SHARE,
+    NEWTON_STEPS_IN_A_ROW,
+    WINDOW_FIELDS,
+    WINDOW_HALF_WIDTH,
+    WINDOW_WIDEST,
+)
 
-_HALF_WIDTH = 4  # gaps of a window on each side of the edge that leads
-_WIDEST = 48
-_STEPS = 60  # steps in a window before everything is solved anew
-_LOUD = 0.02  # imbalance, of C_c, above which the furthest edge leads
-_CALM = 0.2  # an edge outside follows its tangent if that moves it by less, in longest steps
-_NEWTON_STEPS = 12  # steps of all edges in a row
+
+class Linearised(NamedTuple):
+    """Field of all gaps, linearised for a window, and Newton's step of all edges.
+
+    Attributes
+    ----------
+    about : About
+    residual : array, shape (2L,)
+        C - C_c.
+    step : array, shape (2L,)
+        Outward motion of the contact at every edge.
+    stable : bool
+        Whether the energy is stable in all edges.
+    """
+
+    about: About
+    residual: Array
+    step: Array
+    stable: bool
 
 
-@compiled
-def _leading_gap(residual: Array, step: Array, law: Law) -> int:
-    """Gap of the edge around which a window is put."""
-    if np.abs(residual).max() > _LOUD * law.critical:
-        return int(np.argmax(np.abs(residual))) // 2
-    return int(np.argmax(np.abs(step))) // 2
+class Span(NamedTuple):
+    """Gaps of a window: the first, and how many."""
+
+    first: int
+    width: int
+
+
+class WindowDescent(NamedTuple):
+    """Descent in a window on a linearised state.
+
+    Attributes
+    ----------
+    inside : Descent
+        Of the window's gaps.
+    outside : array
+        Outward motion of the edges outside, in the order of their gaps.
+    progress : float
+        Longest motion of an edge inside.
+    """
+
+    inside: Descent
+    outside: Array
+    progress: float
 
 
 @compiled
 def descend_many(
     gaps: Array,
     prescribed: float,
-    most: int,
+    most_fields: int,
     least: Kinds,
     equal_speeds: bool,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
-) -> tuple[Array, int, int, int, Kinds]:
-    """As ``gradient_flow.descend``, for many gaps."""
-    fields = 0
-    tangents = 0
+    system: FlowProblem,
+) -> Descent:
+    """Descend as ``gradient_flow.descend`` does, with many gaps.
+
+    Trajectory and interaction are not known, and left empty.
+    """
+    law = system.law
+    fields, tangents, event = 0, 0, STEP_LIMIT
     count = gaps.shape[0]
-    half = _HALF_WIDTH
-    newton = 0
+    half = WINDOW_HALF_WIDTH
+    newton_steps = 0
     kinds = least
-    while fields < most:
+    while fields < most_fields:
         table = map_gaps(gaps)
-        kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
-        of, parts = solve_many(gaps, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
+        kinds = at_least(choose_kinds(table, law.digits, system.rules.counts), kinds)
+        of, parts = solve_many(
+            gaps, prescribed, law.hold, kinds, law.digits, 2, system.rules, system.panels
+        )
         fields += 1
         tangents += 1
         if not np.isfinite(of.pressure):
-            return gaps, LOST, fields, tangents, kinds
-        residual, drift = imbalance(of, law, panels)
-        edges = yielding_gaps(of, parts, residual, drift, rules)
-        step, _, _, stable, _ = newton_step(of, parts, edges, law.hold)
-        size = np.abs(step).max()
-        if stable and size < law.near:
-            return moved_gaps(gaps, step), RESTING, fields, tangents, kinds
+            event = NO_FIELD
+            break
+        now = linearised(of, parts, system)
+        if now.stable and np.abs(now.step).max() < law.near:
+            gaps = moved_gaps(gaps, now.step)
+            event = AT_REST
+            break
         limit = step_limits(table, law.longest)
-        if stable and newton < _NEWTON_STEPS and np.all(np.abs(step) <= limit):
-            newton += 1
-            gaps = moved_gaps(gaps, step)
+        inside = np.all(np.abs(now.step) <= limit)
+        if now.stable and newton_steps < NEWTON_STEPS_IN_A_ROW and inside:
+            newton_steps += 1
+            gaps = moved_gaps(gaps, now.step)
             continue
-        newton = 0
+        newton_steps = 0
         width = min(2 * half + 1, count - 2)
-        first = (_leading_gap(residual, step, law) - width // 2) % count
-        calm = _CALM * law.longest
-        about = About(of, parts.w, parts.blocks, parts.inverse, edges)
-        window, outside, outer = open_window(about, first, width, calm, law, rules, panels)
-        window_kinds = np.zeros(width + 1, dtype=np.int64)
+        leading = leading_gap(now.residual, now.step, law)
+        span = Span((leading - width // 2) % count, width)
+        found = descend_in_window(
+            now.about, span, prescribed, most_fields - fields, limit, equal_speeds, system
+        )
+        fields += found.inside.fields
+        tangents += found.inside.tangents
+        if found.inside.event == NO_FIELD:
+            event = NO_FIELD
+            break
+        gaps = all_gaps(gaps, span, found)
         for i in range(width):
-            window_kinds[i] = kinds[(first + i) % count]
-        moved, ended, moved_kinds = window, LOST, window_kinds
-        followed = np.empty(0)
-        soft = outer.response.negative == 0
-        while ended == LOST:
-            if not soft:  # with all edges outside held
-                window, outside, outer = open_window(about, first, width, 0.0, law, rules, panels)
-            moved, ended, some, more, moved_kinds, _, _, _ = descend(
-                window, prescribed, min(_STEPS, most - fields), window_kinds, equal_speeds, law,
-                rules, with_outside(panels, outside), np.empty((0, window.size)), False,
-            )  # fmt: skip
-            fields += some
-            tangents += more
-            if ended != LOST:
-                followed = following(
-                    moved, prescribed, moved_kinds, outer, about, limit, law, rules,
-                    with_outside(panels, outside),
-                )  # fmt: skip
-                if not np.all(np.isfinite(followed)):  # where the window came to has no field
-                    ended = LOST
-            if ended == LOST and not soft:
-                return gaps, LOST, fields, tangents, kinds
-            soft = False
-        progress = np.abs(moved[:width] - window[:width]).max()
-        result = np.empty(gaps.shape)
-        for i in range(count):
-            k = (first + i) % count
-            turn = 2 * np.pi if first + i >= count else 0.0
-            for side in range(2):
-                if i < width:
-                    result[k, side] = moved[i, side] - turn
-                else:
-                    sign = 1 - 2 * side
-                    result[k, side] = gaps[k, side] + sign * followed[2 * (i - width) + side]
-            if i < width:
-                kinds[k] = max(kinds[k], moved_kinds[i])
-        gaps = result
-        if ended == NARROW or narrowest(gaps) < law.smallest:
-            return gaps, NARROW, fields, tangents, kinds
-        if progress > law.near:
-            half = _HALF_WIDTH
-        elif 2 * half + 1 >= count - 2 or half >= _WIDEST:
-            return gaps, RESTING, fields, tangents, kinds
+            k = (span.first + i) % count
+            kinds[k] = max(kinds[k], found.inside.kinds[i])
+        if found.inside.event == VANISHED or narrowest(gaps) < law.smallest:
+            event = VANISHED
+            break
+        if found.progress > law.near:
+            half = WINDOW_HALF_WIDTH
+        elif 2 * half + 1 >= count - 2 or half >= WINDOW_WIDEST:
+            event = AT_REST
+            break
         else:
-            half = min(2 * half, _WIDEST)
-    return gaps, UNFINISHED, fields, tangents, kinds
+            half = min(2 * half, WINDOW_WIDEST)
+    none = np.empty((0, 0))
+    return Descent(gaps, event, kinds, fields, tangents, none, np.empty(0), False, none)
+
+
+@compiled
+def linearised(of: Solution, parts: Gaps, system: FlowProblem) -> Linearised:
+    """Linearise the solved field of all gaps about their edges."""
+    residual, drift = imbalance(of, system.law, system.panels)
+    edges = yielding_gaps(of, parts, residual, drift, system.rules)
+    about = About(of, parts.w, parts.blocks, parts.inverse, edges)
+    step, _, _, stable, _ = newton_step(of, parts, edges, system.law.hold)
+    return Linearised(about, residual, step, stable)
+
+
+@compiled
+def leading_gap(residual: Array, step: Array, law: Law) -> int:
+    """Choose the gap in the middle of a window: of the edge furthest from balance or from rest."""
+    if np.abs(residual).max() > FAR_FROM_BALANCE * law.critical:
+        return int(np.argmax(np.abs(residual))) // 2
+    return int(np.argmax(np.abs(step))) // 2
+
+
+@compiled
+def descend_in_window(
+    about: About,
+    span: Span,
+    prescribed: float,
+    most_fields: int,
+    limit: Array,
+    equal_speeds: bool,
+    system: FlowProblem,
+) -> WindowDescent:
+    """Descend in a window; with all edges outside held if there is no field where they follow."""
+    law, rules, panels = system.law, system.rules, system.panels
+    count = about.of.kinds.shape[0]
+    kinds = np.zeros(span.width + 1, dtype=np.int64)
+    for i in range(span.width):
+        kinds[i] = about.of.kinds[(span.first + i) % count]
+    follow = FOLLOWING_SHARE * law.longest
+    window, outside, outer = open_window(about, span.first, span.width, follow, law, rules, panels)
+    held = outer.response.negative != 0
+    fields, tangents = 0, 0
+    while True:
+        if held:
+            window, outside, outer = open_window(
+                about, span.first, span.width, 0.0, law, rules, panels
+            )
+        inside_system = FlowProblem(law, rules, with_outside(panels, outside))
+        alone = Comparison(np.empty((0, window.size)), False, 0)
+        inside = descend(
+            window, prescribed, min(WINDOW_FIELDS, most_fields - fields), kinds, equal_speeds,
+            inside_system, alone,
+        )  # fmt: skip
+        fields += inside.fields
+        tangents += inside.tangents
+        event = inside.event
+        motion = np.empty(0)
+        if event != NO_FIELD:
+            motion = following(
+                inside.gaps, prescribed, inside.kinds, outer, about, limit, law, rules,
+                inside_system.panels,
+            )  # fmt: skip
+            if not np.all(np.isfinite(motion)):  # the window came to edges without a field
+                event = NO_FIELD
+        if event != NO_FIELD or held:
+            break
+        held = True
+    progress = np.abs(inside.gaps[: span.width] - window[: span.width]).max()
+    return WindowDescent(
+        Descent(
+            inside.gaps, event, inside.kinds, fields, tangents, inside.trajectory, inside.forces,
+            False, inside.interaction,
+        ),
+        motion,
+        progress,
+    )  # fmt: skip
+
+
+@compiled
+def all_gaps(gaps: Array, span: Span, found: WindowDescent) -> Array:
+    """Put together the gaps of the whole period after a descent in a window on ``gaps``."""
+    count = gaps.shape[0]
+    result = np.empty(gaps.shape)
+    for i in range(count):
+        k = (span.first + i) % count
+        turn = 2 * np.pi if span.first + i >= count else 0.0
+        for side in range(2):
+            if i < span.width:
+                result[k, side] = found.inside.gaps[i, side] - turn
+            else:
+                sign = 1 - 2 * side
+                motion = found.outside[2 * (i - span.width) + side]
+                result[k, side] = gaps[k, side] + sign * motion
+    return result

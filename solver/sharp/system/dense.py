@@ -7,16 +7,19 @@ from typing import ClassVar
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.gradient_flow import descend
-from adhesis.solver.sharp.descent.trajectory import Stage, Track
+from adhesis.solver.sharp.descent.edge_forces import FlowProblem
+from adhesis.solver.sharp.descent.gradient_flow import Descent, descend
+from adhesis.solver.sharp.descent.track import Stage, Track
+from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.griffith import Law
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
 from adhesis.solver.sharp.field.dense_solver import solve_plain
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
-from adhesis.solver.sharp.system.edge_system import DescentEnd, EdgeSystem, Equilibrium, Kinds
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Kinds
 from adhesis.solver.sharp.tolerances import FASTEST_CLOSING
 
 
@@ -57,24 +60,24 @@ class DenseSystem(EdgeSystem):
         prescribed: float,
         most: int,
         kinds: Kinds,
-        smallest: float,
+        law: Law,
         track: Track,
         *,
         equal_speeds: bool,
-    ) -> DescentEnd:
+        compare: bool,
+    ) -> Descent:
         """Descend with all edges at once."""
-        problem = self._problem
-        law = problem.law._replace(smallest=smallest)
-        other = track.of(gaps.size if equal_speeds else 0)
-        at, ended, fields, tangents, kinds, way, track.astray, taken = descend(
-            gaps, prescribed, most, kinds, equal_speeds, law, RULES,
-            problem.source.panels, other, track.astray,
-        )  # fmt: skip
-        if not equal_speeds:
-            track.ways.append(way)
-            track.stages.append(Stage(outward(at) * (at - gaps).ravel(), taken))
-        problem.count.descent(fields, tangents)
-        return DescentEnd(at, ended, fields, kinds)
+        problem = FlowProblem(law, RULES, self._problem.source.panels)
+        comparison = Comparison(track.of(gaps.size if compare else 0), track.has_left, 0)
+        found = descend(gaps, prescribed, most, kinds, equal_speeds, problem, comparison)
+        track.has_left = found.has_left
+        if not compare:
+            track.ways.append(found.trajectory)
+            track.forces.append(found.forces)
+            motion = outward(gaps) * (found.gaps - gaps).ravel()
+            track.stages.append(Stage(motion, found.interaction))
+        self._problem.count.descent(found.fields, found.tangents)
+        return found
 
     def closing_motion(self, before: Array, after: Array) -> float:
         """Motion of all edges together."""

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.trajectory import Track
+from adhesis.solver.sharp.descent.gradient_flow import Descent
+from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.griffith import Law
 from adhesis.solver.sharp.equilibrium.linear_exterior import About
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
@@ -46,16 +48,6 @@ class Equilibrium:
     slope: float
     lost_edge: int = -1
     linearisation: About | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class DescentEnd:
-    """End of a number of descent steps: gaps, how it ended, fields, and the kinds of the gaps."""
-
-    gaps: Array
-    ended: int
-    fields: int
-    kinds: Kinds
 
 
 class EdgeSystem(ABC):
@@ -107,14 +99,15 @@ class EdgeSystem(ABC):
         prescribed: float,
         most: int,
         kinds: Kinds,
-        smallest: float,
+        law: Law,
         track: Track,
         *,
         equal_speeds: bool,
-    ) -> DescentEnd:
-        """Descend in energy for at most ``most`` steps, or to a gap or patch below ``smallest``.
+        compare: bool,
+    ) -> Descent:
+        """Descend in energy for at most ``most`` steps, by a ``law`` of this problem.
 
-        The track is extended, or with ``equal_speeds`` compared with.
+        The track is extended or, to ``compare``, compared with.
         """
 
     @abstractmethod

@@ -8,16 +8,19 @@ from typing import ClassVar
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.trajectory import Track
+from adhesis.solver.sharp.descent.edge_forces import FlowProblem
+from adhesis.solver.sharp.descent.gradient_flow import Descent
+from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.descent.windowed_descent import descend_many
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.edge_elimination import between_edges
+from adhesis.solver.sharp.equilibrium.griffith import Law
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import equilibrium_many
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many_plain
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
-from adhesis.solver.sharp.system.edge_system import DescentEnd, EdgeSystem, Equilibrium, Kinds
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Kinds
 from adhesis.solver.sharp.tolerances import CLOSING_BY_MOTION, CLOSING_OF_MANY
 
 
@@ -66,21 +69,18 @@ class HierarchicalSystem(EdgeSystem):
         prescribed: float,
         most: int,
         kinds: Kinds,
-        smallest: float,
+        law: Law,
         track: Track,
         *,
         equal_speeds: bool,
-    ) -> DescentEnd:
+        compare: bool,
+    ) -> Descent:
         """Descend in windows, one after the other; the track is not known."""
-        problem = self._problem
-        track.whole = False
-        law = problem.law._replace(smallest=smallest)
-        at, ended, fields, tangents, kinds = descend_many(
-            gaps, prescribed, most, kinds, equal_speeds, law, RULES,
-            problem.source.panels,
-        )  # fmt: skip
-        problem.count.descent(fields, tangents)
-        return DescentEnd(at, ended, fields, kinds)
+        track.is_complete = False
+        problem = FlowProblem(law, RULES, self._problem.source.panels)
+        found: Descent = descend_many(gaps, prescribed, most, kinds, equal_speeds, problem)
+        self._problem.count.descent(found.fields, found.tangents)
+        return found
 
     def closing_motion(self, before: Array, after: Array) -> float:
         """Motion of the edges of one gap, times how many gaps that concerns."""

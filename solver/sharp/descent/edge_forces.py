@@ -1,0 +1,149 @@
+"""Forces on the edges, excess energy release rates, and the change of the energy over a step.
+
+With n_e the outward motion of the contact at edge e, dU/dn_e = (π/8)(C_e |C_e| - C_c²): a closing
+edge, C < 0, overlaps, and contact grows there all the same. Forces are in units of π/8.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.equilibrium.griffith import Law, imbalance
+from adhesis.solver.sharp.field.dense_solver import solve, solve_again
+from adhesis.solver.sharp.field.solution import Solution
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
+from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+
+
+class FlowProblem(NamedTuple):
+    """Constants of a problem that the compiled code of a descent takes.
+
+    Attributes
+    ----------
+    law : Law
+        Griffith's condition, what is prescribed, and lengths.
+    rules : Rules
+    panels : Panels
+        Source of the field, with the exterior of a window if there is one.
+    """
+
+    law: Law
+    rules: Rules
+    panels: Panels
+
+
+class Forces(NamedTuple):
+    """Field of given edges, and the forces on them.
+
+    Attributes
+    ----------
+    solution : Solution
+    residual : array, shape (2L,)
+        C - C_c, positive where contact recedes.
+    drift : array, shape (2L,)
+        dC_c/dθ.
+    slope : array, shape (2L,)
+        dU/dn = C |C| - C_c²; the force is its opposite. NaN where the edges have no field.
+    """
+
+    solution: Solution
+    residual: Array
+    drift: Array
+    slope: Array
+
+
+class ForceRows(NamedTuple):
+    """Derivatives of the openings between edges, C_e ∂C_e/∂n_f, changed in place.
+
+    Attributes
+    ----------
+    values : array, shape (2L, 2L)
+    known : int array, shape (2L,)
+        Whether row e belongs to the present edges (not zero) or to earlier ones.
+    """
+
+    values: Array
+    known: Kinds
+
+
+@compiled
+def forces_at(
+    gaps: Array, prescribed: float, kinds: Kinds, before: Solution, system: FlowProblem
+) -> Forces:
+    """Solve the field of these gaps, and evaluate the forces.
+
+    Nodes, moments and kernels of gaps that are as they were in the solution ``before`` are kept.
+    """
+    law, panels = system.law, system.panels
+    solution = solve_again(gaps, prescribed, law.hold, kinds, system.rules, panels, before)
+    edges = 2 * gaps.shape[0]
+    slope = np.full(edges, np.nan)
+    if not np.isfinite(solution.pressure):
+        return Forces(solution, slope, slope, slope)
+    residual, drift = imbalance(solution, law, panels)
+    for e in range(edges):
+        opening = solution.opening[e]
+        critical = opening - residual[e]
+        slope[e] = opening * abs(opening) - critical * critical
+    return Forces(solution, residual, drift, slope)
+
+
+@compiled
+def energy_change(before: Array, after: Array, step: Array) -> tuple[float, float]:
+    """Integrate the change of the energy over a step, and the work done either way.
+
+    ``before`` and ``after`` are dU/dn at both ends of the step (trapezoidal rule).
+    """
+    change = 0.0
+    work = 0.0
+    for e in range(step.shape[0]):
+        of_edge = 0.5 * (before[e] + after[e]) * step[e]
+        change += of_edge
+        work += abs(of_edge)
+    return change, work
+
+
+@compiled
+def slope_along(
+    gaps: Array, step: Array, prescribed: float, kinds: Kinds, system: FlowProblem
+) -> float:
+    """Evaluate the force along ``step`` at these gaps: positive where the energy falls."""
+    law, rules, panels = system.law, system.rules, system.panels
+    of = solve(gaps, prescribed, law.hold, kinds, 1, rules, panels)
+    residual, _ = imbalance(of, law, panels)
+    force = 0.0
+    for e in range(step.shape[0]):
+        force -= residual[e] * (2 * of.opening[e] - residual[e]) * step[e]
+    return force
+
+
+@compiled
+def force_rates(now: Forces, way: Array, edges: Kinds, rows: Array) -> Array:
+    """Differentiate the force on each of ``edges``, along its own way, by the way of all edges.
+
+    ``rows`` are those of ``force_along_step.forces_on``.
+    """
+    of = now.solution
+    rates = np.empty(edges.shape[0])
+    for i in range(edges.shape[0]):
+        e = edges[i]
+        total = 0.0
+        for f in range(way.shape[0]):
+            total += rows[e, f] * way[f]
+        critical = of.opening[e] - now.residual[e]
+        rate = critical * now.drift[e] * (1 - 2 * (e % 2)) * way[e]
+        rate -= np.sign(of.opening[e]) * total
+        rates[i] = 2 * rate * np.sign(way[e])
+    return rates
+
+
+@compiled
+def add_interaction(rows: Array, step: Array, interaction: Array) -> None:
+    """Add the force that each edge's motion (columns) takes from every edge (rows)."""
+    for e in range(step.shape[0]):
+        for f in range(step.shape[0]):
+            interaction[e, f] += 2 * rows[e, f] * step[f]
