@@ -109,7 +109,7 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
             recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
     s_grow, s_recede = np.array(grow), np.array(recede)
 
-    if contact.yields is not None:
+    if contact.response is not None:
         give, opening = lattice.extra_compliance(contact, outer)
         s_grow += give * opening**2
         s_recede += give * opening**2  # a node that leaves has the opening of the one beside it

@@ -82,10 +82,10 @@ class Lattice:
         g = ∂t/∂s with the contact set held, by reciprocity also the share of a node's pull that
         reaches the mean stress; c = dx/(λ (k - ∂p̄/∂s)).
         """
-        if contact.yields is None or not contact.mask.any():
+        if contact.response is None or not contact.mask.any():
             return 0.0, np.zeros(nodes.size)
-        k, held = self.control.stiffness, float(contact.yields.stress.mean())
-        opening = 1 - contact.yields.displacement[nodes]
+        k, held = self.control.stiffness, float(contact.response.stress.mean())
+        opening = 1 - contact.response.displacement[nodes]
         return self.dx / (self.elastic.period * (k + held)), opening
 
     def conjugate(self, contact: Contact) -> float:

@@ -218,7 +218,7 @@ class Steps:
             share = (target - contact.prescribed) / (far.prescribed - contact.prescribed)
             frozen.stress += share * (far.stress - contact.stress)
             frozen.displacement += share * (far.displacement - contact.displacement)
-            if contact.yields is not None:
+            if contact.response is not None:
                 frozen.separation += share * (far.separation - contact.separation)
         return frozen
 
