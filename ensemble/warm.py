@@ -40,7 +40,7 @@ def warm_up(
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        seen = warm(methods, tell=tell, to_installation=to_installation)
+        seen = warm(methods, report=tell, to_installation=to_installation)
     for text in dict.fromkeys(str(warning.message) for warning in caught):
         say(f"warning: {text}")
     if next_line > _MOMENT:

@@ -1,8 +1,8 @@
-"""Checks of arguments: each returns the value as it will be used, or refuses it in one sentence.
+"""Check arguments: each function returns the converted value or raises with one sentence.
 
 A value of the wrong type raises a TypeError, a wrong value of the right type a ValueError; the
-sentence is "NAME is VALUE: it must be RULE" for both. Each bound stands here once, for Python, the
-command line and campaign files alike.
+sentence is "NAME is VALUE: it must be RULE" for both. Each bound is defined here once, for Python,
+the command line and campaign files.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 T = TypeVar("T")
 
-_LONGEST = 80  # characters of a value that is shown
+_LONGEST = 80  # characters of a value in a message
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Between which bounds a number must lie.
+    """Bounds of a number.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Bounds:
     unit : str
         Empty for a number without a unit.
     note : str
-        What else helps who reads the rule.
+        Appended to the rule in messages.
     """
 
     low: float = -math.inf
@@ -56,7 +56,7 @@ class Bounds:
     note: str = ""
 
     def holds(self, number: float) -> bool:
-        """Whether a number lies between the bounds; NaN does not, nor ±∞ unless it may."""
+        """Return whether a number lies within the bounds; NaN never does, ±∞ only if allowed."""
         if (self.or_zero and number == 0) or (self.or_infinite and number == math.inf):
             return True
         above = number > self.low if self.without_low else number >= self.low
@@ -65,7 +65,7 @@ class Bounds:
 
     @property
     def text(self) -> str:
-        """The rule in words, after "it must be"."""
+        """Rule in words, to follow "it must be"."""
         low, high = plain(self.low), plain(self.high)
         kind = "a whole number" if self.whole else "a number"
         between = math.isfinite(self.low) and math.isfinite(self.high)
@@ -101,16 +101,15 @@ COEFFICIENT = Bounds(1e-6 * _LEAST, 1e6 * _MOST, unit="m")
 HEIGHT_SQUARE = Bounds(_LEAST**2, _MOST**2, unit="m²")
 
 RMS_SLOPE = Bounds(1e-12, 100.0, note="; are heights and period both in m?")
-"""Small-strain theory is for slopes far below 1, and a loop is warned of from 0.3 on. Profiles
-that are used to test methods reach some tens. At 100 flanks stand at 89.4° to the mean line.
-Heights in µm that are taken as m make it 1e6 times too large, and surfaces have slopes of 1e-4 and
-more.
-A slope of 1e-12 is the size of an atomic nucleus on a millimetre."""
+"""Small-strain theory assumes slopes far below 1; loops warn above 0.3. Profiles that test methods
+reach some tens; a slope of 100 is a flank at 89.4° to the mean line. Heights in µm taken for m make
+the slope 1e6 times too large, and surfaces have slopes of 1e-4 and more. A slope of 1e-12 is the
+size of an atomic nucleus on a millimetre."""
 
 MEAN_SQUARE_SLOPE = Bounds(RMS_SLOPE.low**2, RMS_SLOPE.high**2)
 
 YOUNG = Bounds(1e-3, 1e15, unit="Pa")
-"""A thousandth of the modulus of the softest gels, and a thousand times that of diamond."""
+"""From a thousandth of the modulus of the softest gels to a thousand times that of diamond."""
 
 POISSON = Bounds(-1.0, 0.5, without_low=True)
 WORK_OF_ADHESION = Bounds(_LEAST, _MOST, or_zero=True, unit="J/m²")
@@ -137,15 +136,15 @@ ROLLOFF = Bounds(1.0)
 SEED = Bounds(0, whole=True)
 
 MOST_WAVES = 100_000
-"""Beyond this, memory is measured in gigabytes; loops have been tested to a tenth of it."""
+"""Larger profiles need gigabytes of memory; loops have been tested up to a tenth of it."""
 
 HARMONIC = Bounds(1, MOST_WAVES, whole=True)
 
 LOAD_STEPS = Bounds(1, 100_000, whole=True)
 
 ACCURACY = Bounds(1e-10, 1.0, without_high=True)
-"""The field is solved to a hundredth of it, and to no less than 1e-14 in double precision; at 1e-10
-both still leave two decimal digits between them."""
+"""The field is solved to a hundredth of the accuracy, at best to 1e-14 in double precision: at
+1e-10 two decimal digits remain."""
 
 NODES_PER_WAVE = Bounds(8, 100_000, whole=True, note="; fewer are too coarse for the shortest wave")
 
@@ -156,7 +155,7 @@ FINITE = Bounds()
 
 
 def plain(number: float) -> str:
-    """Spell a number as one would write it: 1e9, not 1e+09."""
+    """Format a number without padding: 1e9, not 1e+09."""
     if isinstance(number, int):
         return str(number)
     mantissa, e, exponent = f"{number:.6g}".partition("e")
@@ -164,12 +163,12 @@ def plain(number: float) -> str:
 
 
 def counted(number: int, name: str) -> str:
-    """Return a number of things: "1 jump", "2 jumps"."""
+    """Format a count with its noun: "1 jump", "2 jumps"."""
     return f"{number} {name}{'' if number == 1 else 's'}"
 
 
 def shown(value: object) -> str:
-    """Return a value as Python spells it, on one line and short enough for a sentence."""
+    """Return the repr of a value on one line, shortened for a message."""
     if isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and np.ma.is_masked(value):
         return "masked"
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
@@ -184,9 +183,9 @@ def shown(value: object) -> str:
 
 
 def number_of(value: object) -> float | int | None:
-    """Return a real number as Python's own, of a NumPy scalar too; None if it is none.
+    """Convert a real number, NumPy scalars included, to int or float; None for anything else.
 
-    A bool is an int to Python, never to a user. A fraction too large for a float is NaN.
+    A bool is not a number here. A fraction too large for a float gives NaN.
     """
     if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
         value = value.item()
@@ -197,7 +196,7 @@ def number_of(value: object) -> float | int | None:
     if isinstance(value, numbers.Real | Decimal):
         try:
             return float(value)
-        except (OverflowError, ValueError):  # of a large fraction, of a signalling NaN
+        except (OverflowError, ValueError):  # large fraction; signalling NaN
             return math.nan
     return None
 
@@ -208,16 +207,16 @@ def real(name: str, value: object, bounds: Bounds = FINITE) -> float:
     Raises
     ------
     TypeError
-        If it is no real number: a bool, a text, None, a complex number, an array of several.
+        If it is not a real number: a bool, a text, None, a complex number, an array of several.
     ValueError
-        If it breaks its bounds or is not finite.
+        If it is out of bounds or not finite.
     """
     number = number_of(value)
     if number is None:
         raise TypeError(_sentence(name, value, bounds.text))
     try:
         number = float(number)
-    except OverflowError:  # so large that no bounds hold it
+    except OverflowError:  # an integer beyond the range of floats, out of all bounds
         number = math.nan
     if not bounds.holds(number):
         raise ValueError(_sentence(name, value, bounds.text))
@@ -225,7 +224,7 @@ def real(name: str, value: object, bounds: Bounds = FINITE) -> float:
 
 
 def whole(name: str, value: object, bounds: Bounds) -> int:
-    """Return a whole number between its bounds as an int; 10.0 is one too.
+    """Return a whole number between its bounds as an int; accepts 10.0.
 
     Raises
     ------
@@ -249,7 +248,7 @@ def flag(name: str, value: object) -> bool:
 
 
 def choice(name: str, value: T, choices: Iterable[T]) -> T:
-    """Return one of several names; TypeError if it is no text, ValueError for another one."""
+    """Return one of several names; TypeError if it is not a text, ValueError for another one."""
     names = tuple(choices)
     rule = f"one of {', '.join(map(str, names))}"
     if not isinstance(value, str):
@@ -260,7 +259,7 @@ def choice(name: str, value: T, choices: Iterable[T]) -> T:
 
 
 def instance(name: str, value: T, kind: type[Any], how: str) -> T:
-    """Return an object of a class; a TypeError says ``how`` to make one."""
+    """Return an object of a class; otherwise a TypeError with ``how`` to make one."""
     if not isinstance(value, kind):
         raise TypeError(_sentence(name, value, f"a {kind.__name__}; make one with {how}"))
     return value
@@ -274,7 +273,7 @@ def function(name: str, value: T) -> T:
 
 
 def path(name: str, value: object) -> Path:
-    """Return a path; TypeError for what is none."""
+    """Return a path; TypeError for anything else."""
     if not isinstance(value, str | os.PathLike):
         raise TypeError(_sentence(name, value, "a path"))
     return Path(value)
@@ -285,13 +284,14 @@ def row(
 ) -> NDArray[Any]:
     """Return a row of numbers as an array of float64 (complex128 if ``imaginary``), shape (n,).
 
-    Lists, arrays, what NumPy makes an array of (a column of a table), and iterators; entries may be
-    of any real type. Whether they are finite, and how many, is left to the caller.
+    Accepts lists, arrays, objects that NumPy converts to arrays (a column of a table) and
+    iterators, with entries of any real type. The caller checks whether they are finite, and how
+    many.
 
     Raises
     ------
     TypeError
-        If it is no row of numbers: a text, a mapping, booleans, complex numbers, objects.
+        If it is not a row of numbers: a text, a mapping, booleans, complex numbers, objects.
     ValueError
         If an entry is masked, or it has several dimensions.
     """
@@ -356,7 +356,7 @@ def reals(name: str, values: object) -> NDArray[np.float64]:
 
 
 def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np.float64]:
-    """Return a row of finite numbers, as :func:`row`; ValueError for one that is not finite."""
+    """Return a row of finite numbers, as :func:`row`; ValueError if one is not finite."""
     array = row(name, values, entry=entry)
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
@@ -375,7 +375,7 @@ def _sentence(name: str, value: object, rule: str) -> str:
 
 
 def _described(value: object) -> str:
-    """Return a value as it stands in a sentence; objects by their class alone."""
+    """Describe a value in a message: its repr, for other objects only their class."""
     plainly = (str, bytes, numbers.Number, np.generic, np.ndarray, list, tuple, dict, set)
     if value is None or isinstance(value, plainly):
         return shown(value)

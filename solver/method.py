@@ -1,4 +1,4 @@
-"""What a method must offer, and the contact states that it hands out.
+"""Interface of a method, and the contact states that it returns.
 
 A method finds equilibrium contact states of one :class:`~adhesis.solver.model.problem.Problem`. The
 loading path, the energy audit and the catalogue of jumps (:mod:`adhesis.solver.loading.loop`,
@@ -7,8 +7,8 @@ loading path, the energy audit and the catalogue of jumps (:mod:`adhesis.solver.
 To add a method, subclass :class:`Method` and keep these promises:
 
 1.  ``detached(s)`` is the state without contact at separation s ≥ h_max.
-2.  ``follow(state, s)`` takes an equilibrium state of its own to separation s along the
-    quasi-static path and returns every state it visited on the way, in order, the last one at s.
+2.  ``follow(state, s)`` takes one of the method's equilibrium states to separation s along the
+    quasi-static path and returns every visited state in order, the last one at s.
     The direction is free: s below the state's separation loads, above it unloads, and at the same
     separation the state only settles (first touch at s = h_max is such a case).
 3.  The path obeys the rules of evolution (docs/methods.md): contact nucleates only where surfaces
@@ -21,9 +21,9 @@ To add a method, subclass :class:`Method` and keep these promises:
     states are dense enough for the trapezoidal rule.
 5.  Same input, same bits: no clocks, no unseeded random numbers, no threads.
 6.  A state is immutable; ``follow`` may be called again from an older state (partial loops).
-7.  No state is handed out that the path does not visit, or in which surfaces overlap: no gap is
-    narrower than -1e-6 h_max, and below s = h_max no state is without contact. A path that cannot
-    be followed under these promises ends in a :class:`PathError`.
+7.  Every returned state lies on the path, and surfaces do not overlap in it: no gap is narrower
+    than -1e-6 h_max, and below s = h_max no state is without contact. A path that cannot be
+    followed under these promises raises a :class:`PathError`.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _PER_WAVE, _FEWEST = 16, 256
 
 
 class PathError(RuntimeError):
-    """A path that cannot be followed: there is no state to hand out, and so no number.
+    """Error raised when a path cannot be followed: there is no state to return.
 
     References
     ----------
@@ -74,18 +74,18 @@ class PathError(RuntimeError):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Path(ByValue):
-    """The states from the one that ``follow`` was given (excluded) to the wanted separation.
+    """States visited by one call of ``follow``, without its first state.
 
     Attributes
     ----------
     states : tuple of ContactState
-        In the order in which they were visited, the last one at the wanted separation.
+        In the order of the visit, the last one at the prescribed separation.
     jumps : tuple of Jump
         In the same order.
     error : float
-        Estimated error that the states and jumps bring into a loop's loss, in J/m² of nominal area:
-        energies, stresses, and the separations at which jumps were found. Without that of the
-        trapezoidal rule, which is the loop's own; NaN if the method does not know.
+        Estimated error of a loop's loss due to these states and jumps, in J/m² of nominal area:
+        that of energies, stresses and located separations, without that of the trapezoidal rule;
+        NaN if unknown.
 
     References
     ----------
@@ -135,7 +135,7 @@ class Opening(ByValue):
     x : array, shape (points,)
         Position in m, ascending; the first and the last are the edges. It may exceed λ.
     gap : array, shape (points,)
-        t in m; zero at the edges. So dense that between two points t is linear in φ,
+        t in m; zero at the edges. The points are dense enough to interpolate t linearly in φ,
         x = middle - half-width · cos φ.
 
     References
@@ -167,13 +167,13 @@ class PatchTension(NamedTuple):
 
 @dataclass(frozen=True)
 class MethodReport:
-    """What a method says of itself; each method adds its settings and its counters.
+    """Report of a method; each method adds its settings and counters.
 
     Attributes
     ----------
     name : str
     chosen : str or None
-        Why this method was chosen, where the user left the choice open.
+        Reason for the choice of this method, if ``auto`` made it.
     """
 
     name: str
@@ -181,18 +181,18 @@ class MethodReport:
 
 
 class Method(ABC):
-    """Finds and follows contact states of one problem; see the module's numbered contract.
+    """Base of methods that follow contact states of one problem; see the module's contract.
 
     Parameters
     ----------
     problem : Problem
     chosen : str, optional
-        Why this method was chosen, where the user left the choice open.
+        Reason for the choice of this method, if ``auto`` made it.
 
     Attributes
     ----------
     nodes : int or None
-        Nodes of the method's own grid, where it has one.
+        Nodes of the method's grid, if it has one.
 
     Raises
     ------
@@ -201,8 +201,8 @@ class Method(ABC):
 
     Notes
     -----
-    A method can be shared by threads, which take turns, copied and pickled: the copy is built anew
-    from the same arguments and follows the same paths, bit by bit.
+    Threads can share a method; one calls it at a time. Methods can be copied and pickled: a copy is
+    built from the same arguments and follows the same paths to the last bit.
 
     References
     ----------
@@ -217,7 +217,7 @@ class Method(ABC):
     _built_from: tuple[tuple[Any, ...], dict[str, Any]]
 
     def __new__(cls, *args: Any, **options: Any) -> Self:
-        """Remember the arguments, which a copy is built from."""
+        """Store the arguments, from which a copy is built."""
         method = super().__new__(cls)
         method._built_from = args, options
         return method
@@ -244,7 +244,7 @@ class Method(ABC):
 
     @classmethod
     def _check_adhesion(cls, problem: Problem) -> None:
-        """Refuse a work of adhesion of which no number would come out."""
+        """Raise for a work of adhesion that the method does not resolve."""
         gamma, unit = problem.work_of_adhesion, problem.full_contact_energy
         least, largest = (limit * unit for limit in cls.resolved_adhesion)
         if gamma == 0 or least <= gamma <= largest:
@@ -265,12 +265,12 @@ class Method(ABC):
 
     @abstractmethod
     def fields(self, state: ContactState, n: int) -> Fields:
-        """Stress, displacement and gap of ``state`` on n equally spaced nodes.
+        """Compute stress, displacement and gap of ``state`` on n equally spaced nodes.
 
         Raises
         ------
         ValueError
-            If the method cannot give them at this n.
+            If the method cannot compute them for this n.
         """
 
     @abstractmethod
@@ -304,10 +304,10 @@ class Method(ABC):
 
     @abstractmethod
     def report(self) -> MethodReport:
-        """What was chosen and what it cost so far: resolution, tolerances, counters."""
+        """Return the resolution, the tolerances and the counters so far."""
 
     def detached(self, separation: float) -> ContactState:
-        """State without contact at ``separation`` (m)."""
+        """Return the state without contact at ``separation`` (m)."""
         return ContactState(separation, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
 
 

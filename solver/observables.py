@@ -1,10 +1,9 @@
-"""What is computed from the fields of one state: density of the gap, spectral density.
+"""Compute the probability density of the gap and the spectral density of one state.
 
 Beside an edge of contact the gap opens like the square root of the distance r: by Griffith's
 K = sqrt(2E*γ'), γ' = γ sqrt(1 + h'²), t = (4K/E*) sqrt(r/(2π)) = 4 sqrt(γ' r/(πE*)). Nodes of a
-grid miss it, and with it most of what is narrow. A method hands out the opening of every gap from
-edge to edge (:class:`~adhesis.solver.method.Opening`); here the shares of the period are taken from
-it.
+grid do not resolve it, nor most narrow gaps. The density is therefore computed from the opening of
+every gap from edge to edge, which methods return (:class:`~adhesis.solver.method.Opening`).
 """
 
 from __future__ import annotations
@@ -16,15 +15,15 @@ import numpy as np
 from adhesis.solver.method import Fields, Opening
 from adhesis.solver.model.profile import Array
 
-# Nodes beside an edge between which the opening is refined, and the points put between two of them.
+# Number of nodes beside an edge where the opening is refined, and of points between two of them.
 _NEAR, _POINTS = 4, 16
 
 
 def gap_shares(openings: Sequence[Opening], period: float, bins: Array) -> Array:
-    """Share of the period in which the gap lies in each bin.
+    """Compute the share of the period on which the gap lies in each bin.
 
-    In a gap (l, r) the place is x = (l + r)/2 - (r - l)/2 cos φ. Between the points of an opening t
-    is taken as linear in φ, so that it is an exact square root of the distance beside both edges.
+    In a gap (l, r) the position is x = (l + r)/2 - (r - l)/2 cos φ. Between the points of an
+    opening t is linear in φ, an exact square root of the distance beside both edges.
 
     Parameters
     ----------
@@ -33,12 +32,12 @@ def gap_shares(openings: Sequence[Opening], period: float, bins: Array) -> Array
     period : float
         λ in m.
     bins : array, shape (n + 1,)
-        Ascending gaps in m. What lies outside counts in the outermost bins.
+        Ascending gaps in m. Gaps outside count in the outermost bins.
 
     Returns
     -------
     array, shape (n,)
-        They add up to the share of the period that is out of contact.
+        The sum is the share of the period that is out of contact.
     """
     total = np.zeros(bins.size - 1)
     for opening in openings:
@@ -47,9 +46,9 @@ def gap_shares(openings: Sequence[Opening], period: float, bins: Array) -> Array
 
 
 def _widths(opening: Opening, bins: Array) -> Array:
-    """Length in m on which one opening lies in each bin."""
+    """Compute the length in m on which one opening lies in each bin."""
     left, width = opening.x[0], opening.x[-1] - opening.x[0]
-    # The nearer end measures φ, so that no digit is lost beside either.
+    # φ is computed from the nearer end, to avoid cancellation.
     near = np.sqrt(np.clip((opening.x - left) / width, 0, 1))
     far = np.sqrt(np.clip((opening.x[-1] - opening.x) / width, 0, 1))
     phi = 2 * np.where(near < far, np.arcsin(near), np.arccos(far))
@@ -57,11 +56,11 @@ def _widths(opening: Opening, bins: Array) -> Array:
     inner = bins[1:-1]
     first = np.searchsorted(inner, np.minimum(low, high), side="right")
     last = np.searchsorted(inner, np.maximum(low, high), side="left")
-    # One piece for every bin that an interval reaches into, cut where t crosses its bounds.
+    # Each interval is cut into one piece per bin, where t crosses the bin's bounds.
     pieces = last - first + 1
     interval = np.repeat(np.arange(low.size), pieces)
-    place = np.arange(interval.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    number = np.repeat(first, pieces) + place
+    offset = np.arange(interval.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    number = np.repeat(first, pieces) + offset
     bounds = np.concatenate([[-np.inf], inner, [np.inf]])
     bottom, top = np.minimum(low, high)[interval], np.maximum(low, high)[interval]
     rise = np.where(top > bottom, top - bottom, 1.0)
@@ -79,10 +78,10 @@ def _widths(opening: Opening, bins: Array) -> Array:
 def openings_between(
     edges: Array, fields: Fields, coefficient: Array, period: float
 ) -> list[Opening]:
-    """Openings of the gaps between contact edges, from values at equally spaced nodes.
+    """Interpolate the openings of the gaps between contact edges from equally spaced nodes.
 
-    t over sqrt((x - l)(r - x)) is smooth across a gap (l, r) and known at both edges: it is
-    interpolated between nodes and edges (monotone cubic), t is that times the root.
+    The interpolant (monotone cubic) is that of t/sqrt((x - l)(r - x)), which is smooth across a gap
+    (l, r) and known at both edges.
 
     Parameters
     ----------
@@ -110,7 +109,7 @@ def _opening(
     first = left + (fields.x - left) % period
     order = np.argsort(first)
     x, t = first[order], fields.gap[order]
-    # A node within rounding of an edge says nothing that the edge does not.
+    # A node within rounding of an edge adds no information.
     inside = (x > left + 1e-9 * period) & (x < right - 1e-9 * period) & (t > 0)
     x, t = x[inside], t[inside]
     width = right - left
@@ -118,7 +117,7 @@ def _opening(
         [[ends[0]], t / np.sqrt((x - left) * (right - x)) * np.sqrt(width), [ends[1]]]
     )
     x = np.concatenate([[left], x, [right]])
-    # here: half of the time in which commands that compute nothing start
+    # imported here: it takes half of the start-up time of commands that compute nothing
     from scipy.interpolate import PchipInterpolator
 
     smooth = PchipInterpolator(x, shape)
@@ -134,18 +133,18 @@ def _opening(
 
 
 def spectral_density(values: Array, period: float) -> Array:
-    """Two-sided spectral density C(m q0) = |v_m|²/q0 on the harmonics m = 0 … n/2.
+    """Compute the two-sided spectral density C(m q0) = |v_m|²/q0 of the harmonics m = 0 … n/2.
 
     Parameters
     ----------
     values : array, shape (n,)
-        v at equally spaced nodes of the period, with any unit u.
+        v at equally spaced nodes of the period, in any unit u.
     period : float
         λ in m.
 
     Returns
     -------
     array, shape (n // 2 + 1,)
-        In u² m; ∫ C dq over all q, positive and negative, is the mean square.
+        In u² m; ∫ C dq over positive and negative q is the mean square.
     """
     return np.asarray(np.abs(np.fft.rfft(values) / values.size) ** 2 * (period / (2 * np.pi)))

@@ -1,4 +1,4 @@
-"""Compiling ahead: all that loops and fields of a method call, before the first one is timed."""
+"""Compile ahead of time all functions that loops and fields of a method call."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.registry import make_method
-from adhesis.solver.runtime.compile_log import hushed
+from adhesis.solver.runtime.compile_log import silence_compile_log
 from adhesis.solver.runtime.disk_cache import installed_folder
 from adhesis.solver.runtime.jit import (
     Compilation,
@@ -46,28 +46,26 @@ __all__ = [
 def warm(
     methods: Iterable[str] = COMPILED_METHODS,
     *,
-    tell: Callable[[Compilation], None] = lambda seen: None,
+    report: Callable[[Compilation], None] = lambda seen: None,
     to_installation: bool = False,
 ) -> Compilation:
-    """Compile what the methods need, or load it where it is compiled already.
-
-    That is done by small loops, so that nothing is compiled that is not called, and all is that is.
+    """Compile the functions of the methods, or load their cached code, by running small loops.
 
     Parameters
     ----------
     methods : iterable of str
         Of :data:`COMPILED_METHODS`.
-    tell : callable
-        Called each time the compiler begins a function.
+    report : callable
+        Called when the compilation of a function begins.
     to_installation : bool
         Keep the code in the installation, if that can be written, for all its users and nodes.
 
     Returns
     -------
     Compilation
-        How many functions were compiled now, and the time that it took.
+        Number of functions compiled now, and the time that took.
     """
-    with watch_compilation(tell) as seen, hushed(), _without_collecting():
+    with watch_compilation(report) as seen, silence_compile_log(), _without_garbage_collection():
         for method in methods:
             if to_installation:
                 with kept_in_installation():
@@ -79,8 +77,8 @@ def warm(
 
 
 @contextmanager
-def _without_collecting() -> Iterator[None]:
-    """Spare the search for circles among the millions of objects of the compiler."""
+def _without_garbage_collection() -> Iterator[None]:
+    """Suspend the search for cycles, which is slow among millions of objects of the compiler."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -91,17 +89,17 @@ def _without_collecting() -> Iterator[None]:
 
 
 def compiled_in(method: str) -> Path | None:
-    """Folder in which all code of a method lies for this processor and these settings, or None."""
+    """Return the folder with all code of a method for this processor and settings, or None."""
     return code_files().find(_marker(method))
 
 
 def in_installation(folder: Path) -> bool:
-    """Whether a folder of compiled code is the installation's, not the user's."""
+    """Return True for the installation's folder of compiled code, False for the user's."""
     return folder.is_relative_to(installed_folder())
 
 
 def _marker(method: str) -> str:
-    """Name of the file that says that all is compiled; another one when more comes to be."""
+    """Return the name of the file that marks a method as compiled; it changes with this module."""
     made_by = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
     return f"{method}-{made_by}.json"
 
@@ -109,18 +107,18 @@ def _marker(method: str) -> str:
 def _mark(method: str, to_installation: bool) -> None:
     files = code_files(to_installation)
     if files.read(_marker(method)) is None:
-        words = {"method": method, "processor": processor(), **settings()}
-        files.write(_marker(method), json.dumps(words, indent=1).encode())
+        entries = {"method": method, "processor": processor(), **settings()}
+        files.write(_marker(method), json.dumps(entries, indent=1).encode())
 
 
 def small_problem(work_of_adhesion: float) -> Problem:
-    """A problem with few waves, whose loops take a moment."""
+    """Build a problem with few waves, whose loops take less than a second."""
     profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=3, h_rms=1e-6)
     return Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion)
 
 
-def _crowded() -> SharpMethod:
-    """A method that takes a dozen gaps for many, on a profile that has them."""
+def _hierarchical() -> SharpMethod:
+    """Build a method that uses its hierarchical solver from 6 gaps on, and a profile with more."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=1, h_rms=1e-6)
     method = SharpMethod(Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.004))
     method.edges.many = 6
@@ -128,7 +126,7 @@ def _crowded() -> SharpMethod:
 
 
 def _small_loops(method: str) -> None:
-    """Loops that call all compiled functions with all types of arguments that loops call them."""
+    """Run loops that call all compiled functions with all types of arguments that occur."""
     for work_of_adhesion in (0.04, 0.0):
         problem = small_problem(work_of_adhesion)
         chosen = (
@@ -143,7 +141,7 @@ def _small_loops(method: str) -> None:
 
         run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
         if isinstance(chosen, SharpMethod) and work_of_adhesion > 0:
-            run_loop(_crowded(), max_penetration=0.5, load_steps=2)
+            run_loop(_hierarchical(), max_penetration=0.5, load_steps=2)
         state = max(states, key=lambda state: state.patches)
         chosen.fields(state, chosen.nodes or 256)
         chosen.openings(state)

@@ -1,4 +1,4 @@
-"""The methods by name."""
+"""Make methods by name."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def make_method(
     accuracy : float
         Wanted relative error of the loss, 1e-10 ≤ accuracy < 1.
     nodes_per_wave : int, optional
-        For ``grid``: nodes per shortest wave, instead of those that ``accuracy`` asks for.
+        For ``grid``: nodes per shortest wave; by default derived from ``accuracy``.
 
     Raises
     ------
     ValueError
         For an unknown name or a value outside its range.
     TypeError
-        If the problem is no Problem, or a value no number.
+        If the problem is not a Problem, or a value not a number.
 
     References
     ----------
@@ -71,12 +71,12 @@ def make_method(
     return method
 
 
-@uninterrupted  # an import that is interrupted leaves modules that are never whole again
+@uninterrupted  # an interrupted import leaves incomplete modules behind
 def _load(name: Literal["grid", "sharp"]) -> None:
     """Import a method, and with it the compiler."""
-    from adhesis.solver.runtime.compile_log import tell_of_compiling
+    from adhesis.solver.runtime.compile_log import log_compilation
 
-    tell_of_compiling()
+    log_compilation()
     import_module(f"adhesis.solver.{name}.method")
 
 
@@ -98,12 +98,11 @@ def check_nodes(nodes_per_wave: int, waves: int) -> None:
 def choose(
     problem: Problem, nodes_per_wave: int | None = None
 ) -> tuple[Literal["grid", "sharp"], str]:
-    """Pick the method for a problem, and say why in one sentence.
+    """Choose the method for a problem; returns its name and the reason in one sentence.
 
-    The error of ``sharp`` is that of its tolerances, on any spectrum, and with the few patches that
-    adhesion leaves it is much the faster one (docs/methods.md). Without adhesion there are hundreds
-    of patches, the loss is zero whatever the resolution, and the work of ``sharp`` grows with the
-    cube of their number.
+    The error of ``sharp`` is that of its tolerances, on any spectrum, and with adhesion it is much
+    the faster one (docs/methods.md). Without adhesion there are many more patches, and the loss is
+    zero at any resolution.
     """
     if nodes_per_wave is not None:
         return "grid", "auto: grid, as a number of nodes per wave is given"

@@ -1,4 +1,4 @@
-"""What the dataclasses that hold inputs and results have in common."""
+"""Common base of the dataclasses that hold inputs and results."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def finite(value: float) -> float | None:
 class ByValue:
     """Read-only arrays, equality by value and a short repr, for a frozen dataclass.
 
-    The dataclass is made with ``eq=False, repr=False``. Two objects are equal if they are of one
-    class and every field agrees that is not left out of comparisons (``compare=False``): arrays in
-    shape and every entry, NaN being equal to NaN. Equal objects have equal hashes.
+    The dataclass is declared with ``eq=False, repr=False``. Two objects are equal if they have the
+    same class and agree in all fields without ``compare=False``: arrays in shape and every entry,
+    NaN being equal to NaN. Equal objects have equal hashes.
     """
 
     def __post_init__(self) -> None:
@@ -33,12 +33,12 @@ class ByValue:
                 self.__dict__[name] = view
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Copies and pickles are read-only as well."""
+        """Restore a copy or pickle, with read-only arrays as well."""
         self.__dict__.update(state)
         ByValue.__post_init__(self)
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are of one class and agree in every field that is compared."""
+        """Compare class and fields."""
         if self is other:
             return True
         if type(self) is not type(other):
@@ -49,11 +49,11 @@ class ByValue:
         )
 
     def __hash__(self) -> int:
-        """Hash of the fields that are compared."""
+        """Return the hash of the compared fields."""
         return hash((type(self), *(_hashable(getattr(self, e.name)) for e in _compared(self))))
 
     def __repr__(self) -> str:
-        """One line; of arrays and long tuples the size alone."""
+        """Return one line, with only the size of arrays and long tuples."""
         shown = (
             f"{entry.name}={_brief(getattr(self, entry.name))}"
             for entry in fields(self)  # type: ignore[arg-type]  # every subclass is a dataclass

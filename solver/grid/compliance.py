@@ -8,7 +8,7 @@ removing the contact node i with stress σ_i releases ½ dx σ_i² S, both exact
 Ω the contact set without the node. S depends on the geometry alone: 1.7286 dx/E* at the edge of a
 long isolated patch, more for short patches, less beside narrow gaps. Here the nodes of the patch
 and of its two neighbours are lumped into blocks of uniform stress that grow away from their ends;
-S is stationary with respect to the stress, so lumping costs about 1e-4 of it.
+as S is stationary with respect to the stress, the relative error of lumping is about 1e-4.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ import numpy as np
 from adhesis.solver.grid.kernels import inverse_form
 from adhesis.solver.model.profile import Array
 
-# Blocks of one node at the end of a patch that faces the node, and the growth of those behind them.
+# Number of one-node blocks at the end of a patch beside the node, and growth of the next blocks.
 _SINGLE_NODES = 5
 _GROWTH = 1.8
-# Lengths up to this many nodes are taken exactly, longer ones rounded in equal ratios.
+# Lengths up to this many nodes are exact, longer ones rounded in equal ratios.
 _EXACT_LENGTH = 24
 _RATIO = 1.08
-# Geometries remembered without rounding, to spare the rounding.
+# Number of geometries cached without rounding, to save the time of rounding.
 _RECENT = 20_000
 
 
 @cache
 def _growing(length: int) -> tuple[int, ...]:
-    """Offsets of block ends that grow away from offset 0, up to ``length``."""
+    """Return the offsets of block ends, with blocks that grow from offset 0 up to ``length``."""
     ends = [0]
     width = 1.0
     while ends[-1] + round(width) <= length:
@@ -44,14 +44,14 @@ def _growing(length: int) -> tuple[int, ...]:
 
 @cache
 def _fine_near(length: int) -> tuple[int, ...]:
-    """Block ends of a patch of ``length`` nodes, fine at offset 0 only."""
+    """Return the block ends of a patch of ``length`` nodes, fine at offset 0 only."""
     ends = _growing(length)
     return ends if ends[-1] == length else (*ends, length)
 
 
 @cache
 def _fine_both(length: int) -> tuple[int, ...]:
-    """Block ends of a patch of ``length`` nodes, fine at both ends."""
+    """Return the block ends of a patch of ``length`` nodes, fine at both ends."""
     half = _growing(length // 2)
     return tuple(sorted({*half, *(length - offset for offset in half)}))
 
@@ -72,7 +72,7 @@ _rounded = _Rounded()
 
 
 class EdgeCompliance:
-    """S of edge nodes on a periodic grid, remembered by geometry.
+    """S of edge nodes on a periodic grid, cached by geometry.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class EdgeCompliance:
         gap: int,
         neighbours: tuple[int, int, int] | None,
     ) -> float:
-        """S of the free node next to a patch, in m/Pa.
+        """Compute S of the free node next to a patch, in m/Pa.
 
         Parameters
         ----------
@@ -108,8 +108,8 @@ class EdgeCompliance:
         neighbours : (int, int, int) or None
             Contact nodes beyond the gap on the node's side, nodes of the gap on the patch's other
             side, and contact nodes beyond that; None if the patch is the only one of the period.
-            They are the neighbours' nodes and, shared out between both sides, those of all other
-            patches, taken as if they followed without gaps: far away only their number counts.
+            The nodes of all other patches are divided between both sides and added to the
+            neighbours without gaps: far away only their number matters.
         """
         geometry = (width, gap, neighbours)
         known = self._recent.get(geometry)
@@ -122,10 +122,10 @@ class EdgeCompliance:
     def _rounded_value(
         self, width: int, gap: int, neighbours: tuple[int, int, int] | None
     ) -> float:
-        """S of the geometry with rounded lengths."""
+        """Compute S of the geometry with rounded lengths."""
         key: tuple[int, ...]
         if neighbours is None:
-            # Either the patch or the gap is taken exactly: together they are the period.
+            # The shorter of patch and gap is rounded; together they are the period.
             short = _rounded[min(width, self.n - width)]
             width = short if width <= self.n - width else self.n - short
             key = (width,)
@@ -138,7 +138,7 @@ class EdgeCompliance:
         return known
 
     def across_patch(self, width: int, left: int, right: int, before: int, after: int) -> Array:
-        """S of the two free nodes beside a patch, shape (2, 2), in m/Pa.
+        """Compute S of the two free nodes beside a patch, shape (2, 2), in m/Pa.
 
         Parameters
         ----------
@@ -151,7 +151,7 @@ class EdgeCompliance:
         """
         key: tuple[int, ...]
         if before == 0 and after == 0:
-            # A single patch: either it or the only gap is taken exactly.
+            # A single patch: the shorter of it and the only gap is rounded.
             short = _rounded[min(width, self.n - width)]
             width = short if width <= self.n - width else self.n - short
             key = (0, width, self.n - width, 0, 0, 0)
@@ -176,7 +176,7 @@ class EdgeCompliance:
         return known
 
     def across_gap(self, near: int, gap: int, far: int) -> Array:
-        """S of the first and last free node of a gap between patches, shape (2, 2), in m/Pa.
+        """Compute S of the first and last free node of a gap, shape (2, 2), in m/Pa.
 
         Parameters
         ----------
@@ -198,7 +198,7 @@ class EdgeCompliance:
         return known
 
     def _compute(self, key: tuple[int, ...]) -> float:
-        """Schur complement of the node at 0; the patch lies at -1 and beyond."""
+        """Compute the Schur complement of the node at 0; the patch starts at -1."""
         if len(key) == 1:
             return float(self._schur([(0, -1, _fine_both(key[0]))], (0,))[0, 0])
         width, gap, next_width, other_gap, other_width = key
@@ -219,13 +219,13 @@ class EdgeCompliance:
     def _schur(
         self, patches: list[tuple[int, int, tuple[int, ...]]], nodes: tuple[int, ...]
     ) -> Array:
-        """S of one or two free nodes beside patches (start, direction, block ends)."""
+        """Compute S of one or two free nodes beside patches (start, direction, block ends)."""
         low: list[int] = []
         high: list[int] = []
         for start, sign, ends in patches:
-            places = sorted(start + sign * offset for offset in ends)
-            low += places[:-1]
-            high += places[1:]
+            nodes_between = sorted(start + sign * offset for offset in ends)
+            low += nodes_between[:-1]
+            high += nodes_between[1:]
         j = np.array(nodes)
         s = self._block(j[:, None], j[:, None] + 1, j[None, :], j[None, :] + 1)
         if not low:
@@ -245,6 +245,6 @@ class EdgeCompliance:
         return s
 
     def _block(self, a: Array, b: Array, c: Array, d: Array) -> Array:
-        """Sum of V over the nodes a … b-1 and c … d-1."""
+        """Compute the sum of V over the nodes a … b-1 and c … d-1."""
         f = self._f
         return np.asarray(f[np.abs(b - c)] - f[np.abs(a - c)] - f[np.abs(b - d)] + f[np.abs(a - d)])

@@ -5,8 +5,8 @@ With the contact set Ω given, the stress solves V_ΩΩ σ = (h - s)_Ω. V is po
 preconditioner: with it the number of iterations grows only like log n (see e.g. Rey, Anciaux &
 Molinari, Comput. Mech. 60 (2017) for FFT contact solvers). Two pairs of transforms an iteration.
 
-Where the separation is not fixed (``control``) a second solution, V_ΩΩ σ₁ =
-1, tells how the stress follows it: σ = σ₀ - (s - s₀) σ₁, and s from what is prescribed.
+If the separation is not fixed (``control``), a second solution, V_ΩΩ σ₁ =
+1, gives the change of the stress with s: σ = σ₀ - (s - s₀) σ₁, with s from the prescribed value.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.grid.kernels import advance, dot, turn
+from adhesis.solver.grid.kernels import advance, dot, update_direction
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.profile import Array
@@ -28,27 +28,27 @@ EDGE_COMPLIANCE = 1.7286
 """S E*/dx at the edge of a long isolated patch (numerical)."""
 
 _MAX_ITERATIONS = 500
-_NOTHING = 1e-9  # of the residual wanted: below it there is nothing left to solve
-# Error of the energy that a unit of tolerance allows, in closing energies.
+_NEGLIGIBLE = 1e-9  # of the wanted residual: below it is rounding
+# Error of the energy allowed per unit of tolerance, in closing energies.
 _ENERGY_TOLERANCE = 0.05
 
 
 @dataclass
-class Yield:
-    """How a contact gives way where its separation is not fixed.
+class SeparationResponse:
+    """Change of a contact per unit of separation, for controls that do not fix the separation.
 
     Attributes
     ----------
     stress, displacement : array, shape (n,)
-        σ₁ in Pa/m and Vσ₁: what a unit of separation takes from the stress.
+        σ₁ in Pa/m and Vσ₁, by which stress and displacement fall per unit of separation.
     """
 
     stress: Array
     displacement: Array
 
-    def copy(self) -> Yield:
+    def copy(self) -> SeparationResponse:
         """Return a copy that shares no array with this one."""
-        return Yield(self.stress.copy(), self.displacement.copy())
+        return SeparationResponse(self.stress.copy(), self.displacement.copy())
 
 
 @dataclass
@@ -60,7 +60,7 @@ class Contact:
     separation : float
         s in m.
     prescribed : float
-        What the control prescribes, x of ``control``.
+        x of ``control``.
     mask : bool array, shape (n,)
         The contact nodes Ω.
     stress : array, shape (n,)
@@ -70,10 +70,10 @@ class Contact:
     residual : float
         max |h - s - v| over Ω, in m.
     elastic_energy : float
-        In J/m, from below; its error is of second order in the residual.
+        In J/m, a lower bound; its error is of second order in the residual.
     energy_error : float
-        Estimate from above of that error, in J/m.
-    yields : Yield or None
+        Upper estimate of that error, in J/m.
+    response : SeparationResponse or None
         None at fixed separation.
     """
 
@@ -85,7 +85,7 @@ class Contact:
     residual: float = 0.0
     elastic_energy: float = 0.0
     energy_error: float = 0.0
-    yields: Yield | None = None
+    response: SeparationResponse | None = None
 
     def copy(self) -> Contact:
         """Return a copy that shares no array with this one."""
@@ -98,11 +98,11 @@ class Contact:
             self.residual,
             self.elastic_energy,
             self.energy_error,
-            self.yields.copy() if self.yields is not None else None,
+            self.response.copy() if self.response is not None else None,
         )
 
     def at(self, prescribed: float, control: Control) -> Contact:
-        """Return a copy, yet to be solved, where x is ``prescribed``."""
+        """Return an unsolved copy at x = ``prescribed``."""
         moved = self.copy()
         moved.prescribed = prescribed
         if control.is_fixed:
@@ -119,7 +119,7 @@ class ContactSolver:
     height : array, shape (n,)
         h in m.
     closing_gap : float
-        Gap in m that adhesion just closes beside an edge: the unit of residuals.
+        Largest gap in m that adhesion closes beside an edge: the unit of residuals.
     control : Control
 
     Attributes
@@ -141,30 +141,30 @@ class ContactSolver:
         self.iterations = 0
 
     def empty(self, separation: float) -> Contact:
-        """Contact state without contact nodes."""
+        """Return a contact without contact nodes."""
         n = self.elastic.n
         prescribed = self.control.prescribed(separation, 0.0)
-        nothing = np.zeros(n)
-        contact = Contact(separation, prescribed, np.zeros(n, dtype=bool), nothing, np.zeros(n))
+        mask = np.zeros(n, dtype=bool)
+        contact = Contact(separation, prescribed, mask, np.zeros(n), np.zeros(n))
         if not self.control.is_fixed:
-            contact.yields = Yield(np.zeros(n), np.zeros(n))
+            contact.response = SeparationResponse(np.zeros(n), np.zeros(n))
         return contact
 
     def solve(self, contact: Contact, tolerance: float) -> None:
-        """Bring stress, displacement and energy of ``contact`` to its contact set, in place.
+        """Solve stress, displacement and energy of ``contact`` for its contact set, in place.
 
-        Starts from the stress that is there, restricted to Ω.
+        The initial guess is the present stress, restricted to Ω.
 
         Parameters
         ----------
         contact : Contact
         tolerance : float
-            Largest residual displacement on Ω, in units of the closing gap.
+            Largest residual displacement on Ω, in closing gaps.
 
         Raises
         ------
         PathError
-            If there is no free node, or the iteration stalls above the tolerance.
+            If there is no free node, or the iteration does not converge.
         """
         self.solves += 1
         most = tolerance * self.closing_gap
@@ -177,35 +177,38 @@ class ContactSolver:
         )
         contact.displacement = displacement
         contact.energy_error = gain if np.isfinite(gain) else 0.0
-        if contact.yields is not None:
-            self._give_way(contact, contact.yields, inside, most)
+        if contact.response is not None:
+            self._adjust_separation(contact, contact.response, inside, most)
             target = self.height - contact.separation
             displacement = contact.displacement
-        # max over σ of ∫σ(h - s) - ½∫σv is the elastic energy: errors enter quadratically.
+        # The elastic energy is the maximum over σ of ∫σ(h - s) - ½∫σv: errors enter quadratically.
         contact.elastic_energy = self.elastic.dx * (
             dot(stress, target) - 0.5 * dot(stress, displacement)
         )
 
-    def _give_way(self, contact: Contact, gives: Yield, inside: Array, most: float) -> None:
-        """Bring a solved contact to the separation that belongs to what is prescribed, in place."""
+    def _adjust_separation(
+        self, contact: Contact, response: SeparationResponse, inside: Array, most: float
+    ) -> None:
+        """Move a solved contact to the separation that the prescribed value implies, in place."""
         scale = float(np.abs(self.height).max())
-        gives.displacement, residual, _ = self._solve(
-            inside, gives.stress, gives.displacement, np.ones_like(inside), most / scale, np.inf
+        unit = np.ones_like(inside)
+        response.displacement, residual, _ = self._solve(
+            inside, response.stress, response.displacement, unit, most / scale, np.inf
         )
-        mean, per_separation = float(contact.stress.mean()), float(gives.stress.mean())
+        mean, per_separation = float(contact.stress.mean()), float(response.stress.mean())
         control = self.control
         if control.is_load:
             if per_separation == 0:
-                return  # no contact carries nothing
-            way = (mean + contact.prescribed) / per_separation
+                return  # without contact the load is not carried at any separation
+            change = (mean + contact.prescribed) / per_separation
         else:
             compliance = 1 / control.stiffness
             rest = contact.prescribed - contact.separation + mean * compliance
-            way = rest / (1 + per_separation * compliance)
-        contact.stress -= way * gives.stress
-        contact.displacement = contact.displacement - way * gives.displacement
-        contact.separation += way
-        contact.residual += abs(way) * residual
+            change = rest / (1 + per_separation * compliance)
+        contact.stress -= change * response.stress
+        contact.displacement = contact.displacement - change * response.displacement
+        contact.separation += change
+        contact.residual += abs(change) * residual
 
     def _solve(
         self,
@@ -216,11 +219,10 @@ class ContactSolver:
         most: float,
         energy_tolerance: float,
     ) -> tuple[Array, float, float]:
-        """Bring ``stress``, in place, to where its displacement is the target on Ω.
+        """Solve in place for the ``stress`` whose displacement on Ω is the target.
 
-        ``displacement`` is that of the stress as it is, and left as it is.
-
-        Returns the displacement, the largest residual, and what the last iteration gained, in J/m.
+        ``displacement`` is that of the initial stress and is not changed. Returns the displacement,
+        the largest residual in m, and the energy gained by the last iteration in J/m.
         """
         elastic = self.elastic
         kept = stress * inside
@@ -235,11 +237,12 @@ class ContactSolver:
         gain = np.inf
         largest = float(np.abs(residual).max())
         for _ in range(_MAX_ITERATIONS):
-            if (largest <= most and gain <= energy_tolerance) or largest <= _NOTHING * most:
+            if (largest <= most and gain <= energy_tolerance) or largest <= _NEGLIGIBLE * most:
                 break
             correction = elastic.precondition(residual)
             rz = dot(residual, correction)
-            turn(direction, inside, correction, rz / rz_before if rz_before else 0.0)
+            factor = rz / rz_before if rz_before else 0.0
+            update_direction(direction, inside, correction, factor)
             response = elastic.displacement(direction)
             curvature = dot(direction, response)
             if curvature <= 0:
@@ -249,9 +252,9 @@ class ContactSolver:
                 )
             step = rz / curvature
             largest = advance(stress, displacement, residual, direction, response, inside, step)
-            # Twice what one iteration adds to the energy bounds what all later ones will: gains
-            # fall faster than by two thirds. A residual alone says little beside full contact,
-            # where V hardly resists a uniform one.
+            # Twice the energy gained by one iteration bounds the sum of all later gains, which
+            # fall faster than by two thirds each. The residual alone is a poor measure near full
+            # contact, where V is nearly singular for a uniform one.
             gain = elastic.dx * step * rz
             rz_before = rz
             self.iterations += 1

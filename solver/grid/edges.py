@@ -1,4 +1,4 @@
-"""Edges of a contact set, and what moving each of them by one node would cost."""
+"""Edges of a contact set, and the energy of moving each of them by one node."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Indices = NDArray[np.intp]
 
 
 def patch_ranges(mask: Mask) -> tuple[Indices, Indices]:
-    """First nodes and numbers of nodes of the patches of a contact set, shape (patches,) each.
+    """Find first node and number of nodes of every patch of a contact set, shape (patches,) each.
 
-    Sorted by the first node; a patch may reach round the period. A contact set without a free node
-    is one patch that starts at node 0.
+    Sorted by the first node; a patch may extend across the end of the period. A contact set without
+    a free node is one patch that starts at node 0.
     """
     ends = np.flatnonzero(mask[1:] != mask[:-1])
     ends += 1
-    if mask[0] and mask[-1]:  # the last patch reaches round the period
+    if mask[0] and mask[-1]:  # the last patch extends across the end of the period
         if ends.size == 0:
             return np.zeros(1, dtype=np.intp), np.array([mask.size])
         ends = np.concatenate((ends[1:], ends[:1] + mask.size))
@@ -47,9 +47,9 @@ class Edges:
     width, gap : int array
         Nodes of the patch, and free nodes beyond the edge.
     growth, recession : array
-        Energy in J/m of adding ``outer``, of removing ``inner``; infinite where that is ruled out.
+        Energy in J/m of adding ``outer``, of removing ``inner``; infinite if not allowed.
     overlap : bool array
-        Whether ``outer`` overlaps the rigid profile: it joins whatever it costs.
+        True if ``outer`` overlaps the rigid profile: it then joins whatever the energy.
     """
 
     side: Indices
@@ -63,7 +63,7 @@ class Edges:
 
 
 def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
-    """Price every edge of a contact set.
+    """Compute the energy of moving every edge of a contact set.
 
     Parameters
     ----------
@@ -109,10 +109,10 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
             recede[edge] = compliance(w[k] - 1, near_gap + 1, others)
     s_grow, s_recede = np.array(grow), np.array(recede)
 
-    if contact.yields is not None:
-        give, opening = lattice.extra_compliance(contact, outer)
-        s_grow += give * opening**2
-        s_recede += give * opening**2  # a node that leaves has the opening of the one beside it
+    if contact.response is not None:
+        factor, opening = lattice.extra_compliance(contact, outer)
+        s_grow += factor * opening**2
+        s_recede += factor * opening**2  # with the opening of the free node next to the one removed
     t = contact.displacement[outer] - lattice.height[outer] + contact.separation
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < overlap_below

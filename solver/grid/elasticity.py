@@ -1,8 +1,8 @@
-"""The elastic half-space on a periodic grid: displacement, stress and energy.
+"""Elastic half-space on a periodic grid: displacement and stress.
 
 A stress of wave number q ≠ 0 displaces the surface by v_q = 2 σ_q/(E*|q|) (plane strain; Johnson,
-Contact Mechanics, section 13.2). The mean stress moves the half-space as a whole, which the
-separation accounts for: v has zero mean, and the operator's symbol at q = 0 is zero.
+Contact Mechanics, section 13.2). The uniform displacement is part of the separation: v has zero
+mean, and the operator's symbol at q = 0 is zero.
 """
 
 from __future__ import annotations
@@ -41,27 +41,27 @@ class ElasticGrid:
         stiffness = 0.5 * modulus * q / n
         compliance = np.zeros_like(q)
         compliance[1:] = 2 / (modulus * q[1:]) / n
-        # The opposite-order operator is singular at q = 0, a preconditioner must not be: the mean
-        # over the contact is given the stiffness of the longest wave.
+        # The opposite-order operator is singular at q = 0, which a preconditioner must not be: the
+        # mean gets the stiffness of the longest wave.
         preconditioner = stiffness.copy()
         preconditioner[0] = stiffness[1]
         self._stiffness, self._compliance = symbol(stiffness), symbol(compliance)
         self._preconditioner = symbol(preconditioner)
 
     def displacement(self, stress: Array) -> Array:
-        """Displacement v in m (zero mean) of a stress in Pa; a buffer, see ``multiply``."""
+        """Compute v in m (zero mean) of a stress in Pa, in the buffer of ``multiply``."""
         return self._fourier.multiply(self._compliance, stress)
 
     def stress(self, displacement: Array) -> Array:
-        """Stress in Pa (zero mean) that displaces the surface by v in m; a buffer."""
+        """Compute the stress in Pa (zero mean) of a displacement v in m, in the same buffer."""
         return self._fourier.multiply(self._stiffness, displacement)
 
     def precondition(self, residual: Array) -> Array:
-        """Stress in Pa that roughly closes a residual displacement in m; a buffer."""
+        """Compute an approximate stress in Pa for a residual in m, in the same buffer."""
         return self._fourier.multiply(self._preconditioner, residual)
 
     def kernel(self) -> Array:
-        """First column of V, shape (n,), in m/Pa: displacement by 1 Pa on node 0."""
+        """Compute the first column of V, shape (n,), in m/Pa: displacement by 1 Pa on node 0."""
         unit = np.zeros(self.n)
         unit[0] = 1.0
         return self.displacement(unit).copy()

@@ -1,7 +1,7 @@
-"""Real Fourier transforms whose bits depend on the input alone.
+"""Real Fourier transforms with bit-wise reproducible results.
 
-FFTW plans that are measured differ from run to run, and so do the last bits of their results; a
-contact at the edge of its stability can tell them apart. Hence estimated plans and one thread.
+Measured FFTW plans differ from run to run, and so do the last bits of their results, which can
+change the path of a contact close to instability. Hence estimated plans and one thread.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from adhesis.solver.model.profile import Array
 
 
 def symbol(eigenvalues: Array) -> Array:
-    """Real eigenvalues of a circulant operator, shape (n // 2 + 1,), as ``multiply`` takes them.
+    """Repeat real eigenvalues of a circulant operator, shape (n // 2 + 1,), for ``multiply``.
 
-    Each stands twice, shape (n + 2,), for the real and the imaginary part: numpy would make complex
-    numbers of real ones before every product of the two.
+    The result, shape (n + 2,), has each twice, for the real and the imaginary part, as numpy would
+    convert real factors to complex ones in every product.
     """
     return np.repeat(eigenvalues, 2)
 
 
 class RealFourier:
-    """Pair of real transforms of n values on buffers of its own.
+    """Pair of real transforms of n values with their own buffers.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class RealFourier:
         Returns
         -------
         array, shape (n,)
-            The buffer ``values``: it holds until the next transform.
+            The buffer ``values``, valid until the next transform.
         """
         self.values[:] = field
         self._forward.execute()

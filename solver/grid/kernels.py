@@ -14,7 +14,7 @@ from adhesis.solver.runtime.jit import compiled, compiled_finite_sums
 
 @compiled_finite_sums
 def dot(a: Array, b: Array) -> float:
-    """Sum of a_i b_i."""
+    """Return the sum of a_i b_i."""
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]
@@ -22,8 +22,8 @@ def dot(a: Array, b: Array) -> float:
 
 
 @compiled_finite_sums
-def turn(direction: Array, inside: Array, correction: Array, factor: float) -> None:
-    """Next search direction: the correction on Ω plus ``factor`` times the last direction."""
+def update_direction(direction: Array, inside: Array, correction: Array, factor: float) -> None:
+    """Set the next search direction: the correction on Ω plus ``factor`` times the last one."""
     for i in range(direction.size):
         direction[i] = inside[i] * correction[i] + factor * direction[i]
 
@@ -38,7 +38,7 @@ def advance(
     inside: Array,
     step: float,
 ) -> float:
-    """Go ``step`` along the direction; return the largest absolute residual on Ω."""
+    """Take ``step`` along the direction; return the largest absolute residual on Ω."""
     largest = 0.0
     for i in range(stress.size):
         stress[i] += step * direction[i]
@@ -50,7 +50,7 @@ def advance(
 
 @compiled
 def inverse_form(matrix: Array, vector: Array) -> float:
-    """bᵀ A⁻¹ b of a symmetric positive definite A by Cholesky; A's lower half is destroyed."""
+    """Return bᵀA⁻¹b for a symmetric positive definite A (Cholesky); overwrites its lower half."""
     n = vector.size
     total = 0.0
     y = np.empty(n)

@@ -1,4 +1,4 @@
-"""The grid of one problem: its nodes, its half-space, and what adhesion and edges cost there."""
+"""Grid of one problem: nodes, half-space, work of adhesion and edge compliance."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from adhesis.solver.model.profile import Array
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """What n equally spaced nodes know of a problem; arrays have the shape (n,).
+    """A problem discretised on n equally spaced nodes; arrays have the shape (n,).
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Lattice:
 
     @classmethod
     def of(cls, problem: Problem, n: int) -> Lattice:
-        """Lattice of ``n`` nodes in one period of the problem's profile."""
+        """Make the lattice of ``n`` nodes in one period of the problem's profile."""
         profile = problem.profile
         elastic = ElasticGrid(n, profile.period, problem.half_space.modulus)
         return cls(
@@ -68,43 +68,43 @@ class Lattice:
         return self.elastic.dx
 
     def closing_gap(self, work_of_adhesion: float, curvature: float) -> float:
-        """Gap in m that adhesion just closes beside an edge: the unit of tolerances on lengths.
+        """Compute the largest gap in m that adhesion closes beside an edge, the unit of tolerances.
 
-        Without adhesion it is what the curvature (1/m) makes of half a node.
+        It is at least dx²/8 times the curvature (1/m), the height within half a node of a crest.
         """
         modulus = self.elastic.modulus
         closing = float(np.sqrt(2 * work_of_adhesion * EDGE_COMPLIANCE * self.dx / modulus))
         return max(closing, 0.125 * self.dx**2 * curvature)
 
     def extra_compliance(self, contact: Contact, nodes: NDArray[np.intp]) -> tuple[float, Array]:
-        """What giving way adds to the compliance of nodes beside an edge, c g gᵀ; 0 at fixed s.
+        """Compute c and g of the compliance c g gᵀ that a free separation adds; c = 0 at fixed s.
 
-        g = ∂t/∂s with the contact set held, by reciprocity also the share of a node's pull that
-        reaches the mean stress; c = dx/(λ (k - ∂p̄/∂s)).
+        g = ∂t/∂s of nodes beside an edge with the contact set fixed, by reciprocity also the share
+        of a force on the node that changes the mean stress; c = dx/(λ (k - ∂p̄/∂s)).
         """
-        if contact.yields is None or not contact.mask.any():
+        if contact.response is None or not contact.mask.any():
             return 0.0, np.zeros(nodes.size)
-        k, held = self.control.stiffness, float(contact.yields.stress.mean())
-        opening = 1 - contact.yields.displacement[nodes]
-        return self.dx / (self.elastic.period * (k + held)), opening
+        k, per_separation = self.control.stiffness, float(contact.response.stress.mean())
+        opening = 1 - contact.response.displacement[nodes]
+        return self.dx / (self.elastic.period * (k + per_separation)), opening
 
     def conjugate(self, contact: Contact) -> float:
-        """Y of ``control``: p̄ in Pa, under a load s - h_max in m."""
+        """Compute Y of ``control``: p̄ in Pa, under a load s - h_max in m."""
         mean_stress = float(contact.stress.mean())
         return self.control.conjugate(contact.separation, mean_stress, self.h_max)
 
     def gap(self, contact: Contact) -> Array:
-        """Gap t = v - h + s in m at every node."""
+        """Compute the gap t = v - h + s in m at every node."""
         return contact.displacement - self.height + contact.separation
 
     def adhesion_energy(self, contact: Contact) -> float:
-        """-Σ γ sqrt(1 + h'²) dx over the contact nodes, in J/m."""
+        """Compute -Σ γ sqrt(1 + h'²) dx over the contact nodes, in J/m."""
         return -self.dx * float(np.sum(self.adhesion[contact.mask]))
 
     def energy(self, contact: Contact) -> float:
-        """W of ``control`` in J/m, per period: U at fixed separation.
+        """Compute W of ``control`` in J/m, per period: U at fixed separation.
 
-        Under a tension nothing is as low as no contact.
+        Under a tension W of a state without contact is -∞.
         """
         energy = contact.elastic_energy + self.adhesion_energy(contact)
         if self.control.is_fixed:

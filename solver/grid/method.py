@@ -1,7 +1,7 @@
 """Method ``grid``: contact sets of grid nodes, moved by energy comparison.
 
-Any profile, any contact geometry, no assumption but the grid: the reference for faster methods.
-What it does and how accurate it is: docs/methods.md.
+It takes any profile and contact geometry and is the reference for faster methods; algorithm and
+accuracy are described in docs/methods.md.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from adhesis.solver.observables import openings_between
 from adhesis.solver.runtime.threads import one_at_a_time
 
 _FEWEST_NODES_PER_WAVE = 8
-# The loss is of first order in dx. At 32 nodes per shortest wave it is good to 1e-3 on the rough
-# scenes of the benchmark; grids of more than 256 are left to those who ask for them.
+# The error of the loss is of first order in dx. With 32 nodes per shortest wave it is 1e-3 on the
+# rough profiles of the benchmark; more than 256 nodes must be requested explicitly.
 _FIRST_ORDER = 0.032
 _MOST_NODES_PER_WAVE = 256
-# A single wave at 32 nodes would be too coarse for its own edges.
+# A single wave with 32 nodes does not resolve its edges.
 _FEWEST_NODES = 1024
 
 
@@ -41,7 +41,7 @@ class GridReport(MethodReport):
         Per shortest wave.
     accuracy : float
     longest_step : int
-        Longest step of an edge in one sweep, in nodes.
+        Largest displacement of an edge in one sweep, in nodes.
     sweeps, rejected_sweeps, flips, solves, cg_iterations, substeps, bisections : int
     """
 
@@ -68,9 +68,9 @@ class GridMethod(Method):
         Wanted relative error of the loss: sets the tolerances of stresses, of the location of jumps
         and of the load steps, and the nodes unless they are given.
     nodes_per_wave : int, optional
-        Least number of nodes per shortest wave. Default: 0.032/accuracy (32 at 1e-3), at least 8
-        and at most 256, where the grid's own error is about 1e-4 and no longer that asked for. The
-        grid has the next power of two, and by default no fewer than 1024 nodes.
+        Least number of nodes per shortest wave. Default: 0.032/accuracy (32 at 1e-3), from 8 to
+        256; at 256 the discretisation error is about 1e-4, also for a smaller accuracy. The number
+        of nodes is rounded up to a power of two, by default at least 1024.
     nodes : int, optional
         Number of nodes, even, instead of the above.
     chosen : str, optional
@@ -84,8 +84,8 @@ class GridMethod(Method):
     """
 
     name: ClassVar[str] = "grid"
-    # Below, the loss is smaller than the errors of the two works whose difference it is; above
-    # 1e12, contact lasts to 1e6 h_max and nothing is left of the profile in the gap's opening.
+    # For smaller γ the loss is below the errors of the two works of which it is the difference;
+    # above 1e12 contact lasts to 1e6 h_max, where the gap no longer depends on the profile.
     resolved_adhesion: ClassVar[tuple[float, float]] = (1e-8, 1e12)
 
     def __init__(
@@ -120,10 +120,9 @@ class GridMethod(Method):
 
     @one_at_a_time
     def follow(self, state: ContactState, prescribed: float) -> Path:
-        """Follow the quasi-static path from ``state`` to where x is ``prescribed``.
+        """Follow the quasi-static path from ``state`` to x = ``prescribed``; see ``method.Method``.
 
-        See ``method.Method``. A state without contact stays without contact
-        down to s = h_max, where the surfaces touch.
+        A state without contact stays without contact down to s = h_max, where the surfaces touch.
         """
         control = self.problem.control
         branch: Branch = "unloading"
@@ -143,7 +142,7 @@ class GridMethod(Method):
 
     @one_at_a_time
     def fields(self, state: ContactState, n: int) -> Fields:
-        """Stress, displacement and gap of ``state`` on every (nodes/n)-th node.
+        """Compute stress, displacement and gap of ``state`` on every (nodes/n)-th node.
 
         Raises
         ------
@@ -166,18 +165,18 @@ class GridMethod(Method):
 
     @one_at_a_time
     def openings(self, state: ContactState) -> list[Opening]:
-        """Openings from the nodes' gaps, and from Griffith's balance at the edges."""
+        """Compute the openings from the gaps at nodes, and Griffith's criterion at the edges."""
         if not state.patches:
             return []
         profile, gamma = self.problem.profile, self.problem.work_of_adhesion
         slope = profile.at(state.edges, derivative=1)
-        tough = gamma * np.sqrt(1 + slope**2)
-        coefficient = 4 * np.sqrt(tough / (np.pi * self.problem.half_space.modulus))
+        toughness = gamma * np.sqrt(1 + slope**2)
+        coefficient = 4 * np.sqrt(toughness / (np.pi * self.problem.half_space.modulus))
         fields = self.fields(state, self.n)
         return openings_between(state.edges, fields, coefficient, profile.period)
 
     def report(self) -> GridReport:
-        """Resolution, tolerances and counters."""
+        """Return resolution, tolerances and counters."""
         return GridReport(
             name=self.name,
             chosen=self.chosen,
@@ -197,7 +196,7 @@ class GridMethod(Method):
     # ------------------------------------------------------------------ states
 
     def _contact(self, state: ContactState) -> Contact:
-        """Contact of a state of this method, solved from its contact set alone."""
+        """Solve the contact of a state of this method from its contact set alone."""
         contact = self.solver.empty(state.separation)
         contact.prescribed = self.problem.prescribed_in(state)
         if state.patches:
@@ -209,7 +208,7 @@ class GridMethod(Method):
 def _node_count(
     harmonic: int, accuracy: float, nodes_per_wave: int | None, nodes: int | None
 ) -> int:
-    """Number of nodes of the grid.
+    """Compute the number of nodes of the grid.
 
     Raises
     ------
@@ -225,8 +224,8 @@ def _node_count(
             )
         return int(nodes)
     if nodes_per_wave is None:
-        asked = min(max(_FIRST_ORDER / accuracy, _FEWEST_NODES_PER_WAVE), _MOST_NODES_PER_WAVE)
-        wanted = max(round(asked) * harmonic, _FEWEST_NODES)
+        per_wave = min(max(_FIRST_ORDER / accuracy, _FEWEST_NODES_PER_WAVE), _MOST_NODES_PER_WAVE)
+        wanted = max(round(per_wave) * harmonic, _FEWEST_NODES)
     elif nodes_per_wave != int(nodes_per_wave) or nodes_per_wave < _FEWEST_NODES_PER_WAVE:
         raise ValueError(
             f"nodes_per_wave is {nodes_per_wave!r}: it must be a whole number of at least "

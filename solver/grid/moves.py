@@ -1,4 +1,4 @@
-"""Moves of edges on a grid: which release energy, which go together, and how a set takes them."""
+"""Select the moves of edges on a grid that release energy, and apply them to the contact set."""
 
 from __future__ import annotations
 
@@ -11,21 +11,18 @@ from adhesis.solver.grid.edges import Edges
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.pairs import pairs
 
-# Moves whose energies differ by less than this share of the largest are equally urgent: mirror
-# images must move together, and rounding must not choose between them.
+# Moves whose energies differ by less than this share of the largest tie: mirror images must move
+# together, and rounding must not choose between them.
 _TIE = 1e-6
-# A move must release this share of γ' dx: below lies the error of S.
+# Least released energy of a move, as a share of γ' dx: smaller ones are within the error of S.
 _MARGIN = 1e-4
 
 Key = tuple[int, int, int]
-"""Name of a move of a contact set."""
+"""Identifies a move of a contact set."""
 
 
 class Motion(NamedTuple):
-    """What is remembered of an edge: direction and length of its last move, and what is carried.
-
-    ``carried`` is the part of a node that it was to move and has not yet.
-    """
+    """Direction and length of an edge's last move, and the fraction of a node carried over."""
 
     direction: int
     length: int
@@ -37,7 +34,7 @@ Memory = dict[tuple[int, int], Motion]
 
 
 class Move(NamedTuple):
-    """One edge's move: ``length`` nodes outwards (``direction`` +1) or inwards (-1), maybe none."""
+    """One edge's move by ``length`` nodes, or none, outwards (``direction`` +1) or inwards (-1)."""
 
     edge: int
     direction: int
@@ -48,7 +45,7 @@ class Move(NamedTuple):
 
 
 def least_release(lattice: Lattice) -> float:
-    """Energy in J/m that a move must release."""
+    """Compute the least energy in J/m that a move must release."""
     return _MARGIN * lattice.dx * float(lattice.adhesion.min())
 
 
@@ -61,12 +58,12 @@ def edge_moves(
     caution: int,
     equal_speeds: bool,
 ) -> list[Move]:
-    """Moves of single edges that release energy, thinned out by ``caution``.
+    """Select moves of single edges that release energy, fewer with more ``caution``.
 
     By linear kinetics edges move in proportion to the energy that their next node releases: the
-    leading one by its own step, which doubles while it keeps its direction, the others by their
-    share of that, and by whole nodes as it adds up. For comparison, with ``equal_speeds``, every
-    edge by a step of its own.
+    leading one by its own step, which doubles while it keeps its direction, the others by the
+    corresponding share, accumulated to whole nodes. For comparison, with ``equal_speeds``, every
+    edge moves by its own step.
     """
     margin = least_release(lattice)
     moves = []
@@ -80,8 +77,8 @@ def edge_moves(
         before = memory.get((side, inner))
         same = before is not None and before.direction == direction
         length = 2 * before.length if before is not None and same else 1
-        room = int(edges.gap[k] if outwards else edges.width[k])
-        length = max(1, min(length, longest, room // 3))
+        available = int(edges.gap[k] if outwards else edges.width[k])
+        length = max(1, min(length, longest, available // 3))
         release = -float(edges.growth[k] if outwards else edges.recession[k])
         carried = before.carried if before is not None and same else 0.0
         moves.append(Move(k, direction, length, release, key, carried))
@@ -91,35 +88,35 @@ def edge_moves(
         moves = [m._replace(length=1) for m in moves]
     if caution < 2:
         return moves if equal_speeds else _in_proportion(moves)
-    # 2, 3, …: the most unstable half, quarter, … by one node
+    # caution 2, 3, …: the half, quarter, … that releases most energy moves by one node
     keep = max(1, len(moves) >> (caution - 1))
     least = sorted(m.release for m in moves)[-keep] * (1 - _TIE)
-    urgent = [m for m in moves if m.release >= least]
+    largest = [m for m in moves if m.release >= least]
     if len(moves) >> (caution - 2) > 1:
-        return urgent
-    # Even the tied ones together did not pay: one of them, the first from the highest crest on.
-    return [min(urgent, key=lambda m: _place(edges, m.edge, lattice))]
+        return largest
+    # Even tied moves together raised the energy: only the first from the highest crest moves.
+    return [min(largest, key=lambda m: _position(edges, m.edge, lattice))]
 
 
 def _in_proportion(moves: list[Move]) -> list[Move]:
-    """Moves in proportion to the energy they release; the leading one keeps its length."""
+    """Scale the moves in proportion to their released energies; the leading one is kept."""
     fastest = max(m.release for m in moves)
     leading = min(m.length for m in moves if m.release >= fastest * (1 - _TIE))
     shared = []
     for m in moves:
-        way = m.carried + leading * m.release / fastest
-        # what ties in release ties in way
-        length = min(int(way + 10 * _TIE * leading), m.length)
-        shared.append(m._replace(length=length, carried=min(max(way - length, 0.0), 1.0)))
+        distance = m.carried + leading * m.release / fastest
+        # moves that tie in released energy must get equal lengths
+        length = min(int(distance + 10 * _TIE * leading), m.length)
+        shared.append(m._replace(length=length, carried=min(max(distance - length, 0.0), 1.0)))
     return shared
 
 
 def pair_moves(
-    contact: Contact, edges: Edges, lattice: Lattice, blocked: set[Key], alone: bool
+    contact: Contact, edges: Edges, lattice: Lattice, blocked: set[Key], one_pair: bool
 ) -> list[Move]:
-    """Moves of the pair of edges that releases most, and of those that tie with it.
+    """Select the moves of the pair of edges that releases most, and of those that tie with it.
 
-    With ``alone`` one of them only, the first from the highest crest on.
+    With ``one_pair`` only the first of them from the highest crest.
     """
     margin = least_release(lattice)
     found = pairs(contact, edges, lattice)
@@ -128,18 +125,18 @@ def pair_moves(
         return []
     most = max(p.release for p in found)
     tied = [p for p in found if p.release >= most * (1 - _TIE)]
-    if alone:
-        tied = [min(tied, key=lambda p: _place(edges, p.edges[0], lattice))]
+    if one_pair:
+        tied = [min(tied, key=lambda p: _position(edges, p.edges[0], lattice))]
     return [Move(edge, p.direction, 1, p.release, p.key(edges)) for p in tied for edge in p.edges]
 
 
-def _place(edges: Edges, edge: int, lattice: Lattice) -> int:
-    """Nodes from the highest crest to an edge, to the right."""
+def _position(edges: Edges, edge: int, lattice: Lattice) -> int:
+    """Count the nodes from the highest crest to an edge, to the right."""
     return (int(edges.inner[edge]) - lattice.origin) % lattice.n
 
 
 def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[Memory, int]:
-    """Move the edges; return each one's motion under its new place, and the flips."""
+    """Move the edges; return the motion by edge at its new node, and the number of flips."""
     mask, stress = contact.mask, contact.stress
     n = mask.size
     memory: Memory = {}
@@ -156,8 +153,8 @@ def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[Memo
             # A node under compression is never removed.
             length = int(np.argmin(np.append(stress[nodes] < 0, False)))
             mask[nodes[:length]] = False
-        place = (inner + move.direction * side * length) % n
-        memory[(side, place)] = Motion(move.direction, length, move.carried)
+        moved = (inner + move.direction * side * length) % n
+        memory[(side, moved)] = Motion(move.direction, length, move.carried)
         flips += length
     # The last free node never joins.
     if mask.all():
@@ -167,10 +164,7 @@ def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[Memo
 
 
 def join_overlaps(contact: Contact, edges: Edges, lattice: Lattice, longest: int) -> int:
-    """Add the overlapping nodes beside the patches, up to the longest step from each edge.
-
-    Returns how many.
-    """
+    """Add overlapping nodes beside the patches, up to the longest step; return their number."""
     gap = lattice.gap(contact)
     flips = 0
     for k in np.flatnonzero(edges.overlap).tolist():

@@ -1,8 +1,8 @@
-"""Pairs of edges that move together: the softest motions of a contact set.
+"""Pairs of edges that move together: the least stable motions of a contact set.
 
-Where a patch is about to shrink or a gap about to close, its two edges go together; one of them
-alone is held back by the other, and moving single nodes would come late by a fraction of a node.
-The two nodes' compliance is the 2 × 2 matrix S = V_JJ - V_JΩ (V_ΩΩ)⁻¹ V_ΩJ, Ω without the pair J:
+Where a patch is about to vanish or a gap to close, its two edges move together; each one alone is
+stabilised by the other, and single moves would follow with a delay of a fraction of a node. The
+compliance of the two nodes is the 2 × 2 matrix S = V_JJ - V_JΩ (V_ΩΩ)⁻¹ V_ΩJ, Ω without the pair J:
 adding the pair costs ½ dx tᵀ S⁻¹ t, removing it releases ½ dx σᵀ S σ.
 """
 
@@ -15,7 +15,7 @@ from adhesis.solver.grid.edges import Edges, Indices
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.model.profile import Array
 
-# More than |S_12|/S_11 of any pair (0.3 across a patch of three nodes).
+# Upper bound of |S_12|/S_11 of any pair (0.3 across a patch of three nodes).
 COUPLING = 0.6
 
 
@@ -31,7 +31,7 @@ class Pair:
     release: float
 
     def key(self, edges: Edges) -> tuple[int, int, int]:
-        """Name of this move of this contact set."""
+        """Return the identifier of this move."""
         one, two = self.edges
         return int(edges.inner[one]), int(edges.inner[two]), self.direction
 
@@ -39,29 +39,29 @@ class Pair:
 def pairs(
     contact: Contact, edges: Edges, lattice: Lattice, coupling: float = COUPLING
 ) -> list[Pair]:
-    """Price the pairs of edges of every patch and of every gap of a contact set (J/m).
+    """Compute the energies released by the pairs of edges of every patch and gap (J/m).
 
-    Only those are priced that could pay if S coupled their edges by ``coupling``.
+    Pairs that cannot release energy, even with a relative ``coupling`` in S, are skipped.
     """
     count = edges.side.size // 2
     dx, adhesion, compliance = lattice.dx, lattice.adhesion, lattice.compliance
     width, left, right = edges.width[:count], edges.gap[:count], edges.gap[count:]
     t = contact.displacement[edges.outer] - lattice.height[edges.outer] + contact.separation
     pull = contact.stress[edges.inner]
-    give, opening = lattice.extra_compliance(contact, edges.outer)
+    factor, opening = lattice.extra_compliance(contact, edges.outer)
     found: list[Pair] = []
 
-    def near(one: int, two: int, cost: Array, nodes: Indices) -> bool:
-        """Whether the pair can pay at all: S couples its edges by less than half."""
+    def may_release(one: int, two: int, cost: Array, nodes: Indices) -> bool:
+        """Return False if the pair cannot release energy with a coupling up to ``coupling``."""
         adhesive = adhesion[nodes[one]] + adhesion[nodes[two]]
         return bool(cost[one] + cost[two] < coupling * dx * adhesive)
 
-    def price(one: int, two: int, direction: int, s: Array) -> None:
+    def add(one: int, two: int, direction: int, s: Array) -> None:
         nodes = edges.outer if direction > 0 else edges.inner
         adhesive = float(adhesion[nodes[one]] + adhesion[nodes[two]])
         g1, g2 = float(opening[one]), float(opening[two])
-        s11, s22 = float(s[0, 0]) + give * g1 * g1, float(s[1, 1]) + give * g2 * g2
-        s12 = float(s[0, 1]) + give * g1 * g2
+        s11, s22 = float(s[0, 0]) + factor * g1 * g1, float(s[1, 1]) + factor * g2 * g2
+        s12 = float(s[0, 1]) + factor * g1 * g2
         if direction > 0:
             a, b = float(t[one]), float(t[two])
             form = (s22 * a * a - 2 * s12 * a * b + s11 * b * b) / (s11 * s22 - s12 * s12)
@@ -80,19 +80,19 @@ def pairs(
             after = before = 0
         elif count == 2:
             before, after = before // 2, after - after // 2
-        # The patch's own edges.
+        # The edges of the patch.
         one, two = k, count + k
         if w >= 3 and (count > 1 or a >= 4):
-            if near(one, two, edges.growth, edges.outer):
-                price(one, two, 1, compliance.across_patch(w, a, b, before, after))
-            if near(one, two, edges.recession, edges.inner):
-                price(one, two, -1, compliance.across_patch(w - 2, a + 1, b + 1, before, after))
+            if may_release(one, two, edges.growth, edges.outer):
+                add(one, two, 1, compliance.across_patch(w, a, b, before, after))
+            if may_release(one, two, edges.recession, edges.inner):
+                add(one, two, -1, compliance.across_patch(w - 2, a + 1, b + 1, before, after))
         # The edges of the gap on its right.
         one, two = count + k, following
         far = int(width[following])
         if count > 1 and b >= 3 and w > 1 and far > 1:
-            if near(one, two, edges.growth, edges.outer):
-                price(one, two, 1, compliance.across_gap(w, b, far))
-            if near(one, two, edges.recession, edges.inner):
-                price(one, two, -1, compliance.across_gap(w - 1, b + 2, far - 1))
+            if may_release(one, two, edges.growth, edges.outer):
+                add(one, two, 1, compliance.across_gap(w, b, far))
+            if may_release(one, two, edges.recession, edges.inner):
+                add(one, two, -1, compliance.across_gap(w - 1, b + 2, far - 1))
     return found

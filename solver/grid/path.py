@@ -1,4 +1,4 @@
-"""The path of the method ``grid`` between two separations, with location of the jumps."""
+"""Follow the path of the method ``grid`` between two separations and locate its jumps."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 
-# The relative error of a loss, times the nodes in the first equilibrium width on a crest of rms
-# curvature: above it lay one in a hundred of rough loops (docs/methods.md).
+# Relative error of a loss times the number of nodes in the first equilibrium width on a crest of
+# rms curvature: larger in one of a hundred rough loops (docs/methods.md).
 _COARSE = 0.6
-_OVERLAP = 1e-6  # of h_max: surfaces that overlap by less touch
-_NEAREST = 1e-8  # of the range: a touch is located no more finely
+_OVERLAP = 1e-6  # of h_max: a smaller overlap counts as touch
+_NEAREST = 1e-8  # of the range: resolution of the location of first touch
 _APART = 0.1  # shortest waves between edges of different minima
 _FEWEST_APART = 2  # nodes
 
 
 @dataclass
 class Counters:
-    """What the path cost: sub-steps taken, and those that were halved."""
+    """Numbers of accepted and of shortened sub-steps."""
 
     substeps: int = 0
     bisections: int = 0
 
 
 def first_width(problem: Problem) -> float:
-    """Width in m at which a patch on a crest of rms curvature κ first comes to rest.
+    """Compute the first equilibrium width in m of a patch on a crest of rms curvature κ.
 
     (16 Γ/(π κ²))^(1/3) in units of 1/q0, Γ = 2γq0/E* (docs/methods.md, "Resolution").
     """
@@ -43,12 +43,12 @@ def first_width(problem: Problem) -> float:
 class Steps:
     """Sub-steps of one call of ``follow``, with location of the jumps.
 
-    Between two separations Δs apart the energy of the frozen edges less that of the relaxed ones is
-    D. With p̄ the mean stresses, edges that move smoothly give D = ½ λ|Δs||p̄_frozen - p̄_relaxed|,
-    so the excess X = D - that is of third order in Δs: a measure of the error of the trapezoidal
-    rule, and of the audit. If even D - λ|Δs||p̄_frozen - p̄_relaxed| > 0, the new contact set has
-    less energy than the old one already at the old separation: the path has left its local minimum
-    there or in between, which is a jump.
+    Let D be the energy with fixed edges less that with relaxed edges after a step Δs, and p̄ the
+    mean stresses. Edges that move smoothly give D = ½ λ|Δs||p̄_fixed - p̄_relaxed|; the difference
+    of the two sides is of third order in Δs and measures the error of the trapezoidal rule and of
+    the audit. If even D - λ|Δs||p̄_fixed - p̄_relaxed| > 0, the new contact set has less energy than
+    the old one already at the old separation: the local minimum became unstable in this step, which
+    is a jump.
     """
 
     def __init__(
@@ -68,14 +68,14 @@ class Steps:
         self.states: list[ContactState] = []
         self.jumps: list[Jump] = []
         self.error = 0.0
-        self.share = 0.5  # of a step that must be shortened
-        self.last: tuple[Contact, Contact] | None = None  # where a step began, and its frozen end
-        self.reached = np.nan  # what was prescribed in the last state
+        self.share = 0.5  # factor by which a rejected step is shortened
+        self.last: tuple[Contact, Contact] | None = None  # start and fixed-edge end of a step
+        self.reached = np.nan  # prescribed value of the last state
         self.energy = self.lattice.energy
         self.period = problem.profile.period
         self.problem = problem
         control, h_max = problem.control, problem.profile.h_max
-        # Range of what is prescribed.
+        # Range of the prescribed value.
         self.scale = h_max if control.is_fixed else problem.stress_scale
         if not (control.is_fixed or control.is_load):
             self.scale = h_max + problem.stress_scale / control.stiffness
@@ -86,12 +86,13 @@ class Steps:
             if self.adhesion_scale
             else 0.0
         )
-        # Edges that went further, or end further apart, in nodes, ran, or belong to other minima.
+        # Number of nodes beyond which the displacement of an edge is a run, and that between edges
+        # of two states makes them different minima.
         wave = self.profile.shortest_wavelength / self.lattice.dx
         self.apart = max(_FEWEST_APART, _APART * wave)
 
     def first_touch(self, separation: float) -> Contact:
-        """Contact at the separation at which the highest crests touch."""
+        """Return the contact at the separation at which the highest crests touch."""
         contact = self.solver.empty(separation)
         before = state_of(self.lattice, contact)
         self.states.append(before)
@@ -108,16 +109,16 @@ class Steps:
         return contact
 
     def run(self, contact: Contact, prescribed: float) -> None:
-        """Go from a relaxed contact to x = ``prescribed``, appending states and jumps.
+        """Follow the path from a relaxed contact to x = ``prescribed``, appending states and jumps.
 
         Raises
         ------
         PathError
-            If the contact runs into full contact, as it may where the separation is not fixed.
+            If the contact runs into full contact, which is possible if the separation is not fixed.
         """
         control = self.lattice.control
         step = prescribed - contact.prescribed
-        # Below this stride a jump is run to its end: only then is it known how well it is located.
+        # In shorter steps a jump is relaxed to its end, which shows how precisely it is located.
         self.least = self.accuracy * self.scale
         while contact.prescribed != prescribed:
             remaining = prescribed - contact.prescribed
@@ -147,9 +148,9 @@ class Steps:
     def _substep(
         self, contact: Contact, target: float, divisible: bool
     ) -> tuple[Contact | None, bool]:
-        """One step to ``target``: the relaxed contact, and whether it jumped.
+        """Take one step to ``target``; returns the relaxed contact, and whether it jumped.
 
-        No contact: the step must be halved. A jump's two states are appended here.
+        The contact is None if the step must be shortened. The two states of a jump are appended.
         """
         accuracy, relaxation = self.accuracy, self.relaxation
         self.share = 0.5
@@ -174,7 +175,7 @@ class Steps:
         relaxed = relaxation.relax(frozen, jumped if divisible or overlaps else None)
         if relaxed is None:
             if overlaps:
-                # No state is handed out in which surfaces overlap.
+                # Surfaces must not overlap in any returned state.
                 self.share = touched
                 if not divisible:
                     self.least = 2 * touched * stride
@@ -186,7 +187,7 @@ class Steps:
             allowed = max(2 * accuracy * drop, 0.02 * accuracy * self.adhesion_scale)
             least = 0.01 * accuracy * self.scale
             if self.lattice.control.is_load and not relaxed.mask.any():
-                # Where contact is lost counts, and s goes like a square root of the load there.
+                # The separation at the loss of contact varies as a square root of the load.
                 allowed, least = 0.0, 0.01 * accuracy * least
             if work * abs(change) > allowed and stride > least:
                 wanted = allowed / (self.period * abs(change)) if allowed else least
@@ -198,19 +199,19 @@ class Steps:
             self.error += stride * abs(change)
             return relaxed, True
         smooth = 0.5 * work * (change if self.branch == "loading" else -change)
-        # One node more or less at each edge is the grid's own unrest, not curvature.
-        unrest = (
+        # One node more or less at each edge is noise of the discretisation, not curvature.
+        grid_noise = (
             0.25 * abs(smooth) * min(1.0, 2 * patch_ranges(frozen.mask)[0].size / max(flips, 1))
         )
-        allowed = 0.3 * accuracy * self.adhesion_scale * stride / self.scale + unrest
+        allowed = 0.3 * accuracy * self.adhesion_scale * stride / self.scale + grid_noise
         if abs(drop - smooth) > allowed and divisible:
             return None, False
         return relaxed, False
 
     def _frozen(self, contact: Contact, target: float) -> Contact:
-        """Contact with the same edges where x is ``target``, yet to be solved.
+        """Return an unsolved contact with the same edges at x = ``target``.
 
-        Stress is linear in what is prescribed: a shorter step begins with its share of the last.
+        As the stress is linear in x, the initial guess interpolates the last, longer step.
         """
         frozen = contact.at(target, self.lattice.control)
         if self.last is not None and self.last[0] is contact:
@@ -218,14 +219,14 @@ class Steps:
             share = (target - contact.prescribed) / (far.prescribed - contact.prescribed)
             frozen.stress += share * (far.stress - contact.stress)
             frozen.displacement += share * (far.displacement - contact.displacement)
-            if contact.yields is not None:
+            if contact.response is not None:
                 frozen.separation += share * (far.separation - contact.separation)
         return frozen
 
     def _touched(self, contact: Contact, frozen: Contact) -> float:
-        """At what share of the step to ``frozen`` nodes overlap as far as is allowed; at most 1.
+        """Compute the share of the step to ``frozen`` at which the overlap is half the allowed one.
 
-        Gaps are linear in what is prescribed while the edges are held.
+        Gaps are linear in x with fixed edges. 1 if the overlap stays within the allowed one.
         """
         most = _OVERLAP * self.profile.h_max
         start, end = self.lattice.gap(contact), self.lattice.gap(frozen)
@@ -236,9 +237,9 @@ class Steps:
         return float(np.clip(share.min(), 0.01, 0.95))
 
     def _rival(self, start: Contact, after: Contact) -> Contact | None:
-        """The minimum that equal speeds lead to instead; None if it is the same one.
+        """Find the minimum under equal edge speeds; None if it is the same one.
 
-        Only where several edges ran, or surfaces touched, can edges have raced.
+        It can differ only if several edges ran, or surfaces touched.
         """
         if start.mask.any():
             ran = patch_ranges(start.mask ^ after.mask)
@@ -251,12 +252,12 @@ class Steps:
         return None if other is None or self._near(other, after) else other
 
     def _near(self, one: Contact, other: Contact) -> bool:
-        """Whether no edge is far from where it is in the other contact set."""
+        """Return True if no edge is far from its position in the other contact set."""
         return bool(patch_ranges(one.mask ^ other.mask)[1].max(initial=0) <= self.apart)
 
     @staticmethod
     def _apart_from(mask: Mask, first: int, width: int) -> bool:
-        """Whether a run of nodes that joined lies apart from the patches of ``mask``."""
+        """Return True if a run of joined nodes is not adjacent to a patch of ``mask``."""
         n = mask.size
         return not (mask[first] or mask[first - 1] or mask[(first + width) % n])
 
@@ -267,7 +268,7 @@ class Steps:
         return state
 
     def _jump(self, before: ContactState, start: Contact, after: Contact) -> None:
-        """Take down the jump to ``after``, the minimum that descent leads to from ``start``."""
+        """Append the jump to ``after``, the minimum reached by descent from ``start``."""
         other = self._rival(start, after)
         lost = self.lattice.control.is_load and not after.mask.any()
         if lost:
@@ -280,7 +281,7 @@ class Steps:
             before, end, self.branch, self.period, raced=other is not None, at_stake=at_stake
         )
         if lost:
-            # The load's own work is not counted (adhesis.solver.model.control).
+            # The work of the load is not counted (adhesis.solver.model.control).
             jump = replace(jump, energy_drop=before.energy / self.period)
         self.error += self.coarse * abs(jump.energy_drop)
         self.jumps.append(jump)

@@ -1,13 +1,13 @@
-"""Relaxation of a contact set at fixed separation: edges move until every move would cost energy.
+"""Relax a contact set at a fixed prescribed value: edges move until no move releases energy.
 
 The rules (docs/methods.md):
 
 *   a free node beside a patch that overlaps the rigid profile joins;
 *   otherwise edges move by energy comparison, in proportion to the energy that they release; the
-    leading one's step is doubled while it keeps its direction, is one node after it turns, and
-    never longer than a tenth of the shortest wave;
-*   no state is accepted whose energy lies above that of the last admissible state: the sweep is
-    taken back and fewer edges move, in the end the most unstable one alone, by one node;
+    leading one's step is doubled while it keeps its direction, is one node after a reversal, and
+    at most a tenth of the shortest wave;
+*   a state is rejected if its energy exceeds that of the last admissible state: the sweep is undone
+    and fewer edges move, finally only the most unstable one, by one node;
 *   contact nucleates where the gap vanishes away from edges, from a relaxed state only.
 """
 
@@ -48,9 +48,9 @@ class Relaxation:
     lattice : Lattice
     solver : ContactSolver
     longest_step : int
-        Longest step of an edge, in nodes.
+        Largest step of an edge, in nodes.
     loose, tight : float
-        Residuals while edges run, and of a relaxed state, in closing gaps.
+        Tolerances of the residual while edges move, and of a relaxed state, in closing gaps.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Relaxation:
         self.tight = tight
         self.tight_residual = tight * solver.closing_gap
         self.tie_height = EQUAL_CRESTS * float(np.abs(lattice.height).max())
-        # the least fall of the energy that counts
+        # smaller falls of the energy are within the error of S
         self.least_fall = 0.1 * least_release(lattice)
         self.sweeps = 0
         self.rejected = 0
@@ -78,33 +78,33 @@ class Relaxation:
     def relax(
         self, contact: Contact, abort: Abort | None = None, *, equal_speeds: bool = False
     ) -> Contact | None:
-        """Move the edges of ``contact`` (solved) to the local minimum that descent leads to.
+        """Move the edges of ``contact`` (solved) to the local minimum reached by descent.
 
-        By linear kinetics, or with ``equal_speeds`` by the rule it is compared with.
+        Descent follows linear kinetics, or with ``equal_speeds`` the alternative kinetics.
 
         Returns
         -------
         Contact or None
-            A relaxed contact, solved to the tight tolerance; None if ``abort`` said so.
+            A relaxed contact, solved to the tight tolerance; None if ``abort`` returned True.
 
         Raises
         ------
         PathError
-            If the edges do not come to rest.
+            If the descent does not converge.
         """
         return _Descent(self, contact, abort, equal_speeds).run()
 
     def relax_without_adhesion(self, contact: Contact) -> Contact:
-        """Contact without adhesion: no tension, no overlap, one solution at every separation.
+        """Solve contact without adhesion: no tension, no overlap, a unique solution.
 
-        Without adhesion nothing holds the inside of a contact together, so nodes in tension leave
-        wherever they are and overlapping nodes join wherever they are, until the set stays
-        (primal-dual active set; Hintermüller, Ito & Kunisch, SIAM J. Optim. 13 (2003) 865).
+        Nodes in tension leave and overlapping nodes join, inside patches as well, until the set
+        does not change (primal-dual active set; Hintermüller, Ito & Kunisch, SIAM J. Optim. 13
+        (2003) 865).
 
         Raises
         ------
         PathError
-            If the contact set does not settle.
+            If the contact set does not converge.
         """
         contact = contact.copy()
         for _ in range(_MAX_ACTIVE_SETS):
@@ -123,14 +123,14 @@ class Relaxation:
         )
 
     def edges(self, contact: Contact) -> Edges:
-        """Edges of a solved contact with their prices."""
+        """Return the edges of a solved contact with the energies of their moves."""
         return survey(contact, self.lattice, -contact.residual)
 
     def touching(self, contact: Contact) -> Indices:
-        """Nodes away from every edge where the surfaces touch first; empty if they do not.
+        """Find the nodes away from all edges where the surfaces touch first; empty if none.
 
-        The gap between nodes is a parabola through three of them, so that first touch comes when
-        the surfaces touch and not when nodes do. Places that overlap equally touch together.
+        The gap between nodes is a parabola through three of them, so that first touch is located
+        between nodes. Minima of equal gap touch together.
         """
         gap = self.lattice.gap(contact)
         left, right = np.roll(gap, 1), np.roll(gap, -1)
@@ -143,11 +143,11 @@ class Relaxation:
         if lowest > 0:
             return np.empty(0, dtype=np.intp)
         tied = np.flatnonzero(least <= lowest + self.tie_height)
-        # A crest halfway between two nodes must not nucleate twice.
+        # A crest halfway between two nodes must nucleate only once.
         return tied[np.diff(tied, prepend=tied[-1] - self.lattice.n) > 1]
 
     def nucleate(self, contact: Contact) -> bool:
-        """Add the nodes where the surfaces touch; whether there were any."""
+        """Add the nodes where the surfaces touch; returns True if there are any."""
         nodes = self.touching(contact)
         if nodes.size == 0:
             return False
@@ -161,7 +161,7 @@ class Relaxation:
 
 
 class _Descent:
-    """One relaxation: the running contact, the last admissible one, and what was tried from it."""
+    """State of one relaxation: present contact, last admissible one, and moves tried from it."""
 
     def __init__(
         self, rules: Relaxation, contact: Contact, abort: Abort | None, equal_speeds: bool
@@ -180,7 +180,7 @@ class _Descent:
         self.caution = 0
         self.moves: list[Move] = []
         self.paired = False  # the last moves are those of pairs of edges
-        self.alone = False  # of tied pairs one moves
+        self.one_pair = False  # only one of several tied pairs moves
 
     def run(self) -> Contact | None:
         for _ in range(_MAX_SWEEPS):
@@ -191,31 +191,31 @@ class _Descent:
                 self._sweep()
                 continue
             energy = self.lattice.energy(self.current)
-            if self._undecided(energy):
-                # Unsolved stress has too little energy: no decision on it when it is close.
+            if self._is_undecided(energy):
+                # An unconverged stress underestimates the energy: close decisions need a solution.
                 self.solver.solve(self.current, self.rules.tight)
                 continue
-            if self._paid(energy):
+            if self._has_fallen(energy):
                 if self.abort is not None and self.abort(energy, self.current):
-                    if not self._unsolved():
+                    if self._is_tight():
                         return None
-                    # Energy and mean stress of a stress solved so loosely may both mislead. What
-                    # was tried in vain stays so until it is known that this paid, or two moves that
-                    # both seem to pay are tried in turn for ever.
+                    # Energy and mean stress of a loosely solved stress are too inaccurate for this.
+                    # Rejected moves stay blocked until the fall of the energy is confirmed, or two
+                    # moves that both seem to release energy would be tried in turn for ever.
                     self.solver.solve(self.current, self.rules.tight)
                     continue
                 if self.moves:
                     self.blocked.clear()
                     self.caution = 0
-                    self.alone = False
+                    self.one_pair = False
                 self.anchor = self.current.copy()
                 self.anchor_energy = energy
             else:
-                self._take_back()
+                self._undo()
                 edges = self.rules.edges(self.current)
             if self._move(edges):
                 self._sweep()
-            elif self._at_rest():
+            elif self._has_converged():
                 return self.current
         raise PathError(
             f"method 'grid' finds no state at a mean gap of {self.current.separation:.6g} m: edges "
@@ -226,28 +226,28 @@ class _Descent:
         self.solver.solve(self.current, self.tolerance)
         self.rules.sweeps += 1
 
-    def _unsolved(self) -> bool:
-        return self.current.residual > self.rules.tight_residual
+    def _is_tight(self) -> bool:
+        return not self.current.residual > self.rules.tight_residual
 
-    def _undecided(self, energy: float) -> bool:
-        """Whether the last sweep paid cannot be told from a stress solved so loosely."""
+    def _is_undecided(self, energy: float) -> bool:
+        """Return True if the change of energy in the last sweep is within its error."""
         if self.anchor is None or not self.moves:
             return False
-        return energy >= self.anchor_energy - self.current.energy_error and self._unsolved()
+        return energy >= self.anchor_energy - self.current.energy_error and not self._is_tight()
 
-    def _paid(self, energy: float) -> bool:
-        """Whether the energy fell with the last sweep, if there was one."""
+    def _has_fallen(self, energy: float) -> bool:
+        """Return True if the energy fell in the last sweep, or if there was none."""
         if self.anchor is None or not self.moves:
             return True
         return not energy >= self.anchor_energy - self.rules.least_fall
 
-    def _take_back(self) -> None:
-        """Go back before the last sweep, and from there try fewer edges, shorter steps."""
+    def _undo(self) -> None:
+        """Undo the last sweep and choose fewer edges or shorter steps for the next one."""
         assert self.anchor is not None
         self.rules.rejected += 1
         if self.paired and len(self.moves) > 2:
-            # Equal pairs hold each other back: one of them leads.
-            self.alone = True
+            # Tied pairs impede each other: only one of them moves.
+            self.one_pair = True
         elif self.paired:
             self.blocked.update(m.key for m in self.moves)
         elif len(self.moves) == 1 and self.moves[0].length == 1:
@@ -258,7 +258,7 @@ class _Descent:
         self.current = self.anchor.copy()
 
     def _move(self, edges: Edges) -> bool:
-        """Move single edges, or pairs where no single edge gains energy; whether any moved."""
+        """Move single edges, or pairs if no single edge releases energy; False if none moves."""
         self.moves = edge_moves(
             edges,
             self.lattice,
@@ -269,8 +269,8 @@ class _Descent:
             self.equal_speeds,
         )
         self.paired = False
-        if not self.moves and not self._unsolved():
-            self.moves = pair_moves(self.current, edges, self.lattice, self.blocked, self.alone)
+        if not self.moves and self._is_tight():
+            self.moves = pair_moves(self.current, edges, self.lattice, self.blocked, self.one_pair)
             self.paired = bool(self.moves)
         if not self.moves:
             return False
@@ -278,14 +278,14 @@ class _Descent:
         self.rules.flips += flips
         return True
 
-    def _at_rest(self) -> bool:
-        """Whether edges that do not move are at a minimum: tightly solved, and nothing touches."""
-        if self._unsolved():
+    def _has_converged(self) -> bool:
+        """Return True at a minimum: edges at rest, tightly solved, and no new touch."""
+        if not self._is_tight():
             self.solver.solve(self.current, self.rules.tight)
             self.blocked.clear()
             energy = self.lattice.energy(self.current)
             if energy >= self.tight_energy - self.rules.least_fall:
-                # Nothing was won since the last time: loosely solved states go in circles.
+                # The energy has not fallen since the last tight solution: loose ones would cycle.
                 self.tolerance = self.rules.tight
             self.tight_energy = min(energy, self.tight_energy)
             return False

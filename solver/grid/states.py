@@ -1,4 +1,4 @@
-"""Contact sets as contact states: effective edges, mean stress, energies; and back."""
+"""Convert contact sets to contact states (effective edges, mean stress, energies) and back."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ edge stress against K/sqrt(2πr))."""
 
 @dataclass(frozen=True, eq=False)
 class _Patches:
-    """What a state remembers: its contact set. Everything else follows from it."""
+    """Contact set of a state, from which the method continues."""
 
     first: Indices
     width: Indices
 
 
 def state_of(lattice: Lattice, contact: Contact) -> ContactState:
-    """Contact state of a solved contact; without a contact node that without contact."""
+    """Make the contact state of a solved contact."""
     first, width = patch_ranges(contact.mask)
     if first.size == 0:
         return ContactState(contact.separation, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
@@ -39,9 +39,9 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
     left, right = left + wrapped * period, right + wrapped * period
     order = np.argsort(left, kind="stable")
     mean_stress = float(contact.stress.mean())
-    control, held = lattice.control, 0.0
+    control, hold_energy = lattice.control, 0.0
     if not control.is_fixed:
-        held = control.potential(0.0, contact.separation, mean_stress, lattice.h_max, period)
+        hold_energy = control.potential(0.0, contact.separation, mean_stress, lattice.h_max, period)
     area = float(width.sum()) - 2 * EDGE_OFFSET * first.size
     return ContactState(
         separation=contact.separation,
@@ -50,18 +50,18 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
         elastic_energy=contact.elastic_energy,
         adhesion_energy=lattice.adhesion_energy(contact),
         contact_fraction=max(0.0, area / lattice.n),
-        hold_energy=held,
+        hold_energy=hold_energy,
         internal=_Patches(first, width),
     )
 
 
 def mask_of(lattice: Lattice, state: ContactState) -> NDArray[np.bool_]:
-    """Contact set of a state that :func:`state_of` made.
+    """Return the contact set of a state made by :func:`state_of`.
 
     Raises
     ------
     ValueError
-        If another method made it.
+        If another method made the state.
     """
     mask = np.zeros(lattice.n, dtype=bool)
     if state.patches == 0:

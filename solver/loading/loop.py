@@ -1,4 +1,4 @@
-"""The loading path: one complete loading-unloading loop."""
+"""Run one complete loading-unloading loop."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from adhesis.solver.model.problem import Problem
 T = TypeVar("T")
 
 HOW_METHOD = "make_method(name, problem)"
-"""How to make a method, for whoever gives something else."""
+"""Call that makes a method, for error messages."""
 
 Progress = Callable[[Branch, float, ContactState], None]
 """Called after each load step with branch, penetration Δ/h_max and state; may raise to stop."""
@@ -58,13 +58,13 @@ def progress_of(progress: Progress | bool | None, top: float) -> Iterator[Progre
         yield function("progress", progress)
 
 
-# After so many times the loading stroke, unloading skips load steps that are shorter than a share
-# of the control's natural range (h_max at fixed separation) or of the way since first touch; loops
-# of ordinary depth have detached long before.
+# Beyond this multiple of the loading range, unloading takes longer steps: of the given share of the
+# control's natural range (h_max at fixed separation) or of the distance from first touch. Loops of
+# ordinary depth detach long before.
 _STROKES_AT_STEP = 20
 _LONG_STEP = 0.02
-# Unloading is given up so many natural ranges below first touch. Contact detaches at about
-# sqrt(γ/energy of full contact) ranges, and no method accepts more than 1e12 of those energies.
+# Unloading stops with an error this many natural ranges below first touch. Contact detaches at
+# about sqrt(γ/energy of full contact) ranges, and methods accept γ up to 1e12 of those energies.
 _FARTHEST = 1e7
 
 
@@ -79,7 +79,7 @@ def check_cycle(
         Unless the turning point is positive and finite and, at fixed separation, below 1, and
         load_steps is a whole number from 1 to 100,000.
     TypeError
-        If one of them is no number.
+        If one of them is not a number.
     """
     control = control or Control()
     name, bounds = "max_penetration", FAR_DISPLACEMENT
@@ -105,11 +105,11 @@ def run_loop(
     ----------
     method : Method
     max_penetration : float
-        Δ~max = Δ/h_max, 0 < Δ~max < 1; where a stiffness holds the half-space u_tot/h_max.
+        Δ~max = Δ/h_max, 0 < Δ~max < 1; u_tot/h_max if the control is a stiffness.
     max_stress : float
-        Under a load, instead: p̄ in Pa, positive.
+        Instead, under a load: p̄ in Pa, positive.
     load_steps : int
-        Equal steps of the loading branch; unloading goes on with the same step.
+        Equal steps of the loading branch; unloading uses the same step.
     progress : callable or bool, optional
         True shows a bar, in a terminal or notebook; a function is called as :data:`Progress` says.
     on_state : callable, optional
@@ -120,7 +120,7 @@ def run_loop(
     ValueError
         If the cycle cannot be run (:func:`check_cycle`).
     TypeError
-        If the method is no Method, or a value no number.
+        If the method is not a Method, or a value not a number.
     PathError
         If the path cannot be followed, or the contact does not detach (:func:`unload`).
 
@@ -146,19 +146,21 @@ def run_loop(
 
 
 def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None) -> T:
-    """The turning point, or points, that belong to the control.
+    """Select the turning point, or points, of the control.
 
     Raises
     ------
     ValueError
-        If the other one is given, or none.
+        If the argument of another control is given, or none.
     """
     wanted, other = ("max_penetration", max_penetration), ("max_stress", max_stress)
     if problem.control.is_load:
         wanted, other = other, wanted
     if wanted[1] is None or other[1] is not None:
-        held = "a load" if problem.control.is_load else "a separation or a stiffness"
-        raise ValueError(f"a path under {held} turns at {wanted[0]}: give that, and no {other[0]}")
+        control = "a load" if problem.control.is_load else "a separation or a stiffness"
+        raise ValueError(
+            f"a path under {control} turns at {wanted[0]}: give that, and no {other[0]}"
+        )
     return wanted[1]
 
 
@@ -169,10 +171,10 @@ def recorder(
     state: ContactState,
     progress: Progress | None,
 ) -> Callable[[float], ContactState]:
-    """Return a function that follows one branch from ``state``, a load step a call.
+    """Return a function that follows one branch from ``state``, one load step per call.
 
-    It takes the place of a load step (Δ/h_max, u_tot/h_max or Pa), adds the states on the way to
-    the record, and returns the last one.
+    Its argument is the end of the load step (Δ/h_max, u_tot/h_max or Pa); it adds the visited
+    states to the record and returns the last one.
     """
 
     def step(drive: float) -> ContactState:
@@ -211,26 +213,26 @@ def unload(
     step: Callable[[float], ContactState],
     marks: Sequence[float] = (),
 ) -> None:
-    """Unload by load steps until contact is lost: the rule of all loops and paths.
+    """Unload by load steps until contact is lost, in loops and paths alike.
 
     Parameters
     ----------
     problem : Problem
     axis : Axis
     turn : float
-        Where unloading begins, on the axis or between two of its load steps.
+        Start of unloading, on the axis or between two of its load steps.
     state : ContactState
         The state there.
     step : callable
-        Follows the path to a place on the axis and returns the state there.
+        Follows the path to a value on the axis and returns the state there.
     marks : sequence of float
-        Further places at which a step ends; those above ``turn`` are not passed. A load step within
-        rounding of one gives way to it.
+        Further values at which a step ends; those above ``turn`` are ignored. A mark replaces a
+        load step within rounding of it.
 
     Raises
     ------
     PathError
-        If the path cannot be followed, or contact lasts where no contact has ever lasted.
+        If the path cannot be followed, or contact is not lost at any plausible separation.
     """
     first = i = axis.above(turn)
     stride = 1
@@ -242,9 +244,9 @@ def unload(
         if end < -_FARTHEST * unit:
             raise PathError(
                 f"unloading does not end: surfaces are still in contact at "
-                f"{problem.place(problem.prescribed(end))}, {_FARTHEST:g} times further than the "
-                "profile's height alone would hold them; check the units of work_of_adhesion, "
-                "young and the heights, or try the other method"
+                f"{problem.place(problem.prescribed(end))}, {_FARTHEST:g} times the natural range "
+                "of the profile; check the units of work_of_adhesion, young and the heights, or "
+                "try the other method"
             )
         if first - i >= _STROKES_AT_STEP * axis.load_steps:
             wanted = _LONG_STEP * max(unit, -end) / (axis(i + 1) - end)
@@ -261,7 +263,7 @@ def unload(
 
 
 def _natural_range(problem: Problem) -> float:
-    """Range of the prescribed quantity that the profile alone sets: 1 (in h_max), or Pa."""
+    """Compute the range of the prescribed value set by the profile alone, in h_max or Pa."""
     if problem.control.is_load:
         return problem.stress_scale
     return 1.0 + problem.stress_scale / (problem.control.stiffness * problem.profile.h_max)

@@ -1,4 +1,4 @@
-"""What a loop gives: its curves, its losses and its energy audit.
+"""Result of a loop: its curves, losses and energy audit.
 
 dU/ds = -λ p̄ at equilibrium, so over a closed loop the loop integral of the mean stress and the sum
 of the energy drops at the jumps are the same energy. They are computed independently of each other
@@ -37,8 +37,8 @@ from adhesis.solver.views import Viewed
 STEEP = 0.3
 """Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
 
-# Where the method was asked for no accuracy, an audit residual or an error of the loss beyond this
-# share of the loss is said.
+# Share of the loss above which an audit residual or an error of the loss is reported, for methods
+# without an accuracy.
 _LARGE = 0.02
 
 
@@ -46,18 +46,16 @@ _LARGE = 0.02
 class LoopResult(ByValue, Viewed):
     """A complete loop; arrays have the shape (states,), in the order of the path.
 
-    Immutable; two loops are equal if all is that they hold but ``seconds``, ``method``,
-    ``contact_states`` and ``new_method``: the same problem followed twice by one method gives equal
-    loops.
+    Immutable; two loops are equal if all fields except ``seconds``, ``method``, ``contact_states``
+    and ``new_method`` are: one method gives equal loops each time for the same problem.
 
     Attributes
     ----------
     problem : Problem
     turning_point : float
-        What was asked for at the turning point: Δ/h_max, u_tot/h_max where a stiffness holds the
-        half-space, p̄ in Pa under a load.
+        As prescribed: Δ/h_max, u_tot/h_max if the control is a stiffness, p̄ in Pa under a load.
     max_penetration : float
-        Δ/h_max at the turning point: as asked for, or where the control does not fix it, as found.
+        Δ/h_max at the turning point: prescribed, or computed if the control does not fix it.
     load_steps : int
         Equal steps of the loading branch.
     branch : array of str, shape (states,)
@@ -92,7 +90,7 @@ class LoopResult(ByValue, Viewed):
     seconds : float
         CPU time of this process, in s.
     method : MethodReport
-        What the method says of itself (name, resolution, counters).
+        Name, resolution and counters of the method.
     contact_states : tuple of ContactState
         The states themselves, with the edges of every patch; empty for a loop from a file.
     new_method : callable or None
@@ -136,7 +134,7 @@ class LoopResult(ByValue, Viewed):
     narrowest_length: float = float("nan")
 
     def __repr__(self) -> str:
-        """Two lines: what was followed, and its loss; the first warnings are counted only."""
+        """Return two lines with the loop and its loss, and the number of warnings."""
         return (
             f"LoopResult(turning_point={self.turning_point:g}, {self.load_steps} load steps, "
             f"{len(self.separation)} states, method {self.method.name!r},\n"
@@ -163,7 +161,7 @@ class LoopResult(ByValue, Viewed):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what makes the loss doubtful; none for most loops."""
+        """Reasons to doubt the loss, one sentence each; none for most loops."""
         found = []
         slope = float(np.sqrt(self.problem.profile.m2))
         if slope > STEEP:
@@ -207,12 +205,12 @@ class LoopResult(ByValue, Viewed):
 
     @property
     def races(self) -> int:
-        """Number of jumps that another rule of descent would have ended elsewhere."""
+        """Number of jumps whose end state depends on the assumed edge kinetics."""
         return sum(jump.raced for jump in self.jumps)
 
     @property
     def energy_at_stake(self) -> float:
-        """Sum over the jumps of the energy that depends on the rule of descent, in J/m²."""
+        """Sum over the jumps of the energy that depends on the assumed kinetics, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
 
     @property
@@ -241,7 +239,7 @@ class LoopResult(ByValue, Viewed):
         return self.work_spent / self.largest_contact_fraction
 
     def __str__(self) -> str:
-        """A few lines for a terminal: what was followed, its losses, jumps, pull-off, warnings."""
+        """Summarise the loop for a terminal: problem, losses, jumps, pull-off, warnings."""
         profile = self.problem.profile
         kinds = Counter(jump.kind for jump in self.jumps)
         several = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
@@ -265,7 +263,7 @@ class LoopResult(ByValue, Viewed):
         )
 
     def on_axis(self, branch: Branch, values: Array) -> Array:
-        """Values of one branch at every load step, interpolated where unloading skips some.
+        """Return values of one branch at every load step, interpolated at skipped ones.
 
         Parameters
         ----------
@@ -284,29 +282,29 @@ class LoopResult(ByValue, Viewed):
         values = self._of_states(values)
         chosen = self.states(branch, load_steps_only=True)
         control, h_max = self.problem.control, self.problem.profile.h_max
-        drive = -control.prescribed(self.separation[chosen], self.mean_stress[chosen])
+        prescribed = control.prescribed(self.separation[chosen], self.mean_stress[chosen])
         unit = self.turning_point / self.load_steps * (1.0 if control.is_load else h_max)
-        place = np.abs(np.rint((drive - drive[0]) / unit)) if len(chosen) else np.empty(0)
-        if branch == "loading" or len(chosen) < 2 or place[-1] == len(chosen) - 1:
+        index = np.abs(np.rint((prescribed[0] - prescribed) / unit)) if len(chosen) else np.empty(0)
+        if branch == "loading" or len(chosen) < 2 or index[-1] == len(chosen) - 1:
             return values[chosen]
         # under a load the last state lies where contact was lost, off the axis
-        return np.interp(np.arange(place[-1] + 1), place, values[chosen])
+        return np.interp(np.arange(index[-1] + 1), index, values[chosen])
 
     def at(self, branch: Branch, drives: Array, values: Array) -> Array:
-        """Values of one branch wherever it passes, straight lines between its states.
+        """Interpolate values of one branch linearly between its states.
 
         Parameters
         ----------
         branch : {"loading", "unloading"}
-        drives : array, shape (places,)
-            Δ/h_max at fixed separation, u_tot/h_max for a stiffness; Δ/h_max under a load too, as
-            its jumps there are lines.
+        drives : array, shape (points,)
+            Δ/h_max at fixed separation, u_tot/h_max for a stiffness; Δ/h_max under a load, too,
+            where jumps are sloped lines.
         values : array, shape (states,)
 
         Returns
         -------
-        array, shape (places,)
-            After a jump at the very place; 0 out of contact; NaN beyond the turning point.
+        array, shape (points,)
+            At a jump the value after it; 0 out of contact; NaN beyond the turning point.
 
         Raises
         ------
@@ -319,7 +317,7 @@ class LoopResult(ByValue, Viewed):
         control = Control() if control.is_load else control
         x = control.prescribed(self.separation[chosen], self.mean_stress[chosen])
         wanted = h_max * (1.0 - drives)
-        sign = -1.0 if branch == "loading" else 1.0  # of the way that the branch goes
+        sign = -1.0 if branch == "loading" else 1.0  # of the change of x along the branch
         x, wanted = sign * x, sign * wanted
         turn = x[-1] if branch == "loading" else x[0]
         near = 1e-12 * h_max
@@ -329,7 +327,7 @@ class LoopResult(ByValue, Viewed):
         return np.where(beyond, np.nan, found)
 
     def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
-        """Indices of the states of one branch, optionally only those on the load-step axis.
+        """Return the indices of one branch's states, optionally only those on the load-step axis.
 
         Raises
         ------
@@ -341,7 +339,7 @@ class LoopResult(ByValue, Viewed):
         return np.flatnonzero(chosen & self.load_step if load_steps_only else chosen)
 
     def _of_states(self, values: Array) -> Array:
-        """Refuse values that are not one for each state."""
+        """Return values as an array; raise unless there is one for each state."""
         array = np.asarray(values)
         if array.shape != self.separation.shape:
             raise ValueError(
@@ -354,7 +352,7 @@ class LoopResult(ByValue, Viewed):
 def result_of(
     method: Method, record: Record, turning_point: float, load_steps: int, started: float
 ) -> LoopResult:
-    """The loop of a record; ``started`` is the CPU time at which it was begun, in s."""
+    """Make the result from the record of a loop; ``started`` is its first CPU time, in s."""
     problem = method.problem
     separation = record.column("separation")
     loss = record.work(problem)
@@ -397,10 +395,11 @@ def result_of(
 
 
 def estimated_error(record: Record, audited: float, problem: Problem) -> float:
-    """Estimated error of a path's loss in J/m².
+    """Estimate the error of a path's loss in J/m².
 
-    The method's own, or failing that a part in a hundred of the drops; what the audit sees,
-    ``audited``; and drops that came out negative, as far as they did: nothing jumps upwards.
+    It is the sum of the method's own estimate (if there is none, a hundredth of the drops), the
+    difference found by the audit, and the sizes of negative drops, which are errors: energy falls
+    in every jump.
 
     Parameters
     ----------

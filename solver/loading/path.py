@@ -1,13 +1,13 @@
-"""Any loading path: legs in any order, and the loops that they close on the way.
+"""Loading paths with several turning points, and the minor loops that they close.
 
 A path starts at first touch, goes from one turning point to the next, loading and unloading in
-turn, and ends at the last one or out of contact. Where a leg comes back to the turning point at
-which the leg before it began, it has closed a minor loop. Whether the state is then the one that
-was left (return-point memory) is not assumed: it is measured, and every part is audited,
+turn, and ends at the last one or out of contact. A leg that comes back to the start of the previous
+leg closes a minor loop. Whether the state is then the earlier one (return-point memory) is not
+assumed but measured, and every part is audited,
 
     -∫ Y dx = ΔW/λ + sum of the drops,
 
-with ΔW the change of the potential from its begin to its end (:mod:`adhesis.solver.model.control`),
+with ΔW the change of the potential from its start to its end (:mod:`adhesis.solver.model.control`),
 0 for a part that closes.
 """
 
@@ -40,33 +40,33 @@ from adhesis.solver.values import ByValue
 from adhesis.solver.views import Viewed
 
 _SHOWN = 6  # turning points of a path in its repr
-_SAME = 1e-6  # states whose stress and contact differ by less (of what they went through) are one
+_SAME = 1e-6  # least change of stress or contact, relative to its range on the loop, that counts
 
 
 @dataclass(frozen=True)
 class MinorLoop:
-    """A part of a path that leaves a turning point and comes back to it.
+    """Part of a path that leaves a turning point and comes back to it.
 
     Attributes
     ----------
     start, turn : float
-        The turning point that is left and come back to, and the one between: Δ/h_max, u_tot/h_max
-        or Pa, as in :attr:`PathResult.turning_points`.
+        The turning point at its start and end, and the one between: Δ/h_max, u_tot/h_max or Pa, as
+        in :attr:`PathResult.turning_points`.
     branch : {"loading", "unloading"}
-        On which it is left.
+        Of its first leg.
     loss : float
-        Work done on the way, -∫ Y dx, in J/m² of nominal area.
+        Work -∫ Y dx, in J/m² of nominal area.
     loss_from_drops : float
         Sum of the energy drops at its jumps, in J/m².
     energy_change : float
-        (W at its end - W at its begin) per nominal area, in J/m²: 0 if the state comes back.
+        (W at its end - W at its start) per nominal area, in J/m²: 0 if it closes.
     stress_change : float
-        p̄ at its end less that at its begin, in Pa.
+        p̄ at its end less that at its start, in Pa.
     contact_change : float
-        A/A0 at its end less that at its begin.
+        A/A0 at its end less that at its start.
     closes : bool
-        Whether it ends in the state in which it began: stress and contact agree to a millionth of
-        what they went through on the way.
+        True if it ends in its initial state: stress and contact agree to a millionth of their
+        ranges on the loop.
 
     References
     ----------
@@ -93,15 +93,15 @@ class MinorLoop:
 class PathResult(ByValue, Viewed):
     """A path of several legs; arrays have the shape (states,), in the order of the path.
 
-    Immutable; two paths are equal if all is that they hold but ``seconds``, ``method``,
-    ``contact_states`` and ``new_method``.
+    Immutable; two paths are equal if all fields except ``seconds``, ``method``, ``contact_states``
+    and ``new_method`` are.
 
     Attributes
     ----------
     problem : Problem
     turning_points : tuple of float
-        Ends of the legs: Δ/h_max, u_tot/h_max where a stiffness holds the half-space, p̄ in Pa under
-        a load. A path that ends out of contact has one leg more.
+        Ends of the legs: Δ/h_max, u_tot/h_max if the control is a stiffness, p̄ in Pa under a load.
+        A path that ends out of contact has one more leg.
     load_steps : int
         Equal steps up to the largest turning point.
     leg : int array
@@ -124,7 +124,7 @@ class PathResult(ByValue, Viewed):
     loss_from_drops : float
         Sum of all energy drops, in J/m².
     energy_change : float
-        (W at the end - W at the begin) per nominal area, in J/m²; 0 for a path that ends out of
+        (W at the end - W at the start) per nominal area, in J/m²; 0 for a path that ends out of
         contact.
     loss_error : float
         Estimated numerical error of the work, in J/m².
@@ -175,7 +175,7 @@ class PathResult(ByValue, Viewed):
     narrowest_length: float = float("nan")
 
     def __repr__(self) -> str:
-        """Two lines: what was followed, and its work."""
+        """Return two lines with the path and its work."""
         points = ", ".join(f"{point:g}" for point in self.turning_points[:_SHOWN])
         points += ", …" if len(self.turning_points) > _SHOWN else ""
         return (
@@ -217,14 +217,15 @@ class PathResult(ByValue, Viewed):
 
     @property
     def ends_out(self) -> bool:
-        """Whether the path ends out of contact."""
+        """True if the path ends out of contact."""
         return bool(self.patches[-1] == 0)
 
     @property
     def audit_residual(self) -> float:
-        """(work - change of energy - sum of drops) / largest of their sizes; 0 without any.
+        """(work - change of energy - sum of drops) / the largest of their absolute values.
 
-        Without adhesion a path that ends out of contact has none: its work is only rounding.
+        0 if all three are, and without adhesion for a path that ends out of contact, whose work is
+        only rounding.
         """
         if self.problem.work_of_adhesion == 0 and self.ends_out:
             return 0.0
@@ -236,7 +237,7 @@ class PathResult(ByValue, Viewed):
 def check_path(
     turning_points: Sequence[float], load_steps: int, problem: Problem
 ) -> tuple[float, ...]:
-    """Refuse a path that cannot be followed; returns its turning points.
+    """Check a path and return its turning points.
 
     Raises
     ------
@@ -244,7 +245,7 @@ def check_path(
         Unless it starts with loading and turns at every point, and the largest turning point could
         be that of a loop (:func:`adhesis.solver.loading.loop.check_cycle`).
     TypeError
-        If one of them, or load_steps, is no number.
+        If one of them, or load_steps, is not a number.
     """
     found = finite_row("turning_points", turning_points, entry="turning point")
     points: tuple[float, ...] = tuple(found.tolist())
@@ -281,13 +282,13 @@ def run_path(
     ----------
     method : Method
     turning_points : sequence of float, shape (legs,)
-        Ends of the legs, loading first: Δ/h_max, u_tot/h_max where a stiffness holds the
-        half-space, p̄ in Pa under a load (:mod:`adhesis.solver.model.control`).
+        Ends of the legs, loading first: Δ/h_max, u_tot/h_max if the control is a stiffness, p̄ in Pa
+        under a load (:mod:`adhesis.solver.model.control`).
     load_steps : int
-        Equal steps up to the largest turning point; every leg has them.
+        Equal steps up to the largest turning point; all legs use the same step.
     out : bool
-        Whether the path goes on until contact is lost. Not after a last leg of unloading, which
-        then simply goes on: its turning point is one no more.
+        Whether to unload after the last turning point until contact is lost. The last leg must
+        then be a loading leg.
     progress, on_state : callable, optional
         As in :func:`adhesis.solver.loading.loop.run_loop`.
 
@@ -296,9 +297,9 @@ def run_path(
     ValueError
         If the path cannot be followed (:func:`check_path`).
     TypeError
-        If the method is no Method, or a value no number.
+        If the method is not a Method, or a value not a number.
     PathError
-        If there are no states to follow, or contact is lost before the path has ended.
+        If the path cannot be followed, or contact is lost before its end.
 
     References
     ----------
@@ -310,29 +311,28 @@ def run_path(
     function("on_state", on_state)
     if flag("out", out) and len(points) % 2 == 0:
         raise ValueError(
-            f"the path ends with unloading to {points[-1]:g} and goes out: leave that turning "
-            "point away"
+            f"the path ends with unloading to {points[-1]:g} and goes out: omit that turning point"
         )
     started = process_time()
     with progress_of(progress, max(points)) as report:
-        walk = _Walk(method, Axis(max(points), load_steps), Record(on_state), report)
+        runner = _PathRunner(method, Axis(max(points), load_steps), Record(on_state), report)
         for point in points:
-            walk.to(point)
+            runner.to(point)
         if out:
-            walk.out()
-    return walk.result(points, load_steps, started)
+            runner.out()
+    return runner.result(points, load_steps, started)
 
 
 @dataclass
 class _Turn:
-    """A turning point that a later leg may come back to: its drive, and its state's number."""
+    """A turning point that a later leg may come back to, with the index of its state."""
 
     drive: float
     state: int
 
 
-class _Walk:
-    """A path while it is followed."""
+class _PathRunner:
+    """State of a path while it is followed."""
 
     def __init__(
         self, method: Method, axis: Axis, record: Record, progress: Progress | None
@@ -341,7 +341,7 @@ class _Walk:
         self.axis, self.record, self.progress = axis, record, progress
         self.legs: list[int] = []  # of the states
         self.jump_legs: list[int] = []
-        self.jump_steps: list[int] = []  # number of states before the load step of each jump
+        self.jump_steps: list[int] = []  # for each jump, the states before its load step
         self.minor: list[MinorLoop] = []
         self.open: list[_Turn] = []
         self.leg = -1
@@ -361,7 +361,7 @@ class _Walk:
                 raise PathError(
                     f"contact is lost on the way to {point:g} {unit}, at "
                     f"{self.problem.place(self.problem.prescribed(drive))}, before the path has "
-                    "ended: let it turn where contact lasts, or end there with out"
+                    "ended: choose a turning point at which contact lasts, or end the path with out"
                 )
         self.drive = point
 
@@ -379,7 +379,7 @@ class _Walk:
         )
 
     def _begin(self, branch: Branch) -> None:
-        """The turning point belongs to both legs: it starts the next one."""
+        """Start a leg with the state at the turning point, which belongs to both legs."""
         self.leg += 1
         if self.record.states:
             self.open.append(_Turn(self.drive, len(self.record.states)))
@@ -400,7 +400,7 @@ class _Walk:
         return self.state
 
     def _close(self, start: _Turn, turn: _Turn) -> None:
-        """Take down the minor loop from ``start`` over ``turn`` to the last state."""
+        """Record the minor loop from ``start`` over ``turn`` to the last state."""
         record, period = self.record, self.problem.profile.period
         part = record.slice(start.state)
         begin, end = part.states[0], part.states[-1]
@@ -430,7 +430,7 @@ class _Walk:
         )
 
     def result(self, points: tuple[float, ...], load_steps: int, started: float) -> PathResult:
-        """The path that has been followed."""
+        """Make the result of the path."""
         record, problem = self.record, self.problem
         work = record.work(problem)
         drops = float(sum(jump.energy_drop for jump in record.jumps))

@@ -1,4 +1,4 @@
-"""What a path has passed: its states in order, its jumps, and the work done on the way."""
+"""Record of a path: its states in order, its jumps, and the work along it."""
 
 from __future__ import annotations
 
@@ -13,48 +13,48 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 
-_NEAR = 1e-9  # load steps closer than this share of one are the same
+_NEAR = 1e-9  # in load steps: closer values are equal but for rounding
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Load steps as multiples of a step: ``load_steps`` of them make ``top``."""
+    """Equal load steps from 0, ``load_steps`` of them up to ``top``."""
 
     top: float
     load_steps: int
 
     def __call__(self, index: int) -> float:
-        """Return the place of a load step; of the last one ``top`` itself, without rounding."""
+        """Return the prescribed value of a load step, exactly ``top`` for the last one."""
         return self.top if index == self.load_steps else self.top * index / self.load_steps
 
     @property
     def near(self) -> float:
-        """Distance within which two places are one."""
+        """Distance within which two values are equal but for rounding."""
         return _NEAR * self.top / self.load_steps
 
     def above(self, drive: float) -> int:
-        """Number of the first load step at or above ``drive``."""
+        """Return the index of the first load step at or above ``drive``."""
         return math.ceil(drive * self.load_steps / self.top - _NEAR)
 
-    def apart(self, places: Sequence[float], others: Sequence[float] = ()) -> list[float]:
-        """Those of the places that are no load step, none of the others, and differ."""
+    def apart(self, values: Sequence[float], others: Sequence[float] = ()) -> list[float]:
+        """Return the distinct values, sorted, that are neither load steps nor among the others."""
         found: list[float] = []
-        for place in sorted(places):
-            step = self(round(place * self.load_steps / self.top))
-            if all(abs(place - other) > self.near for other in (step, *others, *found[-1:])):
-                found.append(place)
+        for value in sorted(values):
+            step = self(round(value * self.load_steps / self.top))
+            if all(abs(value - other) > self.near for other in (step, *others, *found[-1:])):
+                found.append(value)
         return found
 
     def between(self, start: float, end: float, marks: Sequence[float] = ()) -> list[float]:
-        """Load steps of a leg from ``start`` to ``end``, both included, and the marks on the way.
+        """Return the load steps from ``start`` to ``end``, both included, and the marks between.
 
-        A load step within rounding of a mark or an end gives way to it.
+        A mark or an end replaces a load step within rounding of it.
         """
         low, high = min(start, end), max(start, end)
         kept = sorted({low, high, *(m for m in marks if low < m < high)})
         grid = (self(k) for k in range(self.above(low), self.above(high)))
-        way = sorted([*kept, *(p for p in grid if min(abs(p - k) for k in kept) > self.near)])
-        return way if start <= end else way[::-1]
+        values = sorted([*kept, *(p for p in grid if min(abs(p - k) for k in kept) > self.near)])
+        return values if start <= end else values[::-1]
 
 
 @dataclass
@@ -73,10 +73,10 @@ class Record:
     states: list[ContactState] = field(default_factory=list)
     jumps: list[Jump] = field(default_factory=list)
     error: float = 0.0
-    """Sum of what the method knows of its own error, in J/m²; NaN if it does not know."""
+    """Sum of the method's estimates of its error, in J/m²; NaN if it has none."""
 
     def visit(self, branch: Branch, on_axis: bool, state: ContactState) -> None:
-        """Take down one state; ``on_axis`` if it ends a load step."""
+        """Append one state; ``on_axis`` if it ends a load step."""
         self.branches.append(branch)
         self.on_axis.append(on_axis)
         self.states.append(state)
@@ -84,20 +84,20 @@ class Record:
             self.on_state(branch, state)
 
     def extend(self, branch: Branch, path: Path) -> ContactState:
-        """Take down one load step, whose last state lies on the axis; return that state."""
-        for passed in path.states[:-1]:
-            self.visit(branch, False, passed)
+        """Append the states of one load step and return the last one, which lies on the axis."""
+        for between in path.states[:-1]:
+            self.visit(branch, False, between)
         self.visit(branch, True, path.states[-1])
         self.jumps += path.jumps
         self.error += path.error
         return path.states[-1]
 
     def column(self, name: str) -> Array:
-        """One attribute of every state, shape (states,)."""
+        """Return one attribute of every state, shape (states,)."""
         return np.array([getattr(state, name) for state in self.states])
 
     def slice(self, first: int, stop: int | None = None) -> Record:
-        """The states numbered from ``first``, to the end or below ``stop``, without jumps."""
+        """Return a record of the states from index ``first`` up to ``stop``, without jumps."""
         part = slice(first, stop)
         return Record(
             branches=self.branches[part],
@@ -106,7 +106,7 @@ class Record:
         )
 
     def copy(self) -> Record:
-        """A record that goes on from the same states and jumps."""
+        """Return a copy with lists of its own."""
         return Record(
             self.on_state,
             list(self.branches),
@@ -117,21 +117,21 @@ class Record:
         )
 
     def work(self, problem: Problem) -> float:
-        """Work of the driving device, -∫ Y dx over the states, in J/m².
+        """Compute the work of the driving device, -∫ Y dx over the states, in J/m².
 
         x and Y are those of :mod:`adhesis.solver.model.control`.
 
         Raises
         ------
         PathError
-            If a state without contact lies below s = h_max, where surfaces overlap. Without
-            adhesion patches narrower than a method resolves are left out, and overlap so much.
+            If a state without contact lies below s = h_max, where surfaces overlap. Not raised
+            without adhesion, where methods may leave out patches that they do not resolve.
         """
         control, h_max = problem.control, problem.profile.h_max
         separation, mean_stress = self.column("separation"), self.column("mean_stress")
         free = separation[self.column("patches") == 0]
-        held = not control.is_load and problem.work_of_adhesion > 0
-        if held and free.min(initial=np.inf) < h_max * (1 - _NEAR):
+        must_touch = not control.is_load and problem.work_of_adhesion > 0
+        if must_touch and free.min(initial=np.inf) < h_max * (1 - _NEAR):
             raise PathError(
                 f"the path is without contact at s = {free.min() / h_max:.9g} h_max "
                 f"({free.min():.9g} m), where surfaces overlap: there is no such state"
@@ -144,10 +144,10 @@ class Record:
 
 
 def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:
-    """∫ Y dx over the states, in J/m²: trapezoidal rule, end-corrected where dY/dx is known.
+    """Compute ∫ Y dx over the states, in J/m², by the end-corrected trapezoidal rule.
 
     At fixed separation that is ∫ p̄ ds. The correction h²/12 (Y'_0 - Y'_1) raises the order from two
-    to four on smooth pieces; it is left out where a stiffness is NaN.
+    to four on smooth pieces; it is omitted where a stiffness is NaN.
 
     Parameters
     ----------
@@ -155,5 +155,5 @@ def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:
         x, Y and dY/dx (:mod:`adhesis.solver.model.control`; m, Pa and Pa/m, or Pa, m and m/Pa), in
         the order of the path.
     """
-    bend = -np.diff(stiffness) * np.diff(prescribed) ** 2 / 12
-    return float(np.trapezoid(conjugate, prescribed)) + float(np.nansum(bend))
+    correction = -np.diff(stiffness) * np.diff(prescribed) ** 2 / 12
+    return float(np.trapezoid(conjugate, prescribed)) + float(np.nansum(correction))

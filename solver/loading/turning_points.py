@@ -1,4 +1,4 @@
-"""Loops that share one loading branch: it is followed once, and left at every turning point."""
+"""Run several loops that share one loading branch."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from adhesis.solver.model.jump import Branch
 
 
 class LoadingBranch:
-    """A loading branch that is followed as far as it is asked for, and left at its turning points.
+    """Loading branch followed on demand, from whose turning points loops unload.
 
-    What a loop that leaves it becomes depends on the turning points and marks of the branch, and
-    neither on which of them are asked for nor on what was computed before.
+    A loop depends on the turning points and marks of the branch, but not on which of them are used,
+    nor on earlier computations.
 
     Parameters
     ----------
@@ -32,9 +32,9 @@ class LoadingBranch:
     turning_points : sequence of float, shape (loops,)
         Different ones: Δ/h_max or u_tot/h_max, or p̄ in Pa under a load.
     load_steps : int
-        Equal steps up to the largest turning point; every unloading branch goes on with that step.
+        Equal steps up to the largest turning point; unloading branches use the same step.
     marks : sequence of float
-        Further places at which a step of the loading branch ends.
+        Further values at which a step of the loading branch ends.
 
     Raises
     ------
@@ -42,7 +42,7 @@ class LoadingBranch:
         If a cycle cannot be run (:func:`adhesis.solver.loading.loop.check_cycle`), or a turning
         point is given twice, or none.
     TypeError
-        If the method is no Method, or a value no number.
+        If the method is not a Method, or a value not a number.
 
     References
     ----------
@@ -69,7 +69,7 @@ class LoadingBranch:
         further = self._axis.apart(marks, turns)
         self._drives = self._axis.between(0.0, turns[-1], [*turns, *further])
         self._turns = frozenset(turns)
-        self._passed = 0  # drives
+        self._passed = 0  # number of prescribed values reached
         self._record = Record()
         self._state = method.detached(method.problem.profile.h_max)
         self._record.visit("loading", False, self._state)
@@ -77,14 +77,14 @@ class LoadingBranch:
         self._error: PathError | None = None
 
     def to(self, turn: float, progress: Progress | None = None) -> None:
-        """Follow it to a turning point, unless it has come as far.
+        """Follow the branch to a turning point, unless it is already there or beyond.
 
         Raises
         ------
         ValueError
-            If that is none of its turning points.
+            If ``turn`` is not one of its turning points.
         PathError
-            If it cannot be followed so far; also when it is asked to again.
+            If the branch cannot be followed so far; at every further call, too.
         """
         if turn not in self._turns:
             raise ValueError(f"{turn!r} is not a turning point of this loading branch")
@@ -113,13 +113,13 @@ class LoadingBranch:
         progress: Progress | None = None,
         on_state: Callable[[Branch, ContactState], None] | None = None,
     ) -> LoopResult:
-        """Follow it to a turning point that it has not passed, and unload from there.
+        """Follow the branch to a turning point not yet passed, and unload from there.
 
         Parameters
         ----------
         turn : float
         marks : sequence of float
-            Further places at which a step of the unloading branch ends.
+            Further values at which a step of the unloading branch ends.
         progress : callable, optional
             See :data:`adhesis.solver.loading.loop.Progress`.
         on_state : callable, optional
@@ -128,13 +128,12 @@ class LoadingBranch:
         Returns
         -------
         LoopResult
-            ``load_steps`` counts those of its own loading branch, and ``seconds`` holds that branch
-            up to the turning point and the unloading from there.
+            As in :func:`run_loops`.
 
         Raises
         ------
         ValueError
-            If that is none of its turning points, or one that it has passed.
+            If ``turn`` is not one of its turning points, or is already passed.
         PathError
             As in :func:`adhesis.solver.loading.loop.run_loop`.
         """
@@ -161,16 +160,16 @@ def run_loops(
     load_steps: int,
     progress: Progress | bool | None = None,
 ) -> tuple[LoopResult, ...]:
-    """Run loops that share one loading branch, followed once and left at every turning point.
+    """Run loops that share one loading branch, which is followed once.
 
     Parameters
     ----------
     method : Method
     max_penetration, max_stress : sequence of float, shape (loops,)
-        The turning points, different ones: Δ/h_max or u_tot/h_max, or Pa under a load. Any iterable
-        of numbers will do.
+        The turning points, all different: Δ/h_max or u_tot/h_max, or Pa under a load. May be any
+        iterable of numbers.
     load_steps : int
-        Equal steps up to the largest turning point; every unloading branch goes on with that step.
+        Equal steps up to the largest turning point; unloading branches use the same step.
     progress : callable or bool, optional
         True shows a bar, in a terminal or notebook; a function is called as
         :data:`adhesis.solver.loading.loop.Progress` says.
@@ -178,9 +177,8 @@ def run_loops(
     Returns
     -------
     tuple of LoopResult
-        One a turning point, in the order in which they were given. ``load_steps`` counts those of
-        its own loading branch, and ``seconds`` holds that branch up to the turning point and the
-        unloading from there.
+        One per turning point, in the given order. ``load_steps`` counts those of the loop's part of
+        the loading branch, ``seconds`` the CPU time of that part and of unloading.
 
     Raises
     ------
@@ -188,7 +186,7 @@ def run_loops(
         If a cycle cannot be run (:func:`adhesis.solver.loading.loop.check_cycle`), or a turning
         point is given twice, or none.
     TypeError
-        If the method is no Method, or a value no number.
+        If the method is not a Method, or a value not a number.
     PathError
         As in :func:`adhesis.solver.loading.loop.run_loop`.
 

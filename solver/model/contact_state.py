@@ -1,4 +1,4 @@
-"""Equilibrium contact states, as every method hands them out."""
+"""Equilibrium contact states, as returned by every method."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class ContactState(ByValue):
     contact_fraction : float
         A/A0.
     stiffness : float
-        dp̄/ds along the branch in Pa/m where the method knows it, else NaN; under another control
-        than a fixed separation dY/dx (:mod:`adhesis.solver.model.control`).
+        dp̄/ds along the branch in Pa/m, or dY/dx if another quantity than the separation is
+        prescribed (:mod:`adhesis.solver.model.control`); NaN if the method does not compute it.
     hold_energy : float
-        What the control adds to U, in J/m per period; 0 at fixed separation.
+        Contribution of the control to the potential, in J/m per period; 0 at fixed separation.
     internal : object
-        What the method needs to go on from here; nobody else reads it.
+        Private data from which the method continues the path.
 
     References
     ----------
@@ -63,8 +63,5 @@ class ContactState(ByValue):
 
     @property
     def potential(self) -> float:
-        """Potential in J/m that is minimal under the control; U at fixed separation.
-
-        It is W of :mod:`adhesis.solver.model.control`.
-        """
+        """Potential W of :mod:`adhesis.solver.model.control` in J/m; U at fixed separation."""
         return self.energy + self.hold_energy

@@ -1,10 +1,9 @@
-"""What holds the half-space from afar: a fixed separation, a stiffness, or a load.
+"""Control of the far side of the half-space: fixed separation, stiffness, or load.
 
-The far side of the solid is displaced by u_tot = Δ + p̄/k (the paper's u_tot = Δ + u_m), k the
-stiffness per nominal area of all that lies between: the machine, the layer. k → ∞ fixes the
-penetration Δ = h_max - s, k = 0 the mean stress p̄. An equilibrium state is a local minimum, over
-the edges and Δ, of the potential W, and a path is one of the prescribed quantity x, which falls
-while the solid is loaded:
+The far side of the solid is displaced by u_tot = Δ + p̄/k (the paper's u_tot = Δ + u_m), with k the
+stiffness per nominal area of the machine and the layer in between. k → ∞ fixes the penetration
+Δ = h_max - s, k = 0 the mean stress p̄. An equilibrium state is a local minimum, over the edges and
+Δ, of the potential W. A path is driven by the prescribed value x, which falls during loading:
 
 =============  =====================  ==============  ======================
 control        prescribed x           conjugate Y     potential W
@@ -16,8 +15,9 @@ load           -p̄                     s - h_max = -Δ  U - λ p̄ Δ
 
 At equilibrium dW/dx = -λ Y, so over a closed loop the loss is -∮ Y dx (which is ∮ p̄ dΔ), and it is
 the sum of the drops of W at the jumps, which happen at fixed x. Under a load the solid falls off
-once contact is lost, and its work from there on has no bound; the loop is closed at the separation
-of the loss, where the drop is U. That may be negative: it is what the load has still to bring up.
+once contact is lost, and the work of the load from there on is unbounded; the loop is therefore
+closed at the separation at which contact is lost, where the drop is U. U may be negative: it is
+then the work that the load has yet to do.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Value = TypeVar("Value", float, Array)
 
 @dataclass(frozen=True)
 class Control:
-    """What is prescribed on a path.
+    """Choice of the prescribed value of a path.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Control:
     ValueError
         If the stiffness is negative or NaN.
     TypeError
-        If it is no number.
+        If it is not a number.
 
     References
     ----------
@@ -60,16 +60,16 @@ class Control:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the separation itself is prescribed."""
+        """True if the separation itself is prescribed."""
         return math.isinf(self.stiffness)
 
     @property
     def is_load(self) -> bool:
-        """Whether the mean stress is prescribed."""
+        """True if the mean stress is prescribed."""
         return self.stiffness == 0
 
     def prescribed(self, separation: Value, mean_stress: Value) -> Value:
-        """Return x of states at s (m) with p̄ (Pa): in m, for a load in Pa."""
+        """Compute the prescribed value x from s (m) and p̄ (Pa): in m, for a load in Pa."""
         if self.is_fixed:
             return separation
         if self.is_load:
@@ -77,13 +77,13 @@ class Control:
         return separation - mean_stress / self.stiffness
 
     def conjugate(self, separation: Value, mean_stress: Value, h_max: float) -> Value:
-        """Return Y of states at s (m) with p̄ (Pa): in Pa, for a load in m."""
+        """Compute the conjugate Y from s (m) and p̄ (Pa): in Pa, for a load in m."""
         return separation - h_max if self.is_load else mean_stress
 
     def potential(
         self, energy: float, separation: float, mean_stress: float, h_max: float, period: float
     ) -> float:
-        """Return W in J/m, per period, of a state with the energy U in J/m."""
+        """Compute W of one period, in J/m, from the energy U in J/m."""
         if self.is_fixed:
             return energy
         if self.is_load:
@@ -91,7 +91,7 @@ class Control:
         return energy + period * mean_stress**2 / (2 * self.stiffness)
 
     def displacement(self, separation: Value, mean_stress: Value, h_max: float) -> Value:
-        """Return u_tot = Δ + p̄/k in m; for a load, which has no far side, Δ."""
+        """Compute u_tot = Δ + p̄/k in m; Δ for a load, which prescribes no displacement."""
         if self.is_fixed or self.is_load:
             return h_max - separation
         return h_max - separation + mean_stress / self.stiffness

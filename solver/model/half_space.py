@@ -23,7 +23,7 @@ class HalfSpace:
     ValueError
         If a value breaks the rules above.
     TypeError
-        If a value is no number.
+        If a value is not a number.
 
     References
     ----------
@@ -43,10 +43,10 @@ class HalfSpace:
         return self.young / (1 - self.poisson**2)
 
     def layer_stiffness(self, thickness: float) -> float:
-        """Stiffness k = E(1-ν)/((1+ν)(1-2ν)d) in Pa/m of a layer that cannot spread sideways.
+        """Compute the stiffness k = E(1-ν)/((1+ν)(1-2ν)d) in Pa/m of a layer on a rigid backing.
 
-        That is what lies between the contact and a rigid backing at the distance d, much larger
-        than the waves of the profile (constrained compression; Johnson, Contact Mechanics, 5.8).
+        The layer cannot spread sideways, and its thickness d is much larger than the waves of the
+        profile (constrained compression; Johnson, Contact Mechanics, 5.8).
 
         Parameters
         ----------

@@ -1,17 +1,17 @@
-"""Jumps: where a contact state loses its stability, and what happens to its patches.
+"""Jumps between contact states after a loss of stability, and their kinds.
 
-The kinds, in the order in which one that fits is chosen (a jump may run through several events):
+The first kind that applies is assigned (a jump may run through several events):
 
 ``pull-off``    the last contact is lost.
 ``snap-in``     a patch appears where there was none.
 ``merging``     two or more patches become one.
 ``vanishing``   a patch is lost while others stay.
 ``splitting``   a patch becomes two.
-``spreading``   edges run outwards, the patches stay the same ones.
-``receding``    edges run inwards, the patches stay the same ones.
+``spreading``   edges advance, the patches stay the same.
+``receding``    edges recede, the patches stay the same.
 
-Spreading and receding are the small-scale mechanism (an edge runs inside one patch, over the
-roughness under it); the others are the large-scale mechanism (patches come and go).
+Spreading and receding are the small-scale mechanism (an edge moves over the roughness of one
+patch); the others are the large-scale mechanism (patches form, merge, split and vanish).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
 
 @dataclass(frozen=True)
 class Jump:
-    """One jump, at fixed separation (or what else is prescribed).
+    """One jump, at a fixed prescribed value.
 
     Attributes
     ----------
@@ -47,21 +47,21 @@ class Jump:
     separation : float
         s at which stability is lost, in m.
     energy_drop : float
-        U before minus U after (the potential W, where the separation is not fixed), per unit
-        nominal area, in J/m². Negative by no more than the energies' error, which then counts in
-        the error of the loss; but for the loss of contact under a load, where it is U before
+        U before minus U after (the potential W if the separation is not fixed), per unit nominal
+        area, in J/m². Negative by at most the error of the energies, which then counts in the error
+        of the loss. At the loss of contact under a load it is U before, of either sign
         (:mod:`adhesis.solver.model.control`).
     kind : JumpKind
     patches_before, patches_after : int
     contact_before, contact_after : float
         Contact fractions.
     patch_length : float
-        Length in m of the largest patch that the jump changed, on the side where it is larger.
+        Length in m of the largest patch that the jump changed, before or after it.
     raced : bool
-        Whether several edges ran and another rule of descent would have ended elsewhere.
+        True if the end state depends on the assumed edge kinetics.
     at_stake : float
-        |U_other - U_after| per unit nominal area, in J/m²: how far the energy of the minimum that
-        the other rule reaches lies from that of this one; 0 unless ``raced``.
+        |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
+        under the other assumed edge kinetics; 0 unless ``raced``.
 
     References
     ----------
@@ -91,7 +91,7 @@ class Jump:
         raced: bool = False,
         at_stake: float = 0.0,
     ) -> Jump:
-        """Jump from one contact state to another, what is prescribed being the same.
+        """Make the jump from one contact state to another at the same prescribed value.
 
         Parameters
         ----------
@@ -119,12 +119,12 @@ class Jump:
 
     @property
     def small_scale(self) -> bool:
-        """Whether edges only ran inside existing patches."""
+        """True if the patches stay the same and only their edges move."""
         return self.kind in SMALL_SCALE
 
 
 def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, float]:
-    """Kind of a jump, and the length of the largest patch that it changed.
+    """Classify a jump; returns its kind and the length (m) of the largest patch that it changed.
 
     Parameters
     ----------
@@ -157,9 +157,9 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
 
 
 def _overlapping(patches: Array, others: Array, period: float) -> tuple[Indices, Indices]:
-    """How many of ``others`` share a point with each patch on the circle, and the first of them.
+    """Count, for each patch, the ``others`` that overlap it on the circle; returns the first too.
 
-    Patches of one state do not overlap, so their left and their right edges come in one order.
+    Patches of one state do not overlap, so their left and right edges have the same order.
     """
     if len(others) == 0:
         return np.zeros(len(patches), dtype=np.int64), np.zeros(len(patches), dtype=np.int64)
@@ -173,7 +173,7 @@ def _overlapping(patches: Array, others: Array, period: float) -> tuple[Indices,
 
 
 def _same(one: Array, two: Array, period: float) -> NDArray[np.bool_]:
-    """Whether patches have the same edges on the circle as others."""
+    """Compare the edges of patches on the circle."""
     offset = (one[:, 0] - two[:, 0] + period / 2) % period - period / 2
     change = (one[:, 1] - one[:, 0]) - (two[:, 1] - two[:, 0])
     same: NDArray[np.bool_] = np.maximum(np.abs(offset), np.abs(change)) < 1e-12 * period

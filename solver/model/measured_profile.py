@@ -1,7 +1,7 @@
-"""From the heights of a trace to one period of a profile: form, continuation, band, spectrum.
+"""Convert a measured trace to one period of a profile: form, continuation, band, spectrum.
 
-A trace is a row of equally spaced heights that is no period of anything; these are the steps that
-make one of it, each a function of its own, in SI units. Reading and choosing is not done here.
+A trace is a row of equally spaced heights, not periodic. Each step of the conversion is one
+function, in SI units. Reading the file and choosing the steps is left to the caller.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from adhesis.solver.values import ByValue
 Continuation = Literal["taper", "blend", "mirror"]
 CONTINUATIONS: tuple[Continuation, ...] = get_args(Continuation)
 
-# Bands of the averaged spectrum: so many to a factor of two in wavelength.
+# Bands of the averaged spectrum per factor of two in wavelength.
 _BANDS_PER_OCTAVE = 4
 
-# Half as high a spectrum in the last quarter of the band as in the one before is roughness (its
-# power falls at least as 1/q: 0.7); equal heights are white noise.
+# Least ratio of the mean power in the last quarter of the band to the quarter before that counts as
+# white noise (ratio 1). The power of roughness falls at least as 1/q (ratio at most 0.7).
 _FLAT = 0.8
 
 
 def polynomial_form(heights: Array, degree: int) -> Array:
-    """Least-squares polynomial of the given degree through the heights, shape (n,), in m.
+    """Fit the least-squares polynomial of the given degree to the heights, shape (n,), in m.
 
-    Degree 0 is the mean, 1 the tilt, 2 a bow: what of the shape is no roughness.
+    It is the form, not the roughness: degree 0 is the mean, 1 the tilt, 2 a bow.
 
     Raises
     ------
     ValueError
-        If the degree is negative, or the heights are too few to leave anything.
+        If the degree is negative, or too high for the number of heights.
     """
     if degree < 0 or degree + 2 > heights.size:
         raise ValueError(f"degree is {degree}: it must lie between 0 and {heights.size - 2}")
-    place = np.linspace(-1.0, 1.0, heights.size)
-    series = legendre.legfit(place, heights, degree)
-    return np.asarray(legendre.legval(place, series))
+    x = np.linspace(-1.0, 1.0, heights.size)
+    series = legendre.legfit(x, heights, degree)
+    return np.asarray(legendre.legval(x, series))
 
 
 def form_shares(heights: Array, most: int = 12) -> Array:
-    """Mean square height of each Legendre polynomial of degree 0 … most in a trace, in m².
+    """Compute the mean square height in m² of each Legendre polynomial of degree 0 … most.
 
-    The parts are those of the least-squares fit of them all; a form (tilt, bow) stands out in its
-    degree, roughness is spread over the high ones.
+    The coefficients are those of one least-squares fit; a form (tilt, bow) stands out at its
+    degree, roughness is spread over the high degrees.
     """
     degree = min(most, heights.size - 2)
     series = legendre.legfit(np.linspace(-1.0, 1.0, heights.size), heights, degree)
@@ -57,7 +57,7 @@ def form_shares(heights: Array, most: int = 12) -> Array:
 def one_period(
     heights: Array, step: float, continuation: Continuation, part: float = 0.05
 ) -> tuple[Array, float]:
-    """One period of heights made of a level trace, and its length in m.
+    """Make one period of heights from a level trace; returns it and its length in m.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ def one_period(
         In m.
     continuation : {"taper", "blend", "mirror"}
         ``taper``: both ends fade to the mean over ``part`` of the length (Tukey's window), period
-        n steps. ``blend``: the last ``part`` of the trace fades out over the first one, which fades
-        in, with weights whose squares add up to one, so that the mean square height stays; period
+        n steps. ``blend``: the last ``part`` of the trace is cross-faded with the first one, with
+        weights whose squares add up to one, which preserves the mean square height; period
         (1 - part) n steps. ``mirror``: the trace and its mirror image, period 2 (n - 1) steps.
     part : float
-        Share of the length that is changed, 0 < part < 0.5.
+        Changed share of the length, 0 < part < 0.5.
 
     Raises
     ------
@@ -100,12 +100,12 @@ def one_period(
 
 
 def band_limited(heights: Array, period: float, shortest: float) -> Profile:
-    """Profile with the waves of one period of heights that are no shorter than ``shortest`` (m).
+    """Make the profile with the waves of one period of heights not shorter than ``shortest`` (m).
 
     Raises
     ------
     ValueError
-        If the heights are too few to hold a wave so short, or so short a period holds no wave.
+        If the heights are too few for the shortest wave, or the period is shorter than it.
     """
     highest = int(period / shortest * (1 + 1e-9))
     if highest < 1:
@@ -133,9 +133,9 @@ class TraceSpectrum(ByValue):
     power : array, shape (k,)
         C(q) in m³, both signs of q: (1/2π) ∫ C dq over all q is the mean square height.
     floor : float
-        C of white noise in m³; 0 where the spectrum still falls at its end.
+        C of white noise in m³; 0 if the spectrum still falls at its end.
     noise : float
-        Root mean square of that noise in m, over all of the band that the step holds.
+        Root mean square of that noise in m, up to the Nyquist wave number.
     """
 
     wave_number: Array
@@ -144,7 +144,7 @@ class TraceSpectrum(ByValue):
     noise: float
 
     def curvature(self, shortest: Array) -> Array:
-        """Root mean square curvature (1/m) of the waves no shorter than each wavelength (m)."""
+        """Compute the rms curvature (1/m) of the waves not shorter than each wavelength (m)."""
         q = self.wave_number
         power = np.maximum(self.power - self.floor, 0.0) * q**4
         within = np.concatenate([[0.0], np.cumsum(np.diff(q) * (power[1:] + power[:-1]) / 2)])
@@ -152,7 +152,7 @@ class TraceSpectrum(ByValue):
 
 
 def trace_spectrum(heights: Array, step: float) -> TraceSpectrum:
-    """Spectrum of a level trace, with Hann's window against its ends (both in m)."""
+    """Compute the spectrum of a level trace with Hann's window; heights and step in m."""
     n = heights.size
     window = np.hanning(n + 2)[1:-1]
     window /= np.sqrt(np.mean(window**2))
@@ -160,7 +160,7 @@ def trace_spectrum(heights: Array, step: float) -> TraceSpectrum:
     q = 2 * np.pi * np.fft.rfftfreq(n, step)
     floor = _white_floor(power)
     number = np.arange(1, q.size)
-    # One band a wave at the long end, where there are few; then equal ratios.
+    # One band per wave at long wavelengths, where there are few; then bands of equal ratio.
     band = np.where(
         number < 2 * _BANDS_PER_OCTAVE, number, np.floor(_BANDS_PER_OCTAVE * np.log2(number)) + 1e6
     )
@@ -171,23 +171,24 @@ def trace_spectrum(heights: Array, step: float) -> TraceSpectrum:
 
 
 def _white_floor(power: Array) -> float:
-    """Power that the last half of the band levels out at; 0 if it does not."""
+    """Compute the power at which the last half of the band levels off; 0 if it does not."""
     half, last = power.size // 2, 3 * power.size // 4
     if power.size < 32:
         return 0.0
     before, after = float(power[half:last].mean()), float(power[last:-1].mean())
-    scatter = 2 * np.sqrt(2 / (power.size - last))  # of their ratio; to err here costs nothing:
-    # roughness taken for noise is cut off where the step cuts it off anyway.
+    # Statistical scatter of the ratio. Roughness mistaken for noise has no consequence: the step
+    # cuts it off at the same wavelength.
+    scatter = 2 * np.sqrt(2 / (power.size - last))
     return min(before, after) if after > (_FLAT - scatter) * before else 0.0
 
 
 def trusted_wavelength(spectrum: TraceSpectrum, step: float, tip_radius: float) -> dict[str, float]:
-    """Shortest wavelengths that a trace can be trusted with, in m, by what limits them.
+    """Compute the shortest reliable wavelength of a trace in m, for each limiting effect.
 
-    ``step``: five heights a wave. ``noise``: beyond the last band whose power is more than four
-    times that of the white noise. ``tip``: where the root mean square curvature of the waves kept
-    reaches 1/(2R): a tip of radius R (m; 0 for none) does not follow sharper ones (Sanner et al.,
-    Appl. Surf. Sci. Adv. 7, 100190, 2022). A limit that does not apply is 0.
+    ``step``: five heights per wave. ``noise``: the end of the last band whose power exceeds four
+    times that of the white noise. ``tip``: the wavelength at which the rms curvature of the kept
+    waves reaches 1/(2R), as a tip of radius R (m; 0 for none) does not follow sharper ones (Sanner
+    et al., Appl. Surf. Sci. Adv. 7, 100190, 2022). A limit that does not apply is 0.
     """
     limits = {"step": 5 * step, "noise": 0.0, "tip": 0.0}
     q = spectrum.wave_number

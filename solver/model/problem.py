@@ -1,4 +1,4 @@
-"""The scene of one loop: a rough rigid profile, an elastic half-space, a work of adhesion."""
+"""Contact problem: a rough rigid profile, an elastic half-space, a work of adhesion, a control."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
 
-# Rounding of a separation over h_max: a penetration that is smaller is 0.
 Value = TypeVar("Value", float, Array)
 
+# Rounding of a separation over h_max: smaller penetrations count as 0.
 _ROUNDING = 8 * float(np.finfo(float).eps)
 
 
 def stress_scale(half_space: HalfSpace, period: float, h_max: Any) -> Any:
-    """E* q0 h_max / 2 in Pa for h_max in m (a number or an array): p̄ is σ~ times this."""
+    """Compute E* q0 h_max / 2 in Pa for h_max in m (a number or an array): p̄ is σ~ times this."""
     return 0.5 * half_space.modulus * (2 * np.pi / period) * h_max
 
 
 def check_slope(rms_slope: float) -> None:
-    """Refuse a profile so steep or so shallow that its heights and period have not one unit.
+    """Refuse an rms slope so large or small that heights and period must have different units.
 
     Raises
     ------
@@ -52,15 +52,15 @@ class Problem(ByValue):
     work_of_adhesion : float
         γ in J/m², 0 (contact without adhesion) or from 1e-30 to 1e30.
     control : Control
-        What holds the half-space; a fixed separation by default.
+        Prescribed quantity; the separation by default.
 
     Raises
     ------
     ValueError
-        If γ breaks the rule, or the rms slope is one that no small-strain theory covers: heights
-        and period are not in one unit then.
+        If γ is out of bounds, or the rms slope far beyond small strain, as it is when heights and
+        period have different units.
     TypeError
-        If a part is of another class, or γ no number.
+        If a part is of another class, or γ not a number.
 
     References
     ----------
@@ -82,7 +82,7 @@ class Problem(ByValue):
 
     @property
     def stress_scale(self) -> float:
-        """E* q0 h_max / 2 in Pa: the mean stress is σ~ times this (the paper's σ~)."""
+        """E* q0 h_max / 2 in Pa: the mean stress is the paper's σ~ times this."""
         return float(stress_scale(self.half_space, self.profile.period, self.profile.h_max))
 
     @property
@@ -94,16 +94,16 @@ class Problem(ByValue):
     def full_contact_energy(self) -> float:
         """Elastic energy of full contact, (E*/4) Σ |q||h_q|² in J/m² of nominal area.
 
-        Where γ exceeds it by far, contact runs to full contact by itself.
+        For much larger γ contact runs into full contact spontaneously.
         """
         return 0.25 * self.half_space.modulus * self.profile.moment(1)
 
     def separation(self, penetration: float) -> float:
-        """Separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""
+        """Compute the separation s = h_max (1 - Δ~) in m at the penetration Δ~ = Δ/h_max."""
         return self.profile.h_max * (1.0 - penetration)
 
     def prescribed(self, drive: float) -> float:
-        """Return the prescribed value x of the control where a path is at ``drive``.
+        """Compute the prescribed value x of the control from its value in the units of a loop.
 
         Parameters
         ----------
@@ -113,21 +113,20 @@ class Problem(ByValue):
         return -drive if self.control.is_load else self.separation(drive)
 
     def prescribed_in(self, state: ContactState) -> float:
-        """Return the prescribed value x of the control in a state: in m, for a load in Pa."""
+        """Compute the prescribed value x of the control in a state: in m, for a load in Pa."""
         return self.control.prescribed(state.separation, state.mean_stress)
 
     def full_contact(self, prescribed: float) -> str:
-        """One sentence for a contact that runs into full contact on the way to x = prescribed."""
+        """Return the message for a contact that runs into full contact before x = prescribed."""
         first = self.control.prescribed(self.profile.h_max, 0.0)
         where = f"before {self.place(prescribed)}" if prescribed < first else "at first touch"
         return (
-            f"the contact runs into full contact {where}: no state with a gap carries that; a "
-            "fixed separation, or a larger stiffness, leaves a gap, and so may a smaller turning "
-            "point or work_of_adhesion"
+            f"the contact runs into full contact {where}: there is no state with a gap; prescribe "
+            "the separation or a larger stiffness, or reduce the turning point or work_of_adhesion"
         )
 
     def place(self, prescribed: float) -> str:
-        """Where a path is at x = prescribed, in the units of its turning points and in m."""
+        """Format x = prescribed for a message, in the units of the turning points and in m."""
         if self.control.is_load:
             return f"a mean stress of {0.0 - prescribed:g} Pa"
         penetration = self.penetration(prescribed)
@@ -137,7 +136,7 @@ class Problem(ByValue):
         return f"u_tot/h_max = {penetration:.6g} (u_tot = {u_tot:.6g} m)"
 
     def penetration(self, separation: Value) -> Value:
-        """Penetration Δ~ = 1 - s/h_max at separations s in m; 0 where it is only rounding."""
+        """Compute the penetration Δ~ = 1 - s/h_max at separations s in m; 0 within rounding."""
         found = 1.0 - separation / self.profile.h_max
         if isinstance(found, np.ndarray):
             return np.where(np.abs(found) < _ROUNDING, 0.0, found)

@@ -1,10 +1,10 @@
-"""Rough periodic profiles: the spectral method, given heights, and their statistics.
+"""Rough periodic profiles: generation by the spectral method or from heights, and statistics.
 
 A profile is a band-limited real function of period λ, held as its Fourier coefficients
 
     h(x) = Σ_m a_m exp(i m q0 x),   q0 = 2π/λ,   a_-m = conj(a_m),   a_0 = 0,
 
-so that it is the same function on every grid: a finer grid adds nodes, never roughness.
+so that it is the same function on every grid: a finer grid adds nodes, not roughness.
 Lengths in m.
 """
 
@@ -53,7 +53,7 @@ _CREST_SAMPLING = 16
 _CREST_SWEEPS = 60
 
 NORMALISATIONS = {"h_rms": HEIGHT, "m2": MEAN_SQUARE_SLOPE, "c0": HEIGHT_SQUARE}
-"""How a self-affine spectrum may be scaled, each with its bounds."""
+"""Parameters that scale a self-affine spectrum, with their bounds."""
 
 EQUAL_CRESTS = 1e-9
 """Crests whose heights differ by less than this share of h_max are equal: they touch together."""
@@ -88,7 +88,7 @@ class Profile(ByValue):
         λ, in m, from 1e-12 to 1e6.
     coefficients : complex array, shape (M + 1,)
         a_0 … a_M in m; ``coefficients[m]`` belongs to the wave number m q0. a_0 must be zero, and
-        another one must not.
+        at least one other non-zero.
 
     Raises
     ------
@@ -96,7 +96,7 @@ class Profile(ByValue):
         If the period is out of its bounds, a coefficient is masked or not finite, or a_0 is not 0;
         or the profile is flat: a loop needs a highest point.
     TypeError
-        If the period is no number, or the coefficients are no row of numbers.
+        If the period is not a number, or the coefficients are not a row of numbers.
 
     References
     ----------
@@ -133,7 +133,7 @@ class Profile(ByValue):
         super().__post_init__()
 
     def __repr__(self) -> str:
-        """One line: period, waves, heights and slope."""
+        """Return one line with period, waves, heights and slope."""
         return (
             f"Profile(period={self.period:.6g} m, {len(self.coefficients)} coefficients, highest "
             f"harmonic {self.highest_harmonic}, h_rms={self.h_rms:.6g} m, "
@@ -160,27 +160,27 @@ class Profile(ByValue):
     # ------------------------------------------------------------------ values
 
     def heights(self, n: int) -> Array:
-        """Heights h at x_j = j λ/n, shape (n,), in m.
+        """Compute the heights h at x_j = j λ/n, shape (n,), in m.
 
         Raises
         ------
         ValueError
-            If the grid cannot carry the shortest wave (n must exceed twice the highest harmonic).
+            If n does not exceed twice the highest harmonic.
         TypeError
-            If n is no number.
+            If n is not a number.
         """
         return self._sample(self.coefficients, n)
 
     def slopes(self, n: int) -> Array:
-        """Slopes h' at x_j = j λ/n, shape (n,), dimensionless."""
+        """Compute the slopes h' at x_j = j λ/n, shape (n,), dimensionless."""
         return self._sample(self.coefficients * self._iq(1), n)
 
     def curvatures(self, n: int) -> Array:
-        """Second derivative h'' at x_j = j λ/n, shape (n,), in 1/m."""
+        """Compute the second derivative h'' at x_j = j λ/n, shape (n,), in 1/m."""
         return self._sample(self.coefficients * self._iq(2), n)
 
     def at(self, x: Array | float, derivative: int = 0) -> Array:
-        """Height (or its derivative of the given order) at any x in m, exactly; cost M per point.
+        """Evaluate the height (or a derivative) exactly at any x in m; O(M) operations per point.
 
         Returns an array of the shape of ``x``, in m^(1 - derivative).
         """
@@ -212,7 +212,7 @@ class Profile(ByValue):
     # ------------------------------------------------------------------ statistics
 
     def moment(self, order: int) -> float:
-        """Spectral moment m_k = Σ_m (m q0)^k |a_m|² over both signs of m, in m^(2-k).
+        """Compute the spectral moment m_k = Σ_m (m q0)^k |a_m|² over both signs of m, in m^(2-k).
 
         m0 is the mean square height, m2 the mean square slope, m4 the mean square curvature
         (Nayak 1971).
@@ -242,9 +242,9 @@ class Profile(ByValue):
         return float(np.sqrt(self.m0))
 
     def crests(self, within: float = EQUAL_CRESTS) -> Crests:
-        """Crests of the continuous function whose height is at least (1 - within) h_max.
+        """Find the crests of the continuous function not lower than (1 - within) h_max.
 
-        Found between nodes by Newton's iteration, so they depend on no grid.
+        Newton's iteration locates them between nodes, independently of any grid.
 
         Parameters
         ----------
@@ -264,7 +264,7 @@ class Profile(ByValue):
             second = self.at(x, 2)
             step = np.where(second < 0, self.at(x, 1) / np.where(second < 0, second, -1.0), 0.0)
             x = x - np.clip(step, -dx, dx)
-            # a crest without curvature is approached by a third a step
+            # convergence is only linear, with ratio 2/3, to a crest without curvature
             if sweep >= 7 and np.abs(step).max() < 1e-9 * dx:
                 break
         top = self.at(x)
@@ -314,11 +314,11 @@ def self_affine_profile(
     c0: float | None = None,
     amplitudes: Amplitudes = "deterministic",
 ) -> Profile:
-    """Self-affine profile by the spectral method (Carbone, Pierro & Recchia, arXiv 1511.08891).
+    """Generate a self-affine profile by the spectral method (Carbone et al., arXiv 1511.08891).
 
     |a_m|² ∝ m^-(2H+1) for n0 ≤ m ≤ ratio·n0, phases uniform on [-π, π). The phase of wave number m
-    is the m-th number of the seed's stream, so it depends on neither n0, ratio, H nor the
-    normalisation: a wider spectrum keeps the waves it already had.
+    is the m-th number of the seed's stream, so it does not depend on n0, ratio, H or the
+    normalisation: a wider spectrum keeps the phases of the narrower one.
 
     Parameters
     ----------
@@ -338,14 +338,14 @@ def self_affine_profile(
         positive.
     amplitudes : {"deterministic", "rayleigh"}
         |a_m| fixed by the power law as in the paper, or Rayleigh distributed about it (a Gaussian
-        process); in the latter case h_rms or m2 still hold exactly for every realisation.
+        process); h_rms or m2 then still hold exactly for every realisation.
 
     Raises
     ------
     ValueError
-        If a value breaks the rules above; the text names the value and the rule.
+        If a value breaks the rules above.
     TypeError
-        If a value is no number.
+        If a value is not a number.
 
     References
     ----------
@@ -384,7 +384,7 @@ def self_affine_profile(
 
 
 def profile_from_heights(heights: Array, period: float) -> Profile:
-    """Band-limited profile through equally spaced heights of one period; the mean is removed.
+    """Interpolate equally spaced heights of one period by a band-limited profile of zero mean.
 
     Parameters
     ----------
@@ -396,7 +396,7 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
     Notes
     -----
     For even n the component at the Nyquist wave number has no phase; it is split evenly between
-    both signs, so that the profile passes through every height.
+    both signs, so that the profile passes through all heights.
 
     Raises
     ------
@@ -404,7 +404,7 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
         If the heights are not one row of at least 3 finite numbers, one of them is masked, or all
         are equal.
     TypeError
-        If they are no real numbers (booleans are none).
+        If they are not real numbers (booleans are not).
 
     References
     ----------
@@ -415,7 +415,7 @@ def profile_from_heights(heights: Array, period: float) -> Profile:
         raise ValueError(f"heights hold {h.size} value(s): at least 3 are needed for one period")
     real("largest height", float(np.abs(h).max()), _HEIGHT_OR_NONE)
     a = np.fft.rfft(h - h.mean()) / h.size
-    # Rounding noise is not roughness: a flat or a band-limited input must stay one.
+    # Rounding noise is set to 0, so that a flat or band-limited input remains so.
     a[np.abs(a) < 1e-15 * max(float(np.max(np.abs(h))), 1e-300)] = 0
     a[0] = 0
     if h.size % 2 == 0:

@@ -1,9 +1,8 @@
-"""The single wave as a method: Johnson's closed form behind the contract of a method.
+"""Johnson's closed form of the single wave as a method.
 
-An oracle. It runs the loading path and the audit (``loop``) with a
-solution that is exact to rounding, so whatever error is left belongs to them, and other methods can
-be held against it state by state. For a single wave only; the adhesive area is measured along the
-profile, as ``problem.Problem`` defines it.
+With this reference, exact to rounding, the errors of the loading path and the audit (``loop``) can
+be measured alone, and other methods compared state by state. The adhesive area is measured along
+the profile, as ``problem.Problem`` defines it.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from adhesis.solver.references.single_wave import SingleWave, WaveLoop
 
 @dataclass(frozen=True)
 class ExactWaveReport(MethodReport):
-    """The one setting."""
+    """Report with the only setting."""
 
     states_per_step: int
 
@@ -44,8 +43,8 @@ class ExactWave(Method):
     problem : Problem
         Its profile must be one wave over the whole period (harmonic 1 only).
     states_per_step : int
-        States that ``follow`` returns along the branch, evenly spaced in the contact half-width,
-        in which p̄ and s are smooth even at the fold.
+        Number of states that ``follow`` returns along the branch, evenly spaced in the contact
+        half-width, of which p̄ and s are smooth functions even at the fold.
 
     Raises
     ------
@@ -91,8 +90,8 @@ class ExactWave(Method):
                 return Path(tuple(states), tuple(jumps))
         a_from = state.internal or 0.0  # without adhesion contact grows from a point
         a_to = self._contact_width(prescribed)
-        way = np.linspace(a_from, a_to, self.states_per_step + 1)[1:]
-        states += [self._state(float(a)) for a in way[:-1]]
+        widths = np.linspace(a_from, a_to, self.states_per_step + 1)[1:]
+        states += [self._state(float(a)) for a in widths[:-1]]
         loop = self._loop
         end = control.prescribed(loop.fold_separation, loop.fold_mean_stress)
         if prescribed > end:
@@ -111,7 +110,7 @@ class ExactWave(Method):
         return Path(tuple(states), tuple(jumps))
 
     def fields(self, state: ContactState, n: int) -> Fields:
-        """Exact fields on n nodes; a node that falls on an edge has the stress 0."""
+        """Compute the exact fields on n nodes; the stress of a node on an edge is 0."""
         x = self.problem.profile.period * np.arange(n) / n
         height = self.problem.profile.at(x)
         if not state.patches:
@@ -122,16 +121,16 @@ class ExactWave(Method):
         return Fields(x, height, stress, gap + height - state.separation, gap)
 
     def openings(self, state: ContactState) -> list[Opening]:
-        """Opening of the only gap by the closed form."""
+        """Compute the opening of the only gap by the closed form."""
         if not state.patches:
             return []
         a, period = state.internal, self.problem.profile.period
         phi = np.linspace(0, np.pi, 2001)
-        place = period / 2 - (period / 2 - a) * np.cos(phi)
-        return [Opening(self.crest + place, self.wave.gap(place, a))]
+        x = period / 2 - (period / 2 - a) * np.cos(phi)
+        return [Opening(self.crest + x, self.wave.gap(x, a))]
 
     def report(self) -> ExactWaveReport:
-        """Return the only choice there is."""
+        """Return the only setting."""
         return ExactWaveReport(self.name, self.chosen, self.states_per_step)
 
     @cached_property
@@ -141,7 +140,7 @@ class ExactWave(Method):
         return self.wave.loop if control.is_fixed else self.wave.loop_under(control.stiffness)
 
     def _contact_width(self, prescribed: float) -> float:
-        """Half-width where x is ``prescribed``, or at the end of the branch beyond it.
+        """Compute the half-width at x = ``prescribed``, beyond the end of the branch that there.
 
         Raises
         ------
@@ -154,9 +153,9 @@ class ExactWave(Method):
             return self.wave.half_width(min(prescribed, end))
         if prescribed >= end:
             return loop.fold_half_width
-        drive = -prescribed if control.is_load else self.wave.amplitude - prescribed
+        value = -prescribed if control.is_load else self.wave.amplitude - prescribed
         try:
-            return self.wave.half_width_under(control.stiffness, drive)
+            return self.wave.half_width_under(control.stiffness, value)
         except ValueError:
             raise PathError(self.problem.full_contact(prescribed)) from None
 

@@ -19,7 +19,7 @@ from adhesis.solver.model.profile import Array, Profile
 
 
 def full_contact_stress(profile: Profile, modulus: float, x: ArrayLike) -> Array:
-    """σ(x) - p̄ in Pa at positions x in m; ``modulus`` is E* in Pa. Shape of ``x``."""
+    """Compute σ(x) - p̄ in Pa at positions x in m, shape of ``x``; ``modulus`` is E* in Pa."""
     m = np.flatnonzero(profile.coefficients)
     amplitude = modulus * m * profile.q0 * profile.coefficients[m]  # 2 · E*|q| a_m/2
     phase = np.multiply.outer(np.asarray(x, dtype=float) * profile.q0, m)
@@ -27,6 +27,6 @@ def full_contact_stress(profile: Profile, modulus: float, x: ArrayLike) -> Array
 
 
 def full_contact_energy(profile: Profile, modulus: float) -> float:
-    """Elastic energy per nominal area in J/m² at zero mean gap; ``modulus`` is E* in Pa."""
+    """Compute the elastic energy in J/m² of nominal area; ``modulus`` is E* in Pa."""
     m = np.arange(profile.coefficients.size)
     return float(0.5 * modulus * profile.q0 * np.sum(m * np.abs(profile.coefficients) ** 2))

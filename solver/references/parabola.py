@@ -21,7 +21,7 @@ from adhesis.solver.model.profile import Array
 
 
 def parabola_load(a: ArrayLike, radius: float, modulus: float, work_of_adhesion: float) -> Array:
-    """P in N/m of the equilibrium with half-width a in m.
+    """Compute P in N/m of the equilibrium with half-width a in m.
 
     ``radius`` is R in m, ``modulus`` is E* in Pa, ``work_of_adhesion`` is γ in J/m².
     """
@@ -30,19 +30,9 @@ def parabola_load(a: ArrayLike, radius: float, modulus: float, work_of_adhesion:
     return np.asarray(repulsion - np.sqrt(2 * np.pi * modulus * work_of_adhesion * a))
 
 
-def parabola_stress(
-    x: ArrayLike, a: float, radius: float, modulus: float, work_of_adhesion: float
-) -> Array:
-    """σ(x) in Pa of the equilibrium with half-width a in m; 0 off contact."""
-    inside = a**2 - np.asarray(x, dtype=float) ** 2
-    root = np.sqrt(np.where(inside > 0, inside, 1.0))
-    adhesion = np.sqrt(2 * modulus * work_of_adhesion * a / np.pi)
-    return np.where(inside > 0, modulus / (2 * radius) * root - adhesion / root, 0.0)
-
-
 def parabola_pull_off(
     radius: float, modulus: float, work_of_adhesion: float
 ) -> tuple[float, float]:
-    """Half-width in m and load in N/m (negative) at the least load."""
+    """Compute the half-width in m and the load in N/m (negative) at the least load."""
     a = (2 * radius**2 * work_of_adhesion / (np.pi * modulus)) ** (1 / 3)
     return float(a), float(-0.75 * (4 * np.pi * modulus * work_of_adhesion**2 * radius) ** (1 / 3))

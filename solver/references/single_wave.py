@@ -1,4 +1,4 @@
-"""One wave against a half-space: Westergaard without adhesion, Johnson with it.
+"""Contact of one wave with a half-space: Westergaard without adhesion, Johnson with adhesion.
 
 Rigid wave h = A cos(q0 x), q0 = 2π/λ, on an elastic half-space (plane strain, frictionless),
 contact |x| < a around the crest, periodic in λ. With ψ = πx/λ, y = sin²(πa/λ), p* = πE*A/λ:
@@ -10,25 +10,25 @@ contact |x| < a around the crest, periodic in λ. With ψ = πx/λ, y = sin²(π
     K     = p1 sqrt(λ cot(πa/λ))
     U_e   = λ A p* [y²/4 - (p̄/p*)² ln y / 2] = ½ ∫ σ (h - s) dx
 
-for any a and s; p1 is the mean tension of the flat periodic punch that is superposed. An
-equilibrium edge has K²/(2E*) = γ' with γ' = γ in the *flat measure* of the papers, so
+for any a and s; p1 is the mean tension of the superposed flat periodic punch. At equilibrium an
+edge has K²/(2E*) = γ' with γ' = γ in the *flat measure* of the papers, so
 p1 = sqrt(2E*γ tan(πa/λ)/λ), and p1/p* = α sqrt(tan(πa/λ)), α² = 2γλ/(π²E*A²).
 
 The solvers of this package measure the adhesive area along the profile instead,
 γ' = γ sqrt(1 + h'²) (the *arc measure*). It raises γ' by at most the factor 1 + (A q0)²/2, so with
 W ∝ γ^κ, κ = 1.25 to 1.27 in the range of α from 0.05 to 0.6, losses differ by less than
-0.7 (A q0)²; at A q0 = 1e-4 that is 7e-9. Both measures are offered here, both exact.
+0.7 (A q0)²; at A q0 = 1e-4 that is 7e-9. Both measures are implemented here, both exact.
 
-At fixed separation the loop has two jumps: at first touch (s = A) the contact runs from nothing to
+At fixed separation the loop has two jumps: at first touch (s = A) the contact grows from zero to
 the half-width a_in with s(a_in) = A; on unloading the branch ends where ds/da = 0, at s_out, and
 the contact is lost. Between them loading and unloading follow the same branch, so the loss does
-not depend on how far the contact was loaded.
+not depend on the largest penetration.
 
-Held by a stiffness k (Pa/m of nominal area) the path is one of u = Δ + p̄/k, Δ = A - s, and what is
-minimal is W = U + λ p̄²/(2k). First touch is at u = 0, the branch is stable where du/da > 0, and it
-ends twice: at u_out, where contact is lost, and at u_full, beyond which the wave runs into full
-contact (at fixed separation that end is s = 0). Under load control (k = 0) the same holds of p̄
-instead of u and U - λ p̄ Δ instead of W; contact that is lost leaves U behind: the load's own work
+With a stiffness k (Pa/m of nominal area) the prescribed value is u = Δ + p̄/k, Δ = A - s, and the
+potential is W = U + λ p̄²/(2k). First touch is at u = 0, the branch is stable where du/da > 0, and
+it has two ends: u_out, where contact is lost, and u_full, beyond which the wave runs into full
+contact (at fixed separation that end is s = 0). Under load control (k = 0) the same holds with p̄
+instead of u and U - λ p̄ Δ instead of W; the drop at the loss of contact is U: the work of the load
 afterwards is not counted.
 
 Sources: Westergaard, J. Appl. Mech. 6 (1939) 49; Johnson, Int. J. Solids Struct. 32 (1995) 423;
@@ -54,7 +54,7 @@ Measure = Literal["flat", "arc"]
 
 
 def _root(function: Callable[[float], Array], low: float, high: float) -> float:
-    """Zero of a function that changes sign between ``low`` and ``high``, to rounding."""
+    """Find the zero of a function that changes sign between ``low`` and ``high``, to rounding."""
     eps = float(np.finfo(float).eps)
     found = brentq(lambda a: float(function(a)), low, high, xtol=1e-300, rtol=4 * eps, maxiter=500)
     return float(found)
@@ -69,7 +69,7 @@ class WaveLoop:
     touch_half_width : float
         a_in in m, reached by the jump at first touch.
     fold_half_width, fold_separation, fold_mean_stress : float
-        Where the branch ends on unloading: a_out in m, s_out in m, p̄ in Pa just before the jump.
+        At the end of the branch on unloading: a_out in m, s_out in m, p̄ in Pa before the jump.
     touch_drop, fold_drop : float
         Energy drops of the two jumps, J/m² of nominal area.
     """
@@ -133,7 +133,7 @@ class SingleWave:
         modulus: float,
         measure: Measure = "flat",
     ) -> SingleWave:
-        """Return the wave whose γ gives Johnson's parameter α (see :attr:`alpha`)."""
+        """Make the wave with Johnson's parameter α (see :attr:`alpha`)."""
         gamma = (np.pi * alpha * amplitude) ** 2 * modulus / (2 * period)
         return cls(amplitude, period, modulus, float(gamma), measure)
 
@@ -163,7 +163,7 @@ class SingleWave:
     # ------------------------------------------------------------------ equilibrium branch
 
     def _angle(self, a: ArrayLike) -> tuple[Array, Array, Array]:
-        """ψ = πa/λ, y = sin²ψ, and ln y without cancellation at either end."""
+        """Compute ψ = πa/λ, y = sin²ψ, and ln y without cancellation at either end."""
         psi = np.pi * np.asarray(a, dtype=float) / self.period
         y = np.sin(psi) ** 2
         with np.errstate(divide="ignore"):
@@ -171,7 +171,7 @@ class SingleWave:
         return psi, y, log
 
     def adhesive_tension(self, a: ArrayLike) -> Array:
-        """p1(a) in Pa at equilibrium: the mean tension of the superposed flat punch."""
+        """Compute p1(a) in Pa at equilibrium, the mean tension of the superposed flat punch."""
         psi, _, _ = self._angle(a)
         p1 = self.full_contact_stress * self.alpha * np.sqrt(np.tan(psi))
         if self.measure == "arc":
@@ -179,24 +179,24 @@ class SingleWave:
         return np.asarray(p1)
 
     def mean_stress(self, a: ArrayLike) -> Array:
-        """p̄(a) in Pa at equilibrium, compression positive."""
+        """Compute p̄(a) in Pa at equilibrium, compression positive."""
         return np.asarray(self.full_contact_stress * self._angle(a)[1] - self.adhesive_tension(a))
 
     def separation(self, a: ArrayLike) -> Array:
-        """s(a) in m at equilibrium."""
+        """Compute s(a) in m at equilibrium."""
         _, y, log = self._angle(a)
         # At a = 0 the limit is s = A: p̄ ln y → 0.
         with np.errstate(invalid="ignore"):
-            bend = np.where(y > 0, self.mean_stress(a) / self.full_contact_stress * log, 0.0)
-        return np.asarray(self.amplitude * (1 - y + bend))
+            term = np.where(y > 0, self.mean_stress(a) / self.full_contact_stress * log, 0.0)
+        return np.asarray(self.amplitude * (1 - y + term))
 
     def stress_intensity(self, a: ArrayLike) -> Array:
-        """K(a) in Pa·sqrt(m) at equilibrium, so K²/(2E*) = γ' at the edge."""
+        """Compute K(a) in Pa·sqrt(m) at equilibrium: K²/(2E*) = γ' at the edge."""
         psi, _, _ = self._angle(a)
         return np.asarray(self.adhesive_tension(a) * np.sqrt(self.period / np.tan(psi)))
 
     def separation_slope(self, a: ArrayLike) -> Array:
-        """ds/da along the equilibrium branch; negative where it is stable at fixed s."""
+        """Compute ds/da along the equilibrium branch; negative where it is stable at fixed s."""
         psi, _, log = self._angle(a)
         p = self.adhesive_tension(a) / self.full_contact_stress
         dy = np.sin(2 * psi)
@@ -210,25 +210,25 @@ class SingleWave:
     # ------------------------------------------------------------------ any a at any s
 
     def mean_stress_at(self, a: ArrayLike, s: ArrayLike) -> Array:
-        """p̄ in Pa of the elastic solution with half-width a held at separation s."""
+        """Compute p̄ in Pa of the elastic solution with half-width a at separation s."""
         _, y, log = self._angle(a)
         ratio = np.asarray(s, dtype=float) / self.amplitude - 1 + y
         return np.asarray(self.full_contact_stress * ratio / log)
 
     def stress_intensity_at(self, a: ArrayLike, s: ArrayLike) -> Array:
-        """K in Pa·sqrt(m) with half-width a held at separation s; negative would be overlap."""
+        """Compute K in Pa·sqrt(m) with half-width a at separation s; negative if they overlap."""
         psi, y, _ = self._angle(a)
         p1 = self.full_contact_stress * y - self.mean_stress_at(a, s)
         return np.asarray(p1 * np.sqrt(self.period / np.tan(psi)))
 
     def elastic_energy_at(self, a: ArrayLike, s: ArrayLike) -> Array:
-        """½∫σ(h - s)dx in J/m with half-width a held at separation s."""
+        """Compute ½∫σ(h - s)dx in J/m with half-width a at separation s."""
         _, y, log = self._angle(a)
         p = self.mean_stress_at(a, s) / self.full_contact_stress
         return np.asarray(self.energy_scale * (y**2 / 4 - p**2 * log / 2))
 
     def adhesion_energy(self, a: ArrayLike) -> Array:
-        """-γ × (length of the contact in the chosen measure), J/m."""
+        """Compute -γ × (length of the contact in the chosen measure), J/m."""
         half = np.asarray(a, dtype=float)
         if self.measure == "arc":
             q0 = 2 * np.pi / self.period
@@ -236,21 +236,21 @@ class SingleWave:
         return np.asarray(-2 * self.work_of_adhesion * half)
 
     def energy_at(self, a: ArrayLike, s: ArrayLike) -> Array:
-        """U(a, s) in J/m per period: elastic plus adhesion energy."""
+        """Compute U(a, s) in J/m per period, elastic plus adhesion energy."""
         return self.elastic_energy_at(a, s) + self.adhesion_energy(a)
 
     def energy(self, a: ArrayLike) -> Array:
-        """U in J/m along the equilibrium branch."""
+        """Compute U in J/m along the equilibrium branch."""
         _, y, log = self._angle(a)
         p = self.mean_stress(a) / self.full_contact_stress
         with np.errstate(invalid="ignore"):
-            bend = np.where(y > 0, p**2 * log / 2, 0.0)
-        return np.asarray(self.energy_scale * (y**2 / 4 - bend) + self.adhesion_energy(a))
+            term = np.where(y > 0, p**2 * log / 2, 0.0)
+        return np.asarray(self.energy_scale * (y**2 / 4 - term) + self.adhesion_energy(a))
 
     # ------------------------------------------------------------------ fields
 
     def stress(self, x: ArrayLike, a: ArrayLike) -> Array:
-        """σ(x) in Pa of the equilibrium with half-width a; 0 off contact, crest at x = 0."""
+        """Compute σ(x) in Pa at equilibrium for half-width a; 0 off contact, crest at x = 0."""
         _, y, _ = self._angle(a)
         u = np.sin(np.pi * np.asarray(x, dtype=float) / self.period)
         inside = y - u**2
@@ -259,7 +259,7 @@ class SingleWave:
         return np.where(inside > 0, np.sqrt(1 - u**2) * value, 0.0)
 
     def gap(self, x: ArrayLike, a: ArrayLike) -> Array:
-        """t(x) in m of the equilibrium with half-width a; 0 in contact, crest at x = 0."""
+        """Compute t(x) in m at equilibrium with half-width a; 0 in contact, crest at x = 0."""
         _, y, _ = self._angle(a)
         u = np.maximum(np.abs(np.sin(np.pi * np.asarray(x, dtype=float) / self.period)), np.sqrt(y))
         p1 = self.adhesive_tension(a) / self.full_contact_stress
@@ -271,7 +271,7 @@ class SingleWave:
 
     @cached_property
     def fold_half_width(self) -> float:
-        """a_out in m, where the branch ends on unloading (ds/da = 0); 0 without adhesion."""
+        """a_out in m, at the end of the branch on unloading (ds/da = 0); 0 without adhesion."""
         if self.work_of_adhesion == 0:
             return 0.0
         # ds/da is positive towards a = 0 and negative towards λ/2, with one zero in between.
@@ -284,7 +284,7 @@ class SingleWave:
         return self.half_width(self.amplitude)
 
     def half_width(self, s: float) -> float:
-        """Half-width a in m of the stable state at separation s in m.
+        """Compute the half-width a in m of the stable state at separation s in m.
 
         Raises
         ------
@@ -315,7 +315,7 @@ class SingleWave:
     # ------------------------------------------------------------------ other controls
 
     def mean_stress_slope(self, a: ArrayLike) -> Array:
-        """dp̄/da along the equilibrium branch, in Pa/m; positive where it is stable under load."""
+        """Compute dp̄/da along the branch, in Pa/m; positive where it is stable under load."""
         psi, _, _ = self._angle(a)
         rate = 1 / np.sin(2 * psi)  # of ln p1, by ψ
         if self.measure == "arc":
@@ -325,20 +325,20 @@ class SingleWave:
         return np.asarray(np.pi / self.period * slope)
 
     def displacement(self, a: ArrayLike, stiffness: float) -> Array:
-        """u(a) = Δ + p̄/k in m at equilibrium, k in Pa/m, positive."""
+        """Compute u(a) = Δ + p̄/k in m at equilibrium, k in Pa/m, positive."""
         return np.asarray(self.amplitude - self.separation(a) + self.mean_stress(a) / stiffness)
 
-    def _drive(self, a: ArrayLike, stiffness: float) -> Array:
-        """What a control prescribes: u in m, or p̄ in Pa where the stiffness is 0."""
+    def _prescribed(self, a: ArrayLike, stiffness: float) -> Array:
+        """Compute the prescribed value: u in m, or p̄ in Pa if the stiffness is 0."""
         return self.mean_stress(a) if stiffness == 0 else self.displacement(a, stiffness)
 
-    def _drive_slope(self, a: ArrayLike, stiffness: float) -> Array:
+    def _prescribed_slope(self, a: ArrayLike, stiffness: float) -> Array:
         if stiffness == 0:
             return self.mean_stress_slope(a)
         return np.asarray(self.mean_stress_slope(a) / stiffness - self.separation_slope(a))
 
     def stable_range(self, stiffness: float) -> tuple[float, float]:
-        """Half-widths (a_out, a_full) in m between which the branch is stable, k in Pa/m, γ > 0.
+        """Compute the half-widths (a_out, a_full) in m of the stable branch, k in Pa/m, γ > 0.
 
         Raises
         ------
@@ -348,19 +348,19 @@ class SingleWave:
         # the slope is negative at both ends and has at most one positive stretch between them
         ends = 1e-9 * self.period, (0.5 - 1e-9) * self.period
         a = np.linspace(*ends, 20001)
-        slope = self._drive_slope(a, stiffness)
+        slope = self._prescribed_slope(a, stiffness)
         top = int(np.argmax(slope))
         if slope[top] <= 0:
             raise ValueError(f"no state is stable with a stiffness of {stiffness!r} Pa/m")
 
         def function(x: float) -> Array:
-            return self._drive_slope(x, stiffness)
+            return self._prescribed_slope(x, stiffness)
 
         full = _root(function, a[top], ends[1]) if slope[-1] < 0 else ends[1]
         return _root(function, ends[0], a[top]), full
 
-    def half_width_under(self, stiffness: float, drive: float) -> float:
-        """Half-width a in m of the stable state at u = ``drive`` in m (k = 0: at p̄ in Pa), γ > 0.
+    def half_width_under(self, stiffness: float, prescribed: float) -> float:
+        """Compute a in m of the stable state at u = ``prescribed`` in m (k = 0: p̄ in Pa), γ > 0.
 
         Raises
         ------
@@ -368,18 +368,21 @@ class SingleWave:
             If there is no such state.
         """
         low, high = self.stable_range(stiffness)
-        least, most = float(self._drive(low, stiffness)), float(self._drive(high, stiffness))
-        if not least <= drive <= most:
-            raise ValueError(f"drive is {drive!r}: stable contact needs {least!r} to {most!r}")
-        return _root(lambda a: self._drive(a, stiffness) - drive, low, high)
+        least = float(self._prescribed(low, stiffness))
+        most = float(self._prescribed(high, stiffness))
+        if not least <= prescribed <= most:
+            raise ValueError(
+                f"prescribed is {prescribed!r}: stable contact needs {least!r} to {most!r}"
+            )
+        return _root(lambda a: self._prescribed(a, stiffness) - prescribed, low, high)
 
     def loop_under(self, stiffness: float) -> WaveLoop:
-        """Return the exact loop held by a stiffness in Pa/m of nominal area (0: a load), γ > 0.
+        """Compute the exact loop with a stiffness in Pa/m of nominal area (0: a load), γ > 0.
 
         Raises
         ------
         ValueError
-            If there is none, as contact runs to full contact from first touch.
+            If contact runs to full contact from first touch.
         """
         a_in = self.half_width_under(stiffness, 0.0)
         a_out, _ = self.stable_range(stiffness)

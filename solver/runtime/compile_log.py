@@ -1,8 +1,7 @@
-"""A word where the compiler makes one wait who runs a loop from Python.
+"""Log a message when a first call waits for compilation.
 
-The first use of a method, where nothing is compiled for this processor yet, tells of it by Python's
-logging, under the name ``adhesis``, which prints warnings to stderr unless it is told otherwise.
-``precompile.warm`` is told to tell in its caller's way.
+The logger is Python's ``adhesis``, whose warnings go to stderr by default. ``precompile.warm``
+silences these messages, as its caller reports progress itself.
 """
 
 from __future__ import annotations
@@ -14,41 +13,41 @@ from functools import cache
 
 from adhesis.solver.runtime.jit import Compilation, processor, watch_compilation
 
-_MOMENT = 1.0  # s that pass without a word
-_BETWEEN_LINES = 10.0  # s
+_FIRST_AFTER = 1.0  # s of compilation before the first message
+_BETWEEN = 10.0  # s between messages
 _log = logging.getLogger("adhesis")
-_hushed: list[None] = []
+_silencers: list[None] = []
 
 
 @contextmanager
-def hushed() -> Iterator[None]:
-    """While this lasts, another tells."""
-    _hushed.append(None)
+def silence_compile_log() -> Iterator[None]:
+    """Silence these messages while the caller reports progress itself."""
+    _silencers.append(None)
     try:
         yield
     finally:
-        _hushed.pop()
+        _silencers.pop()
 
 
-class _Teller:
+class _CompileLogger:
     def __init__(self) -> None:
-        self._next = _MOMENT
+        self._next = _FIRST_AFTER
 
     def __call__(self, seen: Compilation) -> None:
         passed = seen.seconds + seen.under_way
-        if passed < self._next or _hushed:
+        if passed < self._next or _silencers:
             return
-        if self._next == _MOMENT:
+        if self._next == _FIRST_AFTER:
             _log.warning(
                 "compiling for %s, once, in a minute or so (adhesis warm does it ahead)",
                 processor(),
             )
         else:
             _log.warning("compiling: %d functions in %.0f s", seen.functions, passed)
-        self._next = passed + _BETWEEN_LINES
+        self._next = passed + _BETWEEN
 
 
 @cache
-def tell_of_compiling() -> None:
-    """From now on, as long as this process lives."""
-    watch_compilation(_Teller()).__enter__()
+def log_compilation() -> None:
+    """Log compilation from now on until the process ends."""
+    watch_compilation(_CompileLogger()).__enter__()

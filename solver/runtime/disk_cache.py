@@ -1,17 +1,18 @@
-"""Where compiled code is kept between processes: files alone, nothing of the compiler.
+"""Store compiled code on disk between processes; independent of the compiler.
 
-Code lies in a folder named after all that it depends on (:func:`folder_name`), which is looked for
+The code is in a folder named after all that it depends on (:func:`folder_name`), searched for
 
-1.  in the installation, ``solver/__compiled__`` beside the sources: made by ``adhesis warm``, and
-    from then on only read, by every user and every node;
+1.  in the installation, ``solver/__compiled__`` beside the sources: written by ``adhesis warm``,
+    and read by every user and every node;
 2.  in the user's cache: ``$ADHESIS_CACHE``, ``$XDG_CACHE_HOME/adhesis`` or ``~/.cache/adhesis``.
 
-One file a compiled function and signature. A file appears whole, by renaming: processes that
-compile the same at the same time both succeed, without locks, which network disks are bad at.
+Each compiled function and signature has one file. A file is created atomically, by renaming:
+processes that compile the same function at the same time both succeed, without locks, which are
+unreliable on network disks.
 
-Reading a file executes what is in it. So a folder or file counts only if its owner is trusted (the
-user, root, and in the installation the owner of the sources, which are executed anyway) and nobody
-else may write it; anything else is ignored with one warning (:class:`_Distrusted`).
+Reading a file executes its content. A folder or file is therefore used only if its owner is trusted
+(the user, root, and in the installation the owner of the sources, which are executed anyway) and
+nobody else may write it; otherwise it is ignored with one warning (:class:`_Distrusted`).
 """
 
 from __future__ import annotations
@@ -33,10 +34,7 @@ _KERNEL = re.compile(r"^@compiled(_\w+)?\s*$", re.MULTILINE)
 
 
 def kernel_modules(package: Path = _PACKAGE) -> list[Path]:
-    """List the modules that compiled code depends on, in a fixed order.
-
-    Whatever compiled code reads (functions, constants) stands in one of them.
-    """
+    """List the modules with the functions and constants of compiled code, in a fixed order."""
     return [
         path
         for path in sorted(package.rglob("*.py"))
@@ -46,15 +44,14 @@ def kernel_modules(package: Path = _PACKAGE) -> list[Path]:
 
 
 def folder_name(settings: Mapping[str, str], processor: str, package: Path = _PACKAGE) -> str:
-    """Name of the folder for these settings and this processor and the kernels' sources.
+    """Return the folder name for these settings, this processor and the sources of the kernels.
 
     Parameters
     ----------
     settings : mapping of str to str
-        What else the machine code depends on: versions, the compiler's settings, the processor's
-        features.
+        Versions, settings of the compiler, features of the processor.
     processor : str
-        Its name, which the folder bears for the reader.
+        Its name, which the folder's name begins with.
     package : path
         The folder of the sources.
     """
@@ -69,12 +66,12 @@ def folder_name(settings: Mapping[str, str], processor: str, package: Path = _PA
 
 
 def installed_folder() -> Path:
-    """Folder of the installation's compiled code; may be missing or read-only."""
+    """Return the folder of the installation's compiled code; it may be missing or read-only."""
     return _PACKAGE / "__compiled__"
 
 
 def users_folder() -> Path | None:
-    """Folder of the user's compiled code; None without a home to put it in."""
+    """Return the folder of the user's compiled code; None without a home folder."""
     if own := os.environ.get("ADHESIS_CACHE"):
         return Path(own)
     if base := os.environ.get("XDG_CACHE_HOME"):
@@ -86,17 +83,17 @@ def users_folder() -> Path | None:
 
 
 class _Distrusted(Exception):
-    """A folder or file that others could have written; the text says why and what to do."""
+    """Error for a folder or file that others could have written, with the remedy."""
 
 
-class _Place:
+class _CodeFolder:
     """One folder of compiled code.
 
     Parameters
     ----------
     folder : path
     installed : bool
-        Whether it belongs to the installation, not to the user.
+        True for the installation's folder, False for the user's.
     """
 
     def __init__(self, folder: Path, installed: bool) -> None:
@@ -112,7 +109,7 @@ class _Place:
         """
         try:
             self._check(self.folder, os.stat(self.folder))
-            # O_NONBLOCK: a pipe of that name would be waited for
+            # O_NONBLOCK: opening a pipe of that name would block
             descriptor = os.open(self.folder / file, os.O_RDONLY | os.O_NONBLOCK)
         except OSError:
             return None
@@ -124,7 +121,7 @@ class _Place:
                 return None
 
     def write(self, file: str, content: bytes) -> None:
-        """Keep a file, readable for all in the installation and for the user alone elsewhere.
+        """Write a file, readable for all in the installation and for the user alone elsewhere.
 
         Raises
         ------
@@ -136,14 +133,14 @@ class _Place:
         try:
             with os.fdopen(handle, "wb") as stream:
                 stream.write(content)
-            os.chmod(temporary, 0o644)  # others may read what one user's installation has compiled
+            os.chmod(temporary, 0o644)  # other users read the installation's code
             os.replace(temporary, self.folder / file)
         except BaseException:
             os.unlink(temporary)
             raise
 
     def _check(self, path: Path, found: os.stat_result) -> None:
-        """Raise if another user could have written a folder or file."""
+        """Raise if an untrusted user could have written a folder or file."""
         trusted = {os.geteuid(), 0}
         who = "you or root"
         if self._installed:
@@ -169,72 +166,72 @@ class _Place:
 
 
 class CodeFiles:
-    """The files of one folder name, wherever they are kept.
+    """Files of one folder name, in the installation and in the user's cache.
 
     Parameters
     ----------
     name : str
         Of :func:`folder_name`.
     to_installation : bool
-        Whether new files go to the installation, if it can be written, and not to the user's cache.
+        Whether new files go to the installation if it is writable; else to the user's cache.
     """
 
     def __init__(self, name: str, to_installation: bool = False) -> None:
         users = users_folder()
-        self._places = [_Place(installed_folder() / name, installed=True)]
+        self._folders = [_CodeFolder(installed_folder() / name, installed=True)]
         if users is not None:
-            self._places.append(_Place(users / name, installed=False))
-        # where new files go, the preferred place first
-        self._targets = self._places if to_installation else self._places[1:]
+            self._folders.append(_CodeFolder(users / name, installed=False))
+        # folders for new files, in order of preference
+        self._targets = self._folders if to_installation else self._folders[1:]
         self._to_installation = to_installation
         self._warned = False
 
     def read(self, file: str) -> bytes | None:
-        """Return the content of a file, or None; one of the user's is copied to the installation.
+        """Return the content of a file, or None.
 
-        The latter only where new files go to the installation.
+        The user's file is copied to the installation if new files go there.
         """
-        for place in self._places:
-            content = self._content(place, file)
+        for each in self._folders:
+            content = self._content(each, file)
             if content is None:
                 continue
-            if self._to_installation and place is not self._places[0]:
+            if self._to_installation and each is not self._folders[0]:
                 self.write(file, content)
             return content
         return None
 
     def find(self, file: str) -> Path | None:
-        """Return the folder in which a file lies, or None."""
-        found = (place for place in self._places if self._content(place, file) is not None)
-        return next((place.folder for place in found), None)
+        """Return the folder that contains a file, or None."""
+        found = (each for each in self._folders if self._content(each, file) is not None)
+        return next((each.folder for each in found), None)
 
     def write(self, file: str, content: bytes) -> Path | None:
-        """Keep a file; returns its folder, or None after a warning (once) if it cannot be kept."""
+        """Write a file; returns its folder, or None after a warning (once) if none is writable."""
         reasons = []
-        for place in self._targets:
+        for each in self._targets:
             try:
-                place.write(file, content)
+                each.write(file, content)
             except _Distrusted as error:
                 self._warn(str(error))
             except OSError as error:
-                reasons.append(f"{place.folder.parent} ({error.strerror or error})")
+                reasons.append(f"{each.folder.parent} ({error.strerror or error})")
             else:
-                return place.folder
+                return each.folder
         self._warn(
             "compiled code cannot be kept, so that each process compiles it anew: "
             f"{_listed(reasons)}; ADHESIS_CACHE names another folder"
         )
         return None
 
-    def _content(self, place: _Place, file: str) -> bytes | None:
+    def _content(self, folder: _CodeFolder, file: str) -> bytes | None:
         try:
-            return place.read(file)
+            return folder.read(file)
         except _Distrusted as error:
             self._warn(str(error))
             return None
 
     def _warn(self, text: str) -> None:
-        """Warn once: the first reason is that of all further ones."""
+        """Warn once, as further files fail for the same reason."""
         if not self._warned:
             self._warned = True
             warnings.warn(text, RuntimeWarning, stacklevel=4)
@@ -252,7 +249,7 @@ def _name_of(user: int) -> str:
 
 
 def _make_folder(folder: Path, mode: int) -> None:
-    """Make a folder and those above it, with a mode that a lax umask does not widen."""
+    """Make a folder and its missing parents with this mode at most, whatever the umask."""
     if not folder.is_dir():
         _make_folder(folder.parent, mode)
         folder.mkdir(mode=mode, exist_ok=True)

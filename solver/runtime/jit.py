@@ -1,18 +1,18 @@
-"""The one door to numba: compiled functions, kept between processes by all that they depend on.
+"""Compile functions with numba and cache the code on disk; the only module that imports numba.
 
-numba's own cache knows the file of a function, not the files of the functions that it calls, nor
-the compiler's settings: after a change, callers would silently keep old code. And it wants to write
-where it reads. So code is kept by ``disk_cache``, in a folder named after
-the sources of all modules with compiled functions, the versions of numba and LLVM, the settings
-that change code, and the processor. Where no folder can be used, each process compiles anew.
+numba's own cache depends on the file of a function, but not on the files of the functions that it
+calls, nor on the compiler's settings: after a change, callers would silently keep old code. It also
+requires write access where it reads. ``disk_cache`` therefore keeps the code, in a folder named
+after the sources of all modules with compiled functions, the versions of numba and LLVM, the
+settings that change code, and the processor. Without a usable folder each process compiles anew.
 
-numba links the code of a function into all its callers and optimises it there once more. Here that
-is left to short functions; long ones are called under their symbol's name (:class:`_Kept`).
+numba links the code of a function into all its callers and optimises it there once more. Here only
+short functions are linked; long ones are called by their symbol's name (:class:`_FunctionCache`).
 
-Between a call from Python and its result no Python code runs, for a signal handler might raise in
-it, where neither numba nor LLVM expects an exception: it would become another one, be lost, or end
+No Python code runs between a call from Python and its result: a signal handler could raise in it,
+where neither numba nor LLVM expects an exception, which would become another one, be lost, or end
 the process. Hence results are boxed by C code alone (:func:`_box_array`), and functions are loaded
-and compiled in a thread of their own (``uninterrupted``).
+and compiled in a separate thread (``uninterrupted``).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar
 
-# Intel's vector functions, where they are installed, would change bits from machine to machine.
+# Intel's vector functions, if installed, would change last bits from machine to machine.
 os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"  # before numba is loaded
 
 import llvmlite
@@ -49,12 +49,11 @@ from adhesis.solver.runtime.uninterrupted import uninterrupted
 F = TypeVar("F", bound=Callable[..., Any])
 config: Any = _config  # its attributes are made at run time
 
-# numba's settings that change code, as numba.core.config names them
 # Functions of up to so many instructions are copied into their callers, where they may be inlined.
-# Longer ones are called: or each caller would optimise them all over again, and its own callers
-# them and it, which takes four fifths of the time to compile.
+# Longer ones are called: optimising them again in each caller takes four fifths of the time.
 _LONGEST_COPIED = 300
 _DIGEST = hashlib.sha256().digest_size  # bytes at the head of a file of code
+# numba's settings that change code, as numba.core.config names them
 _SETTINGS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "USING_SVML", "BOUNDSCHECK"),
     *("DEBUGINFO_DEFAULT", "EXTEND_VARIABLE_LIFETIMES", "LLVM_REFPRUNE_PASS"),
@@ -63,19 +62,19 @@ _SETTINGS = (
 
 
 def _shapes_differ(source: Any, target: Any) -> None:
-    """Raise that a slice cannot be assigned; a name for what compiled code does."""
+    """Refuse to assign a slice of another shape; only a name, overloaded in compiled code."""
     raise NotImplementedError
 
 
 @overload(_shapes_differ)
 def _shapes_differ_compiled(source: Any, target: Any) -> Any:
-    def plainly(source: Any, target: Any) -> None:
+    def refuse(source: Any, target: Any) -> None:
         raise ValueError("cannot assign a slice from an array of another shape")
 
-    return plainly
+    return refuse
 
 
-# numba's own message tells the shapes, for which half of Python's strings are compiled: 3.5 s.
+# numba's own message contains the shapes, which takes compiling half of Python's strings: 3.5 s.
 if hasattr(arrayobj, "raise_with_shape_context"):
     arrayobj.raise_with_shape_context = _shapes_differ
 
@@ -84,14 +83,14 @@ if hasattr(arrayobj, "raise_with_shape_context"):
 
 
 def _constant(c: Any, value: Any) -> Any:
-    """Read ``value``, which is kept with the compiled function; a borrowed reference."""
+    """Read ``value``, stored with the compiled function; returns a borrowed reference."""
     return c.env_manager.read_const(c.env_manager.add_const(value))
 
 
 def _box_array(typ: Any, val: Any, c: Any) -> Any:
-    """Box an array as numba does, with its class kept as a constant.
+    """Box an array as numba does, but with its class as a constant.
 
-    numba unpickles the class at each call, by a function in Python.
+    numba itself unpickles the class at each call, by a function in Python.
     """
     api = c.pyapi
     api.serialize_object = lambda value: value
@@ -105,7 +104,7 @@ def _box_array(typ: Any, val: Any, c: Any) -> Any:
 def _box_named_tuple(typ: Any, val: Any, c: Any) -> Any:
     """Box a named tuple of this package by ``tuple.__new__``, as its own ``_make`` does.
 
-    numba calls the class, which is a function in Python.
+    numba itself calls the class, which runs Python code.
     """
     if not typ.instance_class.__module__.startswith("adhesis.solver."):
         return boxing.box_namedtuple(typ, val, c)
@@ -126,71 +125,71 @@ pythonapi._boxers.functions.update(
 
 
 def compiled(function: F) -> F:
-    """Compile ``function`` at its first call (numba, nopython), keeping the result on disk.
+    """Compile ``function`` at its first call (numba, nopython) and cache the code on disk.
 
-    Division by zero gives inf or NaN, as in numpy: a test before every division would keep the
-    loops out of vector registers.
+    Division by zero gives inf or NaN, as in numpy: a test before every division would prevent
+    vectorisation.
     """
     return _compile(function, error_model="numpy")
 
 
 def compiled_for_both(function: F) -> F:
-    """Compile likewise what is called from Python as often as from compiled code: once for both.
+    """Compile ``function`` likewise, once for calls from Python and from compiled code.
 
-    Others called from both are compiled twice.
+    Functions with another decorator that are called from both are compiled twice.
     """
     return _compile(function, from_python=True, error_model="numpy")
 
 
 def compiled_sums(function: F) -> F:
-    """Compile ``function`` likewise, and let sums be taken in any order (vector registers)."""
+    """Compile ``function`` likewise, with sums taken in any order (vectorised)."""
     return _compile(function, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
 def compiled_finite_sums(function: F) -> F:
-    """Compile ``function`` with sums in any order of numbers that are none of them NaN."""
+    """Compile ``function`` with sums taken in any order, assuming that no number is NaN."""
     return _compile(function, fastmath={"reassoc", "nnan", "nsz", "contract"})
 
 
 def _compile(function: F, from_python: bool = False, **options: Any) -> F:
-    options["no_cfunc_wrapper"] = True  # that is for calls from C
+    options["no_cfunc_wrapper"] = True  # the wrapper is for calls from C
     dispatcher: Any = numba.njit(**options)(function)
-    dispatcher._cache = _Kept(function)
-    # Most functions are called by compiled ones alone, which need nothing to unpack objects.
+    dispatcher._cache = _FunctionCache(function)
+    # Most functions are called by compiled ones alone, which need no wrapper to unpack objects.
     inner: Any = dispatcher
     dispatcher.compile = uninterrupted(dispatcher.compile)
     if not from_python:
         options["no_cpython_wrapper"] = True
         inner = numba.njit(**options)(function)
-        inner._cache = _Kept(function, "-inner")
+        inner._cache = _FunctionCache(function, "-inner")
         inner.compile = uninterrupted(inner.compile)
     template = inner.get_call_template
 
-    def of_any_value(args: Any, kws: Any) -> Any:
+    def template_without_literals(args: Any, kws: Any) -> Any:
         unliteral: Any = numba.types.unliteral
         return template(
             tuple(unliteral(arg) for arg in args),
             {name: unliteral(arg) for name, arg in kws.items()},
         )
 
-    # otherwise a function is compiled once more for each number that stands in a call
-    dispatcher.get_call_template = of_any_value
+    # With literal types a function would be compiled anew for each constant argument.
+    dispatcher.get_call_template = template_without_literals
     dispatcher.get_overload = inner.get_overload
     dispatcher.inner = inner
     compiled_function: F = dispatcher
     return compiled_function
 
 
-# ----------------------------------------------------------------------- what code depends on
+# ------------------------------------------------------------------ dependencies of the code
 
 
 def processor() -> str:
-    """Return the processor's name as LLVM knows it, such as ``znver4``."""
+    """Return LLVM's name of the processor, such as ``znver4``."""
     return str(config.CPU_NAME or binding.get_host_cpu_name())
 
 
 def settings() -> dict[str, str]:
-    """What machine code depends on besides its sources and the name of the processor."""
+    """Return what machine code depends on besides its sources and the processor's name."""
     features = config.CPU_FEATURES
     if features is None:
         features = binding.get_host_cpu_features().flatten()
@@ -211,7 +210,7 @@ def _plain(value: Any) -> str:
 
 @cache
 def code_files(to_installation: bool = False) -> CodeFiles:
-    """Where this process finds and keeps compiled code."""
+    """Return the folders in which this process finds and keeps compiled code."""
     return CodeFiles(folder_name(settings(), processor()), to_installation)
 
 
@@ -222,7 +221,7 @@ _target: list[CodeFiles] = []
 
 @contextmanager
 def kept_in_installation() -> Iterator[None]:
-    """While this lasts, new code is kept in the installation, if that can be written."""
+    """Keep new code in the installation, if it is writable, inside this context."""
     _target.append(code_files(to_installation=True))
     try:
         yield
@@ -232,7 +231,7 @@ def kept_in_installation() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Call:
-    """A function with a signature that other compiled code calls under a symbol's name."""
+    """A function and signature that other compiled code calls by a symbol's name."""
 
     module: str
     function: str
@@ -240,7 +239,7 @@ class _Call:
     symbol: str
 
     def is_ready(self) -> bool:
-        """Load it, or compile it; whether it has the name under which it is called."""
+        """Load or compile the function; True if it has the symbol that its callers use."""
         dispatcher: Any = getattr(sys.modules[self.module], self.function).inner
         dispatcher.compile(self.signature)
         found = dispatcher.overloads[self.signature].fndesc.llvm_func_name
@@ -248,7 +247,7 @@ class _Call:
 
 
 def _calls_in(library: Any) -> list[_Call]:
-    """Return the calls in a library's code, its own and those in code that was copied into it."""
+    """Return the calls in a library's code, including those in code copied into it."""
     calls: dict[_Call, None] = {}
     for other in library._linking_libraries:
         known = getattr(other, "adhesis_calls", None)  # numba's own functions have none
@@ -256,8 +255,8 @@ def _calls_in(library: Any) -> list[_Call]:
     return list(calls)
 
 
-class _Kept:
-    """What numba's dispatcher asks of a cache, for one function."""
+class _FunctionCache:
+    """Cache of one function's code, with the interface that numba's dispatcher requires."""
 
     def __init__(self, function: Callable[..., Any], kind: str = "") -> None:
         self._module, self._function = function.__module__, function.__qualname__
@@ -265,14 +264,14 @@ class _Kept:
 
     @property
     def cache_path(self) -> str:
-        """For numba's statistics."""
+        """Folder of the code, for numba's statistics."""
         return str(code_files().find(self._name) or "")
 
     def _file(self, signature: Any) -> str:
         return f"{self._name}-{hashlib.sha256(str(signature).encode()).hexdigest()[:16]}"
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        """Code of a signature, or None."""
+        """Load the code of a signature; None if it is not cached."""
         content = _files().read(self._file(signature))
         if content is None:
             return None
@@ -281,7 +280,7 @@ class _Kept:
             return None  # a damaged file: compiled and written anew
         target.refresh()
         symbols, calls, copied, state = pickle.loads(content)
-        # code that this code calls must be there before it, under the name that it calls
+        # the code that this code calls must be loaded before it, under the expected symbol
         if not all(call.is_ready() for call in calls):
             return None
         target.codegen()._engine._defined_symbols.update(symbols)
@@ -291,7 +290,7 @@ class _Kept:
         return result
 
     def save_overload(self, signature: Any, result: Any) -> None:
-        """Keep the code of a signature."""
+        """Write the code of a signature to the cache."""
         library = result.library
         if library.has_dynamic_globals:
             raise RuntimeError(f"{self._name} holds an address of this process and cannot be kept")
@@ -299,7 +298,7 @@ class _Kept:
         own = library.get_function(result.fndesc.llvm_func_name)
         copied = sum(1 for block in own.blocks for _ in block.instructions) <= _LONGEST_COPIED
         if not copied:
-            library._shared_module = binding.parse_assembly("")  # what callers link in
+            library._shared_module = binding.parse_assembly("")  # callers link nothing in
         self._note(result, signature, calls, copied)
         symbols = [
             function.name
@@ -312,61 +311,61 @@ class _Kept:
         _files().write(self._file(signature), hashlib.sha256(content).digest() + content)
 
     def _note(self, result: Any, signature: Any, calls: list[_Call], copied: bool) -> None:
-        """Leave with the code what those call who call it."""
+        """Attach to the code the calls that its callers inherit."""
         if not copied:
             symbol = result.fndesc.llvm_func_name
             calls = [_Call(self._module, self._function, tuple(signature), symbol)]
         result.library.adhesis_calls = calls
 
     def flush(self) -> None:
-        """Nothing to forget: a change has another folder."""
+        """Do nothing: changed code has another folder."""
 
 
 def _files() -> CodeFiles:
     return _target[-1] if _target else code_files()
 
 
-# ------------------------------------------------------------------------- watching the compiler
+# ------------------------------------------------------------------------ counting compilations
 
 
 class Compilation(event.Listener):
-    """Counts the functions that are compiled, and the time that it takes.
+    """Number of functions compiled, and the time that took.
 
     Attributes
     ----------
     functions : int
-        Compiled so far, each signature for itself.
+        Compiled so far, counted by signature.
     seconds, cpu_seconds : float
-        Wall time, and CPU time of this process, without what is under way.
+        Wall time, and CPU time of this process, in s, without the compilation under way.
 
     Parameters
     ----------
-    tell : callable
-        Called with this each time a function is begun.
+    report : callable
+        Called with this object when the compilation of a function begins.
     """
 
-    def __init__(self, tell: Callable[[Compilation], None] = lambda seen: None) -> None:
+    def __init__(self, report: Callable[[Compilation], None] = lambda seen: None) -> None:
         self.functions = 0
         self.seconds = 0.0
         self.cpu_seconds = 0.0
-        self._tell = tell
+        self._report = report
         self._depth = 0
         self._since = (0.0, 0.0)
 
     @property
     def under_way(self) -> float:
-        """Wall time since the compiler was last called, in s; 0 if it is not at work."""
+        """Wall time of the compilation under way, in s; 0 if there is none."""
         return time.perf_counter() - self._since[0] if self._depth else 0.0
 
     def on_start(self, _: Any) -> None:
-        """One more; a function compiles those that it calls."""
+        """Count the start of a compilation; these nest, as a function compiles its callees."""
         if self._depth == 0:
             self._since = time.perf_counter(), time.process_time()
         self._depth += 1
-        self._tell(self)
+        self._report(self)
 
     def on_end(self, _: Any) -> None:
-        """One is ready."""
+        """Count a finished compilation."""
         self._depth -= 1
         self.functions += 1
         if self._depth == 0:
@@ -376,9 +375,9 @@ class Compilation(event.Listener):
 
 @contextmanager
 def watch_compilation(
-    tell: Callable[[Compilation], None] = lambda seen: None,
+    report: Callable[[Compilation], None] = lambda seen: None,
 ) -> Iterator[Compilation]:
-    """Count what is compiled while this lasts; see :class:`Compilation`."""
-    compilation = Compilation(tell)
+    """Count the functions compiled inside this context; see :class:`Compilation`."""
+    compilation = Compilation(report)
     with event.install_listener("numba:compile", compilation):
         yield compilation

@@ -1,8 +1,8 @@
-"""Memory that is freed stays with the process, where its C library lets one say so.
+"""Keep freed memory in the process, if its C library is glibc.
 
-A field of a thousand gaps takes and frees ten megabytes. glibc gives free memory at the end of the
-heap back to the system at once, which hands it out again page by page, each one cleared: a quarter
-of such a field's time. The process grows no larger by what it keeps than it has been.
+A field of a thousand gaps allocates and frees ten megabytes. glibc returns free memory at
+the end of the heap to the system at once, and getting it back page by page, each one cleared, takes
+a quarter of the time of such a field. The peak memory of the process does not change.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _AHEAD = 1 << 22
 
 @cache
 def keep_freed() -> bool:
-    """Let this process keep up to 256 MiB of freed memory; whether its C library does."""
+    """Let this process keep up to 256 MiB of freed memory; False if its C library does not."""
     try:
         library = ctypes.CDLL(None)
         set_option, _ = library.mallopt, library.gnu_get_libc_version

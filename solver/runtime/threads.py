@@ -1,8 +1,8 @@
-"""One thread at a time: in linear algebra, wherever the process was started, and in a method.
+"""Limit linear algebra to one thread, and calls of a method to one thread at a time.
 
-The libraries beneath numpy and scipy start a thread a core for matrices of some tens of rows. They
-gain nothing there, wait for one another on a busy machine, and the number of threads changes the
-last bits of a sum.
+The libraries beneath numpy and scipy start one thread per core even for matrices of some tens of
+rows. This gains nothing, the threads wait for one another on a busy machine, and their number
+changes the last bits of a sum.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from adhesis.solver.runtime.uninterrupted import uninterrupted
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# The number of threads belongs to the process: a caller that restored it while another is at work
-# would change the bits of that other's sums. Compiled code and Python hold the interpreter's lock
-# nearly all the time, so callers that take turns are hardly slower than callers side by side.
+# The number of threads is a property of the process: restoring it while another caller computes
+# would change the bits of that caller's sums. Compiled code and Python hold the interpreter's lock
+# nearly all the time, so serialised callers are hardly slower than concurrent ones.
 _in_use = RLock()
 
 
 class Shared(Protocol):
-    """An object whose decorated methods threads call in turn."""
+    """An object whose decorated methods one thread at a time may call."""
 
     in_use: AbstractContextManager[Any]
 
 
 def new_lock() -> AbstractContextManager[Any]:
-    """Lock that the thread which holds it may take again."""
+    """Make a reentrant lock."""
     return RLock()
 
 
 def one_at_a_time(function: F) -> F:
     """Let one thread at a time call the decorated methods of an object; the others wait.
 
-    Methods reuse work arrays and plans from call to call. Between calls nothing but counters and
-    caches is kept, so threads that take turns get the same bits as one alone.
+    Methods reuse work arrays and plans in every call. Only counters and caches persist between
+    calls, so the results do not depend on the threads, to the last bit.
     """
 
     @wraps(function)
@@ -46,13 +46,13 @@ def one_at_a_time(function: F) -> F:
         with self.in_use:
             return function(self, *args, **options)
 
-    guarded: Any = waiting
-    answer: F = guarded
-    return answer
+    decorated: Any = waiting
+    result: F = decorated
+    return result
 
 
 def on_one_thread(function: F) -> F:
-    """Let linear algebra use one thread while ``function`` runs, and as before afterwards.
+    """Limit linear algebra to one thread while ``function`` runs.
 
     Callers in other threads wait.
     """
@@ -62,15 +62,15 @@ def on_one_thread(function: F) -> F:
         with _in_use, _libraries().limit(limits=1):
             return function(*args, **kwargs)
 
-    limited_function: Any = limited
-    answer: F = limited_function
-    return answer
+    decorated: Any = limited
+    result: F = decorated
+    return result
 
 
 @cache
 @uninterrupted  # the search calls back from C, where the exception of a signal handler is lost
 def _libraries() -> Any:
-    # The search finds what is loaded: compiled code loads these at its first call.
+    # The search finds loaded libraries only; compiled code would load these at its first call.
     import scipy.linalg.cython_blas
     import scipy.linalg.cython_lapack  # noqa: F401  # to load its library
     from threadpoolctl import ThreadpoolController

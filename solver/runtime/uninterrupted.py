@@ -1,9 +1,9 @@
-"""Work that no signal handler interrupts half-way: it is done in a thread of its own.
+"""Run functions in a separate thread, where no signal handler interrupts them.
 
-Python runs the handlers of signals (Ctrl-C, a time limit) between any two steps of the main thread,
-and nowhere else. What one of them raises there is lost where C code has called back into Python,
-and leaves half of what was being made. Here the main thread only waits. It is interrupted at once;
-the work ends by itself, at its next call of such a function.
+Python runs signal handlers (Ctrl-C, a time limit) between any two steps of the main thread only.
+An exception raised there is lost if C code has called back into Python, and it leaves incomplete
+objects behind. Here the main thread only waits and is interrupted at once; the work ends at its
+next call of such a function.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# Bytes of stack, as LLVM may need them: without a limit on the main thread's the system gives 2 MB.
+# Stack in bytes that LLVM may need: the default is 2 MB if the main thread's stack is unlimited.
 _STACK = 64 << 20
 
 
 class _Abandoned(BaseException):
-    """Nobody waits for this work any more."""
+    """Error that ends work whose result is no longer awaited."""
 
 
 class _Worker(threading.Thread):
@@ -30,9 +30,9 @@ class _Worker(threading.Thread):
 
 
 def _start(worker: _Worker) -> None:
-    """Start a thread, to which no signal comes that Python handles.
+    """Start a thread with all signals blocked that Python handles.
 
-    Meanwhile they wait: :mod:`threading` does not expect a handler's exception there.
+    They are blocked here during the start, too: :mod:`threading` does not expect an exception then.
     """
     handled = {each for each in signal.valid_signals() if callable(signal.getsignal(each))}
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, handled)
@@ -45,7 +45,7 @@ def _start(worker: _Worker) -> None:
 
 
 def uninterrupted(function: F) -> F:
-    """Run ``function`` where no signal handler runs; its result, or what it raises, is the same."""
+    """Run ``function`` in a separate thread; its result or exception is passed on."""
 
     @wraps(function)
     def guarded(*args: Any, **kwargs: Any) -> Any:
@@ -73,6 +73,6 @@ def uninterrupted(function: F) -> F:
             raise error
         return result
 
-    guarded_function: Any = guarded
-    answer: F = guarded_function
-    return answer
+    decorated: Any = guarded
+    result: F = decorated
+    return result

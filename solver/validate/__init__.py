@@ -1,5 +1,4 @@
-"""The methods judged by the closed forms: claims of (quantity, error, bound).
+"""Validate the methods against closed forms: claims of (quantity, error, bound).
 
-Import ``claims.validate``; ``judge``
-measures the errors.
+Import ``claims.validate``; ``judge`` measures the errors.
 """

@@ -1,20 +1,19 @@
-"""The methods against the closed forms: :func:`validate` gives rows of (claim, error, bound).
+"""Compare the methods with closed forms: :func:`validate` returns rows of (claim, error, bound).
 
-What is claimed, and why the bounds are what they are (``judge`` for the
-rest):
+Claims and the reasons for their bounds (see also ``judge``):
 
-*   losses: the promise of the method (grid: 0.5 % at no more than 4096 nodes; sharp: 1e-8);
+*   losses: the stated error of the method (grid: 0.5 % with at most 4096 nodes; sharp: 1e-8);
 *   energies along the branch: the adhesion energy 2γe of the resolution e at both edges;
-*   a small contact is not quite a parabola's: with ψ = πa/λ the repulsion is short by less than
-    ψ²/3 of itself, the tension over by less than ψ²/6 (1 + ψ²), exactly from the two closed forms;
-*   a stiffness or a load keeps the promise of a fixed separation, but that the load at which
-    contact is lost is known to the error of the elastic solution, and s there to its square root;
-*   almost full contact differs from full contact, by reciprocity ½⟨σh⟩ = U_full + ½⟨σ_full t⟩
-    exactly, so by no more than ½ s max|σ_full| over the gaps.
+*   a small contact, compared with a parabola: with ψ = πa/λ the repulsion is smaller by less than
+    a share ψ²/3, the tension larger by less than ψ²/6 (1 + ψ²), exactly from the closed forms;
+*   a stiffness or a load: as a fixed separation, but the load at which contact is lost is known to
+    the error of the elastic solution, and s there to its square root;
+*   almost full contact, compared with full contact: by reciprocity ½⟨σh⟩ = U_full + ½⟨σ_full t⟩
+    exactly, so the difference is at most ½ s max|σ_full| over the gaps.
 
-The last and the third differ from the others: what is compared with differs from the scene itself,
-by a term that the bound is the leading order of. There the error comes near to its bound, or prints
-as the same digits, however exact a method is; the note gives the exact difference of the scenes.
+The closed forms of the third and the last claim describe a slightly different problem, and the
+bound is the leading order of that difference. The error of even an exact method is then close to
+its bound; the note gives the exact difference of the two problems.
 """
 
 from __future__ import annotations
@@ -56,14 +55,14 @@ __all__ = ["METHODS", "Row", "validate"]
 def validate(
     method_names: Sequence[MethodName] = METHODS, *, on_row: Callable[[Row], None] | None = None
 ) -> list[Row]:
-    """Judge the methods by the closed forms.
+    """Compare the methods with the closed forms.
 
     Parameters
     ----------
     method_names : sequence of str
         Of :data:`METHODS`.
     on_row : callable, optional
-        Called with every row as it is found.
+        Called with every row when it is complete.
 
     Raises
     ------
@@ -88,7 +87,7 @@ def _rows(name: MethodName) -> Iterator[Row]:
         try:
             yield from claim(judge)
         except RuntimeError as error:
-            # A method that gives up is a failed claim, not the end of the validation.
+            # An error of a method is a failed claim and does not end the validation.
             about = (claim.__doc__ or "").rstrip(".")
             yield judge.row(about, nan, nan, f"did not finish: {error}")
 
@@ -158,21 +157,21 @@ def branch(judge: Judge) -> Iterator[Row]:
 
 def fold(judge: Judge) -> Iterator[Row]:
     """Pull-off of the single wave."""
-    places, stresses = [], []
+    separations, stresses = [], []
     for alpha in ALPHAS:
         wave, result = judge.wave_loop(alpha)
         loop = wave.loop
         reach = loop.fold_separation - wave.amplitude
-        places.append((result.jumps[-1].separation - loop.fold_separation) / reach)
+        separations.append((result.jumps[-1].separation - loop.fold_separation) / reach)
         stress = result.mean_stress[np.flatnonzero(result.patches)[-1]]
         a, s = np.array([loop.fold_half_width]), np.array([loop.fold_separation])
-        # The last state rests within e of an edge that itself is within e of the fold.
+        # The edges of the last state are within e of equilibrium ones, those within e of the fold.
         bound = judge.slack(wave.mean_stress_at, a, s) / wave.full_contact_stress
         off = np.array([(stress - loop.fold_mean_stress) / wave.full_contact_stress])
         stresses.append((off, 2 * bound))
     yield judge.worst(
         "pull-off of the single wave, all α: (s_out - s) / (s_out - A)",
-        np.array(places),
+        np.array(separations),
         np.array(judge.standard.loss),
     )
     yield judge.worst("pull-off of the single wave, all α: p̄_out / p*", *joined(stresses))
@@ -201,7 +200,7 @@ def westergaard(judge: Judge) -> Iterator[Row]:
     peak = np.array([method.fields(state, nodes).stress[0] for state in pressed]) / p_star
 
     def highest(a: Array, s: Array) -> Array:
-        """σ(0) of the half-width a held at s."""
+        """Compute σ(0) with the half-width a at s."""
         y = np.sin(np.pi * a / PERIOD) ** 2
         tension = p_star * y - wave.mean_stress_at(a, s)
         return np.asarray(2 * p_star * np.sqrt(y) - tension / np.sqrt(y))
@@ -235,14 +234,14 @@ def full_contact(judge: Judge) -> Iterator[Row]:
     f = method.fields(state, n)
     full = full_contact_stress(profile, MODULUS, f.x)
     energy = full_contact_energy(profile, MODULUS)
-    # ½⟨σh⟩ from the state: its elastic energy is ½⟨σ(h - s)⟩ per area.
+    # The elastic energy of the state is ½⟨σ(h - s)⟩ per area; ½⟨σh⟩ follows.
     work = state.elastic_energy / PERIOD + 0.5 * state.separation * state.mean_stress
     bound = 0.5 * state.separation * float(np.abs(full[f.gap > 0]).max()) / energy
     reciprocal = energy + 0.5 * float(np.mean(full * f.gap))
     note = f"Δ/h_max = 0.99, A/A0 = {state.contact_fraction:.3f}"
     own = f"{note}; the gap that is left makes {abs(reciprocal / energy - 1):.1e}"
     yield judge.row("full contact, three waves: energy", work / energy - 1, bound, own)
-    # The mean over n nodes misses what one node at either end of the gap holds.
+    # The mean over n nodes has an error of one node at either end of the gap.
     ends = 2 / n * bound / (1 - state.contact_fraction)
     claim = "full contact, three waves: ½⟨σh⟩ = U_full + ½⟨σ_full t⟩"
     yield judge.row(claim, work / reciprocal - 1, ends, note)
@@ -272,7 +271,7 @@ def parabola(judge: Judge) -> Iterator[Row]:
     a = result.contact_fraction[on] / 2 * PERIOD
 
     def curved(a: Array) -> Array:
-        """Mean stress by which the wave's contact differs from the parabola's."""
+        """Bound the difference in mean stress between the wave's contact and the parabola's."""
         psi2 = (np.pi * a / PERIOD) ** 2
         repulsion = parabola_load(a, radius, MODULUS, 0.0) / PERIOD
         tension = repulsion - parabola_load(a, radius, MODULUS, gamma) / PERIOD
@@ -311,8 +310,8 @@ def controls(judge: Judge) -> Iterator[Row]:
             load_steps=2,
         )
         held = f"wave held by k = {relative:g} p*/A" if stiffness else "wave under a load"
-        # Where contact is lost s goes like a square root of what is prescribed, and the loop of a
-        # load is closed there: the load is known to the error of the elastic solution.
+        # At the loss of contact s varies as a square root of the load, which is known to the error
+        # of the elastic solution, and the loop under a load is closed there.
         late = 0.0
         if stiffness == 0:
             a = wave.half_width_under(0.0, exact.fold_mean_stress + judge.standard.stress * p_star)

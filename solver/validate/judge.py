@@ -1,10 +1,10 @@
-"""How the methods are judged: rows of (claim, error, bound), and how each method is run.
+"""Run a method on the problems of the closed forms and compare: rows of (claim, error, bound).
 
-The bounds are physics. An edge has a resolution e: dx for ``grid``, whose edges rest on nodes,
-1e-6 λ for ``sharp`` (energies are stationary in the edges, so its losses are far better). A
-half-width may be off by e, and the mean stress by what the closed form changes when its half-width
-is off by e at the same s. Where a stress is compared at a *given* width, that width is known to e
-and Griffith's balance holds within e.
+The bounds follow from the resolution e of an edge: dx for ``grid``, whose edges lie on nodes,
+1e-6 λ for ``sharp`` (energies are stationary in the edges, so its losses are far better). The error
+of a half-width may be e, that of the mean stress the change of the closed form when its half-width
+changes by e at the same s. A stress compared at a *given* width has the error of a width known to
+e, at which Griffith's criterion holds within e.
 
 The waves are so shallow (A q0 = 6e-6) that the flat and the arc measure of the adhesive area
 (``single_wave``) agree to 3e-11.
@@ -27,7 +27,7 @@ from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.registry import MethodName, make_method
 
 ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-STIFFNESSES = (10.0, 1.0, 0.1, 0.0)  # of what holds the wave, in p*/A; 0 is a load
+STIFFNESSES = (10.0, 1.0, 0.1, 0.0)  # of the control, in p*/A; 0 is a load
 GRIDS = (256, 512, 1024, 2048, 4096)
 AMPLITUDE, PERIOD = 1e-9, 1e-3
 HALF_SPACE = HalfSpace(young=1e6, poisson=0.5)
@@ -36,16 +36,15 @@ MODULUS = HALF_SPACE.modulus
 
 @dataclass(frozen=True)
 class Row:
-    """One claim, judged.
+    """One claim with its error and bound.
 
     Attributes
     ----------
     claim, method, resolution : str
     error, bound : float
-        Not negative; in the units that the claim names, else relative. NaN if the method did not
-        get there.
+        Not negative; in the units of the claim, else relative. NaN if the method raised an error.
     note : str
-        What was measured beside the error, or why there is none.
+        Further measurements, or the reason why there is no error.
     """
 
     claim: str
@@ -57,19 +56,19 @@ class Row:
 
     @property
     def passed(self) -> bool:
-        """Whether the error keeps the bound."""
+        """True if the error is within the bound."""
         return self.error <= self.bound
 
 
 @dataclass(frozen=True)
 class Standard:
-    """How a method is run here, and what it promises.
+    """Settings of a method here, and its stated errors.
 
     Attributes
     ----------
     accuracy : float
     nodes : int or None
-        What it is made with; None for a method without a grid.
+        Settings; None for a method without a grid.
     edge : float
         Resolution e of an edge as a part of λ.
     stress : float
@@ -87,7 +86,7 @@ class Standard:
 
     @property
     def resolution(self) -> str:
-        """For the table."""
+        """Resolution in the table's words."""
         return f"{self.nodes} nodes" if self.nodes else f"accuracy {self.accuracy:g}"
 
 
@@ -99,7 +98,7 @@ METHODS: tuple[MethodName, ...] = tuple(STANDARDS)
 
 
 class Judge:
-    """Runs one method on the scenes of the closed forms.
+    """Comparison of one method with the closed forms.
 
     Parameters
     ----------
@@ -113,7 +112,7 @@ class Judge:
         self._loops: dict[float, tuple[SingleWave, LoopResult]] = {}
 
     def method(self, problem: Problem, nodes: int | None = None) -> Method:
-        """Return the method for ``problem``, by default at the standard's number of nodes."""
+        """Make the method for ``problem``, by default with the standard's number of nodes."""
         nodes = nodes or self.standard.nodes
         per_wave = nodes // problem.profile.highest_harmonic if nodes else None
         return make_method(
@@ -123,12 +122,12 @@ class Judge:
     def row(
         self, claim: str, error: float, bound: float, note: str = "", resolution: str = ""
     ) -> Row:
-        """Return one row; the sign of the error is dropped."""
+        """Make one row, with the absolute value of the error."""
         where = resolution or self.standard.resolution
         return Row(claim, self.name, where, abs(float(error)), float(bound), note)
 
     def worst(self, claim: str, errors: Array, bounds: Array, note: str = "") -> Row:
-        """Return the row of the state whose error comes nearest to its bound.
+        """Make the row of the state with the largest ratio of error to bound.
 
         Raises
         ------
@@ -142,7 +141,7 @@ class Judge:
         return self.row(claim, errors[k], bounds[k], note)
 
     def wave_loop(self, alpha: float) -> tuple[SingleWave, LoopResult]:
-        """Return the closed form at α and the method's loop; the loss does not depend on depth."""
+        """Return the closed form at α and the method's loop; the penetration does not matter."""
         if alpha not in self._loops:
             wave = wave_of(alpha)
             method = self.method(problem_of(wave))
@@ -152,21 +151,21 @@ class Judge:
     # ------------------------------------------------------------------ bounds
 
     def slack(self, function: Callable[[Array, Array], Array], a: Array, s: Array) -> Array:
-        """Change of ``function`` when the half-width is off by the resolution at the same s."""
+        """Compute the change of ``function`` with a change e of the half-width at the same s."""
         step, here = self.standard.edge * PERIOD, function(a, s)
         change = [np.abs(function(a + sign * step, s) - here) for sign in (-1, 1)]
         return np.asarray(np.maximum(*change) + self.standard.stress * np.abs(here))
 
     def unknown_width(self, wave: SingleWave, a: Array, s: Array) -> Array:
-        """Error of the mean stress at a half-width a that is known, and balanced, within e."""
+        """Bound the error of the mean stress at a half-width known, and balanced, within e."""
 
-        def missing(a: Array) -> Array:
+        def imbalance(a: Array) -> Array:
             return wave.mean_stress_at(a, s) - wave.mean_stress(a)
 
         step = self.standard.edge * PERIOD
         changes = [
             [np.abs(function(a + sign * step) - function(a)) for sign in (-1, 1)]
-            for function in (missing, wave.mean_stress)
+            for function in (imbalance, wave.mean_stress)
         ]
         width = np.maximum(*changes[0]) + np.maximum(*changes[1])
         return np.asarray(width + self.standard.stress * wave.full_contact_stress)
@@ -178,11 +177,11 @@ def wave_of(alpha: float) -> SingleWave:
 
 
 def problem_of(wave: SingleWave) -> Problem:
-    """Return the problem that ``wave`` (from :func:`wave_of`) solves."""
+    """Return the problem of a ``wave`` from :func:`wave_of`."""
     return Problem(single_wave(AMPLITUDE, PERIOD), HALF_SPACE, wave.work_of_adhesion)
 
 
 def joined(pairs: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return all errors and all bounds of pairs (errors, bounds)."""
+    """Concatenate the errors and the bounds of pairs (errors, bounds)."""
     errors, bounds = zip(*pairs, strict=True)
     return np.concatenate(errors), np.concatenate(bounds)

@@ -126,7 +126,8 @@ def test_doctor_tells_whether_code_is_compiled(
 ) -> None:
     files = CodeFiles("key")
     monkeypatch.setattr(warm, "code_files", lambda to_installation=False: files)
-    monkeypatch.setattr(files, "_places", [code_cache._Place(tmp_path / "key", installed=True)])
+    place = code_cache._CodeFolder(tmp_path / "key", installed=True)
+    monkeypatch.setattr(files, "_folders", [place])
     before = doctor.compiled_code()
     assert (before.ok, before.needed) == (False, False)
     assert "sharp and grid not yet" in before.text

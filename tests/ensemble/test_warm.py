@@ -157,7 +157,7 @@ def test_compiling_that_takes_a_while_is_told_and_a_moment_is_not(places, monkey
             seen = Compilation(door_tell[-1])
             for i in range(40):
                 seen.functions, seen.seconds = i, seconds * i / 40
-                seen._tell(seen)
+                seen._report(seen)
 
         door_tell = []
         monkeypatch.setattr(warm, "_small_loops", small_loops)

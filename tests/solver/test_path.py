@@ -138,7 +138,7 @@ def test_a_path_may_end_in_contact():
         ([0.5, 0.5], "after loading it must unload"),
         ([0.5, np.nan, 0.6], "must be a finite number"),
         ([1.2], "max_penetration is 1.2"),
-        ([0.5, 0.3], "leave that turning point away"),
+        ([0.5, 0.3], "omit that turning point"),
     ],
 )
 def test_impossible_paths_are_refused(points, rule):

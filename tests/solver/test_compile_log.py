@@ -1,4 +1,4 @@
-"""Compiling that makes one wait who runs a loop from Python is told; a moment of it is not."""
+"""Compilation is logged when it takes longer than a second."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import logging
 
 import pytest
 
-from adhesis.solver.runtime.compile_log import _Teller, hushed
+from adhesis.solver.runtime.compile_log import _CompileLogger, silence_compile_log
 from adhesis.solver.runtime.jit import Compilation
 
 
 def compiling(seconds: float) -> None:
-    """What the compiler tells of so many seconds of work, a function each half second."""
-    teller = _Teller()
+    """Report so many seconds of compilation, one function each half second."""
+    logger = _CompileLogger()
     for i in range(round(2 * seconds) + 1):
         seen = Compilation()
         seen.functions, seen.seconds = i, i / 2
-        teller(seen)
+        logger(seen)
 
 
-def test_a_moment_is_not_told_and_a_minute_is(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_minute_is_logged_and_half_a_second_is_not(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "adhesis")
     compiling(0.5)
     assert caplog.messages == []
@@ -30,7 +30,7 @@ def test_a_moment_is_not_told_and_a_minute_is(caplog: pytest.LogCaptureFixture) 
     assert {record.levelname for record in caplog.records} == {"WARNING"}
 
 
-def test_who_compiles_ahead_tells_in_its_own_way(caplog: pytest.LogCaptureFixture) -> None:
-    with hushed():
+def test_callers_that_report_silence_the_log(caplog: pytest.LogCaptureFixture) -> None:
+    with silence_compile_log():
         compiling(60)
     assert caplog.messages == []
