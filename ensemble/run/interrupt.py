@@ -16,7 +16,7 @@ from adhesis.ensemble.errors import InputError
 # Tasks in progress are given up, and the file is closed, this long (s) before the walltime ends, or
 # this share of it if that is shorter.
 RESERVE, RESERVE_SHARE = 30.0, 0.1
-# Time for workers to answer a stop (s); with a walltime, at most this share of the reserve. The rest
+# Time for workers to answer a stop (s); with a walltime at most this share of the reserve. The rest
 # is for closing the file and ending the ranks.
 GRACE, GRACE_SHARE = 30.0, 0.5
 

@@ -25,7 +25,7 @@ from types import FrameType
 from adhesis import _version
 from adhesis.ensemble.run.interrupt import stop_signals
 
-# Variables that a launcher sets for its ranks. A second launcher that inherits them is taken for one
+# Variables that a launcher sets for its ranks. A second launcher that inherits them passes for one
 # of those ranks: both wait for each other, or end without a message.
 _RANK_MARKS = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE")
 _LAUNCHER_PREFIXES = ("OMPI_", "OPAL_", "ORTE_", "PRTE_", "PMIX_", "PMI_", "HYDI_", "HYDRA_")
