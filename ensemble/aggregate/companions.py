@@ -104,7 +104,7 @@ def read_companion(path: Path | str, campaign: Campaign) -> Companion:
 
 
 def differing_keys(here: Campaign, there: Campaign) -> list[str]:
-    """Keys ("cycle.load_steps") in which the loops of two campaigns differ."""
+    """Return the keys ("cycle.load_steps") in which the loops of two campaigns differ."""
     return [key for key in differing(here, there) if not key.startswith(_IGNORED)]
 
 

@@ -247,7 +247,7 @@ def _quotient(line: Line, series: Sequence[tuple[float, float]]) -> Quotient:
 
 
 def _with_error_of_finer(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Replace the errors of runs (error, seconds), coarse to fine, by the largest of all finer."""
+    """Replace each error of runs (error, seconds), coarse to fine, by the largest from there on."""
     raised: list[tuple[float, float]] = []
     for error, seconds in reversed(series):
         raised.append((max(error, raised[-1][0]) if raised else error, seconds))

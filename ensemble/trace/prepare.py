@@ -165,7 +165,7 @@ def prepare_trace(
 
     References
     ----------
-    docs/measured-profile.md, "What is done to it"
+    docs/measured-profile.md, "Preparation"
     """
     instance("trace", trace, Trace, "read_trace(path)")
     flag(parameter("keep_outliers"), keep_outliers)

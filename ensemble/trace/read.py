@@ -123,7 +123,7 @@ def read_trace(
 
     References
     ----------
-    docs/measured-profile.md, "What is read"
+    docs/measured-profile.md, "Reading"
     """
     path = checks.path("path", path)
     with refused_as_input():
