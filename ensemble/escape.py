@@ -6,7 +6,7 @@ import re
 
 
 def printable(text: str) -> str:
-    r"""Return a text for the terminal: control characters (colours, cursor, title) spelled out.
+    r"""Spell out control characters (colours, cursor, title), for a terminal.
 
     Line ends and tabs stay; ESC becomes ``\x1b``.
     """
@@ -17,17 +17,17 @@ def printable(text: str) -> str:
 
 
 def one_line(text: str) -> str:
-    """Return a text on one line, printable."""
+    """Join the lines of a text, and make it printable."""
     return printable(" ".join(text.split()))
 
 
 def markdown(text: str) -> str:
-    """Return a text as Markdown that shows it as it is: no image, link, HTML, code or table."""
+    """Escape a text as Markdown: no image, link, HTML, code or table is made of it."""
     return re.sub(r"([\\`*\[\]<>&|])", r"\\\1", one_line(text))
 
 
 def code_span(text: str) -> str:
-    """Return a text as Markdown that shows it as code."""
+    """Quote a text as code in Markdown."""
     text = one_line(text)
     ticks = fence(text, 1)
     space = " " if "`" in text else ""
@@ -35,6 +35,6 @@ def code_span(text: str) -> str:
 
 
 def fence(text: str, least: int = 3) -> str:
-    """Return so many backticks that none in the text end what they begin."""
+    """Return more backticks than any run in the text has, at least ``least``."""
     longest = max((len(run) for run in re.findall("`+", text)), default=0)
     return "`" * max(least, longest + 1)

@@ -1,4 +1,4 @@
-"""A line now and then while something takes long that cannot tell of itself."""
+"""Log a line now and then while a long call reports no progress itself."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from contextlib import contextmanager
 _EVERY = 10.0  # s
 
 
-def tell(text: str) -> None:
-    """Write a line to stderr, at once."""
+def log(text: str) -> None:
+    """Write a line to stderr, unbuffered."""
     print(text, file=sys.stderr, flush=True)
 
 
 @contextmanager
 def ticking(
-    what: Callable[[], str] | str, say: Callable[[str], None] = tell, every: float = _EVERY
+    task: Callable[[], str] | str, write: Callable[[str], None] = log, every: float = _EVERY
 ) -> Iterator[None]:
-    """While this lasts, tell every so often what is under way and for how long.
+    """Log at intervals which task is under way, and for how long.
 
-    Nothing is told of what is over before.
+    A task that ends within the first interval is not logged.
 
     Parameters
     ----------
-    what : str or callable
-        What is under way, or what tells it; a callable is called by another thread.
-    say : callable
-        Gets a line.
+    task : str or callable
+        Description of the task, or a callable that returns it; it is called by another thread.
+    write : callable
+        Takes a line.
     every : float
         Time between lines, in s.
     """
@@ -38,8 +38,8 @@ def ticking(
 
     def lines() -> None:
         while not over.wait(every):
-            text = what if isinstance(what, str) else what()
-            say(f"{text} ({time.monotonic() - started:.0f} s)")
+            text = task if isinstance(task, str) else task()
+            write(f"{text} ({time.monotonic() - started:.0f} s)")
 
     thread = threading.Thread(target=lines, daemon=True)
     thread.start()

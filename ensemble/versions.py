@@ -1,4 +1,4 @@
-"""What is installed, and what computed a results file: versions as texts."""
+"""Look up the versions of installed packages and of the code that runs."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def adhesis_version() -> str:
 
 
 def installed() -> dict[str, str]:
-    """Version texts by name: the packages, python, mpi, hdf5 and fftw; or why one does not load.
+    """Return versions by name: packages, python, mpi, hdf5 and fftw; or why one does not load.
 
-    Does not initialise MPI: where this process has not loaded it, ``mpi`` says so.
+    MPI is not initialised: where this process has not loaded it, ``mpi`` is "not loaded".
     """
     mpi = sys.modules.get("mpi4py.MPI")
     return {
@@ -50,11 +50,11 @@ def installed() -> dict[str, str]:
 
 
 def last_lines(text: str, count: int = 2) -> str:
-    """Return the last lines of a message that say something, as one line."""
+    """Join the last lines of a message that hold letters or digits."""
     lines = [" ".join(line.split()) for line in text.splitlines()]
-    # Rulers and empty lines of a launcher's message say nothing.
-    telling = [line for line in lines if any(c.isalnum() for c in line)]
-    return " / ".join(telling[-count:])[:300] or "no message"
+    # A launcher's message ends with rulers and empty lines.
+    filled = [line for line in lines if any(c.isalnum() for c in line)]
+    return " / ".join(filled[-count:])[:300] or "no message"
 
 
 def commit() -> str:

@@ -1,4 +1,4 @@
-"""Averages over realisations, from results files alone, in bounded memory.
+"""Average over realisations, from results files alone, in bounded memory.
 
-Import from its modules; :func:`adhesis.ensemble.aggregate.average.aggregate` gives all of it.
+Import from its modules; :func:`adhesis.ensemble.aggregate.average.aggregate` computes all averages.
 """

@@ -1,9 +1,9 @@
-"""Averages over realisations, from a results file alone.
+"""Average over realisations, from a results file alone.
 
-A cell is one point on the axes of the campaign: an (H, γ), and a value of what else is a list.
+A cell is one point on the axes of the campaign: an (H, γ), and a value of each further list.
 Scalars of all tasks fit in memory; curves do not, so they pass through a bounded block of columns
-at a time. Only rows whose status is "done" are read: the status byte is written last, so a file
-that a run is still writing gives a consistent answer.
+at a time. Only rows whose status is "done" are read: the status byte is written last, so the
+averages of a file that a run is still writing are consistent.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from adhesis.ensemble.results.schema import FAILED
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
-_MOST_FAILURES = 20
+_MAX_FAILURES = 20
 
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Loss at ``upper`` minus loss at ``lower`` γ (J/m²), on the same profiles, else alike.
+    """Loss at ``upper`` less loss at ``lower`` γ (J/m²), all else being equal.
 
-    The profiles are the same across γ, so the difference of each realisation is known much better
-    than the difference of the two means.
+    The profiles are the same for all γ, so the mean of the differences is known much better than
+    the difference of the two means.
     """
 
     hurst: float
@@ -51,7 +51,7 @@ class PairedDifference:
 
 @dataclass(frozen=True, eq=False)
 class Aggregate:
-    """What a report needs of a results file.
+    """Averages and metadata of a results file that a report needs.
 
     Attributes
     ----------
@@ -69,12 +69,12 @@ class Aggregate:
     failures : tuple of (int, str)
         Row and error text of the first failed tasks.
     doubts : tuple of str
-        A sentence about each file, this one and those beside it, with damaged rows, which are left
-        out, or without checksums.
+        One sentence for each file, this one or a companion, that has damaged rows (left out), or no
+        checksums.
     companions : tuple of Companion
-        Other campaigns that the report sets beside this one.
+        Other campaigns that the report compares with this one.
     damaged : int
-        Rows of this file that are.
+        Number of damaged rows of this file.
     """
 
     path: Path
@@ -91,17 +91,17 @@ class Aggregate:
 
     @property
     def done(self) -> int:
-        """Finished tasks."""
+        """Number of finished tasks."""
         return sum(cell.done for cell in self.cells)
 
     @property
     def failed(self) -> int:
-        """Failed tasks."""
+        """Number of failed tasks."""
         return sum(cell.failed for cell in self.cells)
 
     @property
     def pending(self) -> int:
-        """Tasks that wait, or are being computed."""
+        """Number of tasks that wait, or are being computed."""
         return sum(cell.pending for cell in self.cells)
 
     @property
@@ -121,9 +121,9 @@ class Aggregate:
 
     @cached_property
     def shown(self) -> Aggregate:
-        """One cell for each (H, γ), all at the same place on the further axes: the last finished.
+        """One cell for each (H, γ), all at the last finished point of the further axes.
 
-        The last is where all of them are largest, as far as they are combined.
+        At the last point all further axes have their largest value, if they are combined.
         """
         if not self.further:
             return self
@@ -134,15 +134,15 @@ class Aggregate:
         layer = next(m for m in reversed(layers) if any(self.cells[k].done for k in m))
         return self._part(list(layer))
 
-    def _part(self, places: list[int]) -> Aggregate:
-        cells = tuple(self.cells[k] for k in places)
+    def _part(self, indices: list[int]) -> Aggregate:
+        cells = tuple(self.cells[k] for k in indices)
         keys = {(cell.hurst, cell.others) for cell in cells}
         return replace(
             self,
             cells=cells,
             paired=tuple(pair for pair in self.paired if (pair.hurst, pair.others) in keys),
-            jumps=self.jumps.part(places),
-            fields=self.fields.part(places),
+            jumps=self.jumps.part(indices),
+            fields=self.fields.part(indices),
         )
 
     def cell(self, hurst: float, work_of_adhesion: float) -> Cell | None:
@@ -154,7 +154,7 @@ class Aggregate:
 
 
 def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
-    """Average a results file over realisations; ``beside`` are files to set beside it.
+    """Average a results file over realisations; ``beside`` are files to compare with it.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
                 for curve, averages in average_curves(results, branch, name, rows, scales).items():
                     for cell, average in zip(cells, averages, strict=True):
                         cell.curves[f"{branch}_{curve}"] = average
-        failed = np.flatnonzero(status == FAILED)[:_MOST_FAILURES]
+        failed = np.flatnonzero(status == FAILED)[:_MAX_FAILURES]
         companions = tuple(read_companion(other, results.campaign) for other in beside)
         return Aggregate(
             path=results.path,
@@ -188,7 +188,7 @@ def aggregate(path: Path | str, beside: Sequence[Path | str] = ()) -> Aggregate:
 
 
 def _curve_scales(cells: Sequence[Cell]) -> dict[str, dict[str, list[Array]]]:
-    """Datasets to average, and what to make of each: curve -> factor per row, cell by cell."""
+    """Return, by dataset, the curves to average: curve -> factor of each row, cell by cell."""
     ones = [np.ones(cell.done) for cell in cells]
     stress = [1 / stress_scale(cell.campaign, cell.values["h_max"]) for cell in cells]
     slope = [s / np.sqrt(cell.values["m2"]) for s, cell in zip(stress, cells, strict=True)]

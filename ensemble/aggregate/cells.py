@@ -1,4 +1,4 @@
-"""Cells of a campaign, one point on its axes each: numbers of their finished tasks, and means."""
+"""Read the cells of a campaign, one point on its axes each: values of finished tasks, and means."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _WITH_INTERVAL = (
     "effective_work_of_approach",
     "effective_work_of_separation",
 )
-# Energies that are told per largest contact area too, in J/m² of contact.
+# Energies that are also given per largest contact area, in J/m² of contact.
 _PER_CONTACT = {
     "loss_per_contact": "loss",
     "effective_work_of_approach": "work_gained",
@@ -65,13 +65,13 @@ class Cell:
     others : tuple of (str, number)
         Names of the further axes, and the values there.
     campaign : Campaign
-        With the values of the cell in its tables.
+        Its tables hold the values of the cell.
     penetration : dict of array
         Δ/h_max of the curves of each branch.
     plan : FieldPlan
-        Of the states that have fields: their Δ/h_max, wave numbers, positions.
+        States with stored fields: their Δ/h_max, wave numbers, positions.
     done, failed, pending : int
-        Tasks.
+        Numbers of tasks.
     rows : int array, shape (done,)
         Rows of the done tasks in the file, by realisation.
     realisation, seed : int array, shape (done,)
@@ -82,8 +82,8 @@ class Cell:
         ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
         spent per largest contact area, in J/m²).
     estimates : dict of Estimate
-        The same, averaged, but for ``valid_range``, ``edge_range`` and
-        ``largest_interior_tension``. Only losses, pull-off and largest contact have an interval.
+        Means of these, but not of ``valid_range``, ``edge_range``, ``largest_interior_tension``. Only
+        losses, pull-off and largest contact have an interval.
     curves : dict of Curve
         ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
         (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,
@@ -140,11 +140,11 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
     names = [axis.name for axis in campaign.axes[2:]]
     axes = [hurst, gamma, *(results.column(d.name) for d in axis_datasets(campaign))]
     for h, g, *others in sorted(set(zip(*(axis.tolist() for axis in axes), strict=True))):
-        at = zip(axes, (h, g, *others), strict=True)
-        mine = np.flatnonzero(np.all([axis == value for axis, value in at], axis=0))
+        point = zip(axes, (h, g, *others), strict=True)
+        rows_of_cell = np.flatnonzero(np.all([axis == value for axis, value in point], axis=0))
         task = Task(h, g, 0, 0, tuple(zip(names, others, strict=True)))
         here, unit = campaign.at(task), campaign.penetration_unit(task)
-        rows = mine[status[mine] == DONE]
+        rows = rows_of_cell[status[rows_of_cell] == DONE]
         rows = rows[np.argsort(realisation[rows], kind="stable")]
         values = {name: column[rows].astype(float) for name, column in columns.items()}
         drops = values["loss_from_drops"]
@@ -156,7 +156,7 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
         scale = stress_scale(here, values["h_max"]) * values["h_max"]
         for name in ("loss_error", "energy_at_stake"):
             values[f"{name}_dimensionless"] = values[name] / scale
-        failed = int(np.sum(status[mine] == FAILED))
+        failed = int(np.sum(status[rows_of_cell] == FAILED))
         cells.append(
             Cell(
                 hurst=h,
@@ -170,7 +170,7 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
                 plan=field_plan(campaign, task),
                 done=rows.size,
                 failed=failed,
-                pending=int(np.sum(status[mine] == PENDING)),
+                pending=int(np.sum(status[rows_of_cell] == PENDING)),
                 rows=rows,
                 realisation=realisation[rows].astype(np.int64),
                 seed=seed[rows],
@@ -186,7 +186,7 @@ def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
     with_interval = np.array([values[name] for name in _WITH_INTERVAL])
     found = dict(zip(_WITH_INTERVAL, estimates(with_interval), strict=True))
     share = found["small_scale_share"]
-    low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval knows no bounds
+    low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave [0, 1]
     found["small_scale_share"] = replace(share, low=float(low), high=float(high))
     rest = [name for name in values if name not in found and name not in _NOT_AVERAGED]
     plain = estimates(np.array([values[name] for name in rest]), with_interval=False)
@@ -194,6 +194,6 @@ def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
 
 
 def stress_scale(campaign: Campaign, h_max: Array) -> Array:
-    """Mean stress in Pa at σ~ = 1, for every h_max in m."""
+    """Return the mean stress in Pa at σ~ = 1, for each h_max in m."""
     half_space = HalfSpace(campaign.material.young, campaign.material.poisson)
     return np.asarray(problem.stress_scale(half_space, campaign.profile.period, h_max))

@@ -1,4 +1,4 @@
-"""Campaigns set beside one another: the same loops with another resolution, path or spectrum.
+"""Compare campaigns: the same loops with another resolution, path or spectrum.
 
 Two campaigns that share their seed have the same phases realisation by realisation, so the
 difference of their losses is taken profile by profile.
@@ -23,13 +23,13 @@ from adhesis.ensemble.results.read import Results
 
 Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]
 
-# What is computed, and what is kept of it, do not change a loop.
+# Keys that choose tasks and outputs, and do not change a loop.
 _IGNORED = ("sweep.", "stop.", "output.", "solver.time_limit")
 
 
 @dataclass(frozen=True, eq=False)
 class Companion:
-    """Another campaign.
+    """Campaign that is compared with the reported one.
 
     Attributes
     ----------
@@ -39,10 +39,10 @@ class Companion:
     differs : tuple of str
         "key = value" of the keys that differ, with the values of this campaign.
     kind : str
-        What the difference is about: "resolution" (the solver), "load steps", "penetration" (the
+        Subject of the difference: "resolution" (the solver), "load steps", "penetration" (the
         largest one, load steps may go with it), "spectrum" (the profile), "other".
     further : tuple of Axis
-        Axes beside H and γ of the campaign that this one is set beside.
+        Axes beside H and γ of the reported campaign.
     doubts : tuple of str
         Sentences on damage of the file.
     """
@@ -56,7 +56,7 @@ class Companion:
     doubts: tuple[str, ...] = ()
 
     def like(self, cell: Cell) -> Cell | None:
-        """Return the cell of the same H, γ and place on the further axes of either campaign.
+        """Return the cell of the same H, γ and values on the further axes of either campaign.
 
         None if this campaign lacks it.
         """
@@ -81,7 +81,7 @@ class LossDifference:
 
 
 def read_companion(path: Path | str, campaign: Campaign) -> Companion:
-    """Read another results file and say how its campaign differs.
+    """Read another results file and the keys in which its campaign differs.
 
     Raises
     ------
@@ -104,12 +104,12 @@ def read_companion(path: Path | str, campaign: Campaign) -> Companion:
 
 
 def differing_keys(here: Campaign, there: Campaign) -> list[str]:
-    """Keys ("cycle.load_steps") in which the loops of two campaigns differ."""
+    """Return the keys ("cycle.load_steps") in which the loops of two campaigns differ."""
     return [key for key in differing(here, there) if not key.startswith(_IGNORED)]
 
 
 def kind_of(keys: Sequence[str]) -> Kind:
-    """Say what a difference in these keys is about; see :class:`Companion`."""
+    """Classify a difference in these keys; see :class:`Companion`."""
     if keys and all(key.startswith("solver.") for key in keys):
         return "resolution"
     if list(keys) == ["cycle.load_steps"]:
@@ -122,10 +122,10 @@ def kind_of(keys: Sequence[str]) -> Kind:
 
 
 def difference(here: Cell, there: Cell) -> LossDifference | None:
-    """Compare the losses of the realisations that both have finished; None without any."""
+    """Compare losses over the realisations that both have finished; None if there are none."""
     _, mine, theirs = np.intersect1d(here.seed, there.seed, assume_unique=True, return_indices=True)
     if not mine.size:
         return None
-    one = here.values["loss_dimensionless"][mine]
-    two = there.values["loss_dimensionless"][theirs]
-    return LossDifference(*estimates(np.array([one, two, two - one])))
+    own = here.values["loss_dimensionless"][mine]
+    other = there.values["loss_dimensionless"][theirs]
+    return LossDifference(*estimates(np.array([own, other, other - own])))

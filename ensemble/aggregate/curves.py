@@ -1,4 +1,4 @@
-"""Curves over realisations on the common penetration axis: mean, standard deviation, quantiles."""
+"""Average curves on the common penetration axis: mean, standard deviation, quantiles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Curve:
     ----------
     mean, std : array, shape (points,)
         std has n - 1 in the denominator; NaN for one realisation.
-        A realisation that has detached counts, with zero.
+        A realisation that has detached is counted, as zero.
     quantiles : array, shape (len(QUANTILES), points)
     """
 
@@ -46,9 +46,10 @@ def average_curves(
     results : Results
     branch : {"loading", "unloading"}
     name : str
-    rows : one int array for each cell
-    scales : mapping of one array for each cell
-        Curves to make of the dataset: the factor of each row of the cell.
+    rows : sequence of int array
+        Rows of each cell.
+    scales : mapping of sequences of array
+        Curves to make of the dataset; one array for each cell, with the factor of each row.
 
     Returns
     -------
@@ -63,7 +64,7 @@ def average_curves(
             if not mine.size:
                 continue
             raw = table[np.searchsorted(done, mine)]
-            if name == "patches":  # none are told beyond the turning point of a load
+            if name == "patches":  # -1 beyond the turning point of a load: not known
                 raw[raw < 0] = np.nan
             for curve, factors in scales.items():
                 values = raw * factors[k][:, None]

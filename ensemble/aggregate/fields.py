@@ -1,7 +1,7 @@
-"""Spectra and densities of chosen states, averaged over realisations; shapes of the first one.
+"""Average spectra and densities of chosen states over realisations; read shapes of the first one.
 
-A state without contact has no deformation to speak of and is left out, so every average comes with
-its own number of realisations.
+A state without contact is not deformed and left out, so each average has its own number of
+realisations.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ class DeformedShape:
     Attributes
     ----------
     row : int
-        In the results file.
+        Row in the results file.
     h_max : float
         In m.
     height : array, shape (nodes,)
         Rigid profile h in m.
     displacement : array, shape (2, penetrations, nodes)
-        Deformed surface v in m, loading and unloading; NaN where it had no contact.
+        Deformed surface v in m, loading and unloading; NaN where there is no contact.
     """
 
     row: int
@@ -50,8 +50,8 @@ class FieldStatistics:
     penetration : array, shape (penetrations,)
         Δ/h_max of the states, or Δ over the largest one if the campaign has several of these.
     gap_bin, height_bin : array
-        Middles of the bins: gap/h_max, height/h_rms. Those of the wave numbers, and the positions
-        of the nodes of shapes, are in the plan of each cell.
+        Middles of the bins: gap/h_max, height/h_rms. Wave numbers, and positions of the nodes of
+        shapes, are in the plan of each cell.
     psd_height : array, shape (cells, wave numbers)
         In m³; NaN for a cell without finished tasks.
     height_density : array, shape (cells, height bins)
@@ -59,9 +59,9 @@ class FieldStatistics:
         In m³, second axis loading and unloading.
     gap_density : array, shape (cells, 2, penetrations, gap bins)
     in_contact : int array, shape (cells, 2, penetrations)
-        Realisations averaged in the last two.
+        Number of realisations averaged in the last two.
     shapes : tuple of DeformedShape or None
-        Of the first finished realisation that kept its fields.
+        Shapes of the first finished realisation whose fields are stored.
     """
 
     penetration: Array
@@ -75,7 +75,7 @@ class FieldStatistics:
     shapes: tuple[DeformedShape | None, ...]
 
     def part(self, cells: Sequence[int]) -> FieldStatistics:
-        """The same of some of the cells."""
+        """Return the averages of some of the cells."""
         chosen = list(cells)
         return replace(
             self,
@@ -108,7 +108,7 @@ def aggregate_fields(results: Results, rows: Sequence[NDArray[np.intp]]) -> Fiel
 
 
 def fitted_slope(plan: FieldPlan, density: Array) -> tuple[float, float]:
-    """Exponent of a power law through a spectrum at small wave numbers, and its standard error.
+    """Fit a power law to a spectrum at small wave numbers: exponent and its standard error.
 
     Least squares in the logarithms over the lowest decade of the profile's spectrum (over its lower
     half if it is shorter than two decades). NaN if fewer than three bins lie there.
@@ -129,7 +129,7 @@ def fitted_slope(plan: FieldPlan, density: Array) -> tuple[float, float]:
 def _average(
     results: Results, name: str, rows: Sequence[NDArray[np.intp]]
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Mean over the rows of each cell that hold numbers, and how many do.
+    """Average the rows of each cell that hold finite numbers; return means and counts.
 
     The count has the shape of the mean without its last axis.
     """
@@ -156,18 +156,18 @@ def _shapes(results: Results, rows: Sequence[NDArray[np.intp]]) -> tuple[Deforme
     kept = results.column(KEPT)
     out: list[DeformedShape | None] = []
     for mine in rows:
-        places = np.flatnonzero(np.isin(kept, mine))
-        if not places.size:
+        slots = np.flatnonzero(np.isin(kept, mine))
+        if not slots.size:
             out.append(None)
             continue
-        place = slice(int(places[0]), int(places[0]) + 1)
-        row = int(kept[places[0]])
+        slot = slice(int(slots[0]), int(slots[0]) + 1)
+        row = int(kept[slots[0]])
         out.append(
             DeformedShape(
                 row=row,
                 h_max=float(results.column("h_max", slice(row, row + 1))[0]),
-                height=results.column("field_height", place)[0].astype(float),
-                displacement=results.column("field_displacement", place)[0].astype(float),
+                height=results.column("field_height", slot)[0].astype(float),
+                displacement=results.column("field_displacement", slot)[0].astype(float),
             )
         )
     return tuple(out)

@@ -1,7 +1,7 @@
-"""Statistics of the catalogue of jumps: how many, of which kind, how large.
+"""Count the jumps of the catalogue by kind and energy drop.
 
-The catalogue (task × jump) is streamed in blocks of rows. A task that made more jumps than the
-catalogue holds kept those with the largest drops; the statistics say how much energy is missing.
+The catalogue (task × jump) is read in blocks of rows. Of a task with more jumps than the catalogue
+holds it has those with the largest drops; ``truncated`` counts such tasks.
 """
 
 from __future__ import annotations
@@ -35,16 +35,17 @@ class JumpStatistics:
     ----------
     kinds : tuple of str
     small_scale : bool array, shape (kinds,)
-        Whether edges only run inside existing patches.
+        Whether jumps of a kind only move edges inside existing patches.
     tasks : int array, shape (cells,)
+        Number of tasks.
     number : int array, shape (cells, kinds)
-        Jumps in all tasks together.
+        Number of jumps in all tasks together.
     energy : array, shape (cells, kinds)
         Their drops, J/m² of nominal area, in all tasks together.
     histogram : int array, shape (cells, kinds, bins)
-        Jumps by energy drop, between :data:`BIN_EDGES`.
+        Number of jumps by energy drop, between :data:`BIN_EDGES`.
     truncated : int array, shape (cells,)
-        Tasks that made more jumps than the catalogue holds.
+        Number of tasks that made more jumps than the catalogue holds.
     """
 
     kinds: tuple[str, ...]
@@ -56,7 +57,7 @@ class JumpStatistics:
     truncated: NDArray[np.int64]
 
     def part(self, cells: Sequence[int]) -> JumpStatistics:
-        """The same of some of the cells."""
+        """Return the statistics of some of the cells."""
         chosen = list(cells)
         return replace(
             self,
@@ -69,7 +70,7 @@ class JumpStatistics:
 
 
 def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpStatistics:
-    """Stream the catalogue of the given rows, one array of rows for each cell."""
+    """Count the jumps of the given rows, one array of rows for each cell."""
     tasks, slots = len(results), results.campaign.output.jumps
     cell_of = np.full(tasks, -1)
     for k, mine in enumerate(rows):
@@ -88,10 +89,10 @@ def aggregate_jumps(results: Results, rows: Sequence[NDArray[np.intp]]) -> JumpS
         used = (flags >= 0) & (cells >= 0)[:, None]
         cell = np.broadcast_to(cells[:, None], flags.shape)[used]
         kind, drop = flags[used].astype(np.intp), drops[used]
-        place = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)
+        bin_of_drop = np.clip(np.searchsorted(BIN_EDGES, drop, side="right") - 1, 0, bins - 1)
         np.add.at(number, (cell, kind), 1)
         np.add.at(energy, (cell, kind), drop)
-        np.add.at(histogram, (cell, kind, place), 1)
+        np.add.at(histogram, (cell, kind, bin_of_drop), 1)
     count = results.column("jump_count")
     return JumpStatistics(
         kinds=tuple(JUMP_KINDS),

@@ -1,4 +1,4 @@
-"""Speed against error of each method: scenes, runs in processes of their own, tables, figure.
+"""Measure speed against error of each method: scenes, runs in own processes, tables, figure.
 
-Import from its modules; light, as the memory of the measuring process is part of the result.
+Import from its modules. This one imports nothing: the memory of the measuring process is a result.
 """

@@ -1,9 +1,9 @@
-"""What accuracy costs: CPU time and memory of every method against its error in the loss.
+"""Compare CPU time and memory of every method at equal error in the loss.
 
 On every scene (:mod:`adhesis.ensemble.bench.scenes`) each method runs the same loop at several
 resolutions, every run in a process of its own (:mod:`adhesis.ensemble.bench.measure`). Errors are
 those of the loop integral, relative to the closed form or to a reference run of ``sharp`` that is
-tighter than every measured one.
+more accurate than every measured one.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ __all__ = [
     "ratios",
 ]
 
-# Doubling the nodes costs a grid run up to this factor.
-_NEXT_GRID = 4.0
-# The reference may take this many times the limit of a measured run.
-_REFERENCE_PATIENCE = 3.0
-# tamaas does not locate jumps: its steps are finer by this factor.
+# Doubling the nodes multiplies the time of a grid run by up to this factor.
+_COST_OF_DOUBLING = 4.0
+# Time limit of the reference run, in units of that of a measured run.
+_REFERENCE_LIMIT = 3.0
+# tamaas does not locate jumps, so its load steps are finer by this factor.
 _TAMAAS_STEPS = {"one-wave": 5}
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The loss that errors are measured against, in J/m², and what it is."""
+    """Loss to which errors refer, in J/m², and its origin."""
 
     loss: float
     text: str
@@ -67,9 +67,9 @@ class Line:
 class Quotient:
     """A ratio of CPU times at equal error.
 
-    ``bound`` is "" if the error lies within the grid's series (interpolated, log-log), ">" if no
-    grid run is as exact (``value`` is then the ratio to the most exact one: the true one is
-    larger), "<" if the cheapest grid run is already more exact.
+    ``bound`` is "" if the error lies within the series of grids (interpolated, log-log), ">" if no
+    grid run is as accurate (``value`` is then the ratio to the most accurate one, and a lower
+    bound), "<" if the cheapest grid run is more accurate (an upper bound).
     """
 
     value: float
@@ -81,35 +81,36 @@ class Ratio:
     """CPU time of ``grid`` over that of one run of ``sharp``, at the error of the latter.
 
     The errors of ``grid`` come from single jumps and change their sign from one number of nodes to
-    the next: a coarse grid can be right by chance, and who has no reference does not know when.
+    the next: a coarse grid can be accurate by chance, which only a reference shows.
 
     Attributes
     ----------
-    kept : Quotient
-        To the grid from which on every finer one that finished is as exact.
-    lucky : Quotient
-        To the cheapest grid that happens to be as exact.
+    converged : Quotient
+        Ratio to the coarsest grid that is at least as accurate, as are all finer ones that
+        finished.
+    cheapest : Quotient
+        Ratio to the cheapest grid that is at least as accurate, perhaps by chance.
     """
 
     line: Line
-    kept: Quotient
-    lucky: Quotient
+    converged: Quotient
+    cheapest: Quotient
 
 
 @dataclass(frozen=True)
 class Exponent:
-    """Growth of the CPU time of ``sharp`` as a power, by least squares in the logarithms.
+    """Exponent of a power law of the CPU time of ``sharp``, by least squares in the logarithms.
 
     Attributes
     ----------
     among : str
-        What the lines have in common.
+        Property that the lines share.
     variable : str
-        What grows.
+        Name of the independent variable.
     least, most : int
-        Its range.
+        Range of the variable.
     of_loop, of_solution : float
-        Exponents of the CPU time of a loop, and of a solution.
+        Exponents of the CPU time of a loop and of a solution.
     """
 
     among: str
@@ -132,10 +133,10 @@ def benchmark(
     ----------
     scenes : sequence of Scene
     seconds : float
-        CPU seconds after which a run is given up; a grid that would take longer, judged by the one
-        before it, is left out. Both show as lines with a note.
+        CPU seconds after which a run is given up. A grid that would take longer, estimated from the
+        one before it, is left out. Both give lines with a note.
     on_line : callable, optional
-        Called with every line as it is measured.
+        Called with every line after it is measured.
     """
     lines: list[Line] = []
     _fill_caches()
@@ -156,7 +157,7 @@ def growth(
     seconds: float = 360.0,
     on_line: Callable[[Line], None] | None = None,
 ) -> list[Line]:
-    """Measure how cost grows; these lines have no reference and no error."""
+    """Measure the growth of cost; these lines have no reference and no error."""
     unknown = Reference(math.nan, "none")
     lines: list[Line] = []
     _fill_caches()
@@ -175,10 +176,10 @@ def growth(
 
 
 def exponents(lines: Sequence[Line]) -> list[Exponent]:
-    """Fit how the CPU time of ``sharp`` grows with its patches, and with the wave numbers.
+    """Fit the growth of the CPU time of ``sharp`` with its patches, and with the wave numbers.
 
-    From each series of finished lines of :func:`growth` that differ in γ alone, or in the highest
-    harmonic alone.
+    A series is made of the finished lines of :func:`growth` that differ in γ alone, or in the
+    highest harmonic alone.
     """
     done = [line for line in lines if line.run.method == "sharp" and not line.measured.note]
     found = []
@@ -227,8 +228,8 @@ def ratios(lines: Sequence[Line]) -> list[Ratio]:
             and math.isfinite(other.error)
         ]
         if series:
-            kept, lucky = _quotient(line, _kept(series)), _quotient(line, series)
-            found.append(Ratio(line, kept, lucky))
+            converged = _quotient(line, _with_error_of_finer(series))
+            found.append(Ratio(line, converged, _quotient(line, series)))
     return found
 
 
@@ -245,16 +246,16 @@ def _quotient(line: Line, series: Sequence[tuple[float, float]]) -> Quotient:
     return Quotient(float(np.exp(at_equal_error) / own), "")
 
 
-def _kept(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Runs (error, seconds), coarse to fine, each with the largest error of it and finer ones."""
-    kept: list[tuple[float, float]] = []
+def _with_error_of_finer(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Replace each error of runs (error, seconds), coarse to fine, by the largest from there on."""
+    raised: list[tuple[float, float]] = []
     for error, seconds in reversed(series):
-        kept.append((max(error, kept[-1][0]) if kept else error, seconds))
-    return kept[::-1]
+        raised.append((max(error, raised[-1][0]) if raised else error, seconds))
+    return raised[::-1]
 
 
 def _front(series: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Runs (error, seconds) that no cheaper run beats in error; errors fall along the list."""
+    """Select the runs (error, seconds) that no cheaper run beats; errors fall along the list."""
     front: list[tuple[float, float]] = []
     for error, seconds in sorted(series, key=lambda pair: pair[1]):
         if not front or error < front[-1][0]:
@@ -276,17 +277,17 @@ def _runs(scene: Scene, seconds: float) -> Iterator[Run]:
 
 
 def _left_out(run: Run, before: Sequence[Line]) -> Measurement | None:
-    """Measurement of a grid run that would take too long; None if it should be tried."""
+    """Return a note for a grid run that would take too long; None if it should be tried."""
     if run.method != "grid" or not before:
         return None
-    last = before[-1].measured.cpu_seconds  # NaN if that one did not finish either
-    if last * _NEXT_GRID <= run.seconds:
+    last = before[-1].measured.cpu_seconds  # NaN if that run did not finish
+    if last * _COST_OF_DOUBLING <= run.seconds:
         return None
     return Measurement(note=f"left out: it would take more than {run.seconds:g} s")
 
 
 def _fill_caches() -> None:
-    """Compile what is kept on disk: a compiler in the process would count as its memory."""
+    """Fill the cache of compiled code: a compiler in the process would count as its memory."""
     measure(Run(WARM_UP, "sharp", 1e-2, WARM_UP.load_steps, 60.0))
 
 
@@ -294,8 +295,8 @@ def _reference(scene: Scene, seconds: float) -> Reference:
     if scene.exact_loss is not None:
         return Reference(scene.exact_loss, "closed form")
     for accuracy in scene.tightest:
-        patience = _REFERENCE_PATIENCE * seconds
-        run = Run(scene, "sharp", accuracy, scene.reference_load_steps, patience)
+        limit = _REFERENCE_LIMIT * seconds
+        run = Run(scene, "sharp", accuracy, scene.reference_load_steps, limit)
         loss = measure(run).loss
         if math.isfinite(loss):
             text = f"sharp, accuracy {run.described}, {run.load_steps} load steps"

@@ -1,4 +1,4 @@
-"""The figure of the benchmark: error in the loss against CPU time, one panel a scene."""
+"""Draw the figure of the benchmark: error in the loss against CPU time, one panel a scene."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from adhesis.ensemble.report.figures.style import (
 _METHODS = ("grid", "sharp", "tamaas")
 _PANELS_IN_A_ROW = 2
 _PANEL_HEIGHT = 62 * MM
-# Errors below this are rounding or chance; they are drawn here.
-_LEAST_ERROR = 1e-10
+# Smaller errors are rounding or chance, and are drawn at this value.
+_MIN_ERROR = 1e-10
 
 
 def draw(lines: Sequence[Line]) -> Figure:
-    """Return the figure; runs that did not finish are left out."""
+    """Draw the figure; runs that did not finish are left out."""
     scenes = list(dict.fromkeys(line.run.scene for line in lines))
     columns = min(len(scenes), _PANELS_IN_A_ROW)
     rows = math.ceil(len(scenes) / columns)
@@ -55,10 +55,10 @@ def draw(lines: Sequence[Line]) -> Figure:
                     shown[method] = _series(axes, method, chosen)
             label_panel(axes, scenes[k].title)
             axes.set(xlabel="CPU time (s)", ylabel="|error in the loss| / loss")
-        # One range for all, so that the panels can be compared; room at the sides for the labels.
+        # One range for all, so that the panels can be compared; with margins for the labels.
         finished = [line for line in lines if math.isfinite(line.error)]
         seconds = [line.measured.cpu_seconds for line in finished]
-        errors = [_drawn_error(line) for line in finished]
+        errors = [_plotted_error(line) for line in finished]
         for axes in figure.axes if finished else ():
             axes.set(xscale="log", yscale="log")
             axes.set_xlim(min(seconds) / 2, 2.5 * max(seconds))
@@ -69,20 +69,21 @@ def draw(lines: Sequence[Line]) -> Figure:
 
 
 def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
-    """Draw one method's runs, each with its setting beside it."""
+    """Draw the runs of one method, each with its setting beside it."""
     k = _METHODS.index(method)
-    # The darkest for sharp, so that the methods differ in grey too.
+    # sharp has the darkest colour, so that the methods differ in grey too.
     of_method = {"grid": look(0), "sharp": replace(look(2), marker="s"), "tamaas": look(3)}
     chosen: Look = of_method[method]
     seconds = [line.measured.cpu_seconds for line in lines]
-    errors = [_drawn_error(line) for line in lines]
+    errors = [_plotted_error(line) for line in lines]
     (drawn,) = axes.plot(
         seconds, errors, color=chosen.colour, marker=chosen.marker, ls=LINES[k], label=method
     )
-    for place, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
-        # Left below for sharp, right for the others, by turns above and below: runs lie close.
+    for number, (line, x, y) in enumerate(zip(lines, seconds, errors, strict=True)):
+        # Left below for sharp; right for the others, alternately above and below, as they lie
+        # close.
         left = method == "sharp"
-        below = left or place % 2 == 1
+        below = left or number % 2 == 1
         axes.annotate(
             _short(line),
             (x, y),
@@ -96,8 +97,8 @@ def _series(axes: Axes, method: str, lines: Sequence[Line]) -> Line2D:
     return drawn
 
 
-def _drawn_error(line: Line) -> float:
-    return max(abs(line.error), _LEAST_ERROR)
+def _plotted_error(line: Line) -> float:
+    return max(abs(line.error), _MIN_ERROR)
 
 
 def _short(line: Line) -> str:

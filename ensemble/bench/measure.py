@@ -1,6 +1,6 @@
-"""One measured loop in a process of its own: ``python -m adhesis.ensemble.bench.measure``.
+"""Measure one loop in a process of its own: ``python -m adhesis.ensemble.bench.measure``.
 
-Peak memory belongs to a process, not to a call, and compiled code comes in at its first use. So
+Peak memory belongs to a process, not to a call, and compiled code is loaded at its first use. So
 every measured loop has a fresh process: it reads a :class:`Run` as JSON from its argument, runs a
 small loop first, and prints a :class:`Measurement` as JSON.
 """
@@ -28,16 +28,17 @@ from adhesis.solver.registry import MethodName, make_method
 Measured = Literal["grid", "sharp", "tamaas"]
 
 _SOLUTIONS = {"grid": "solves", "sharp": "fields"}
-# Of the load path of ``grid``; it costs little and leaves the error to the nodes.
+# Accuracy of the load path of ``grid``: it costs little and leaves the nodes as the source of
+# error.
 _GRID_ACCURACY = 1e-3
 _WARM_UP_SETTING = {"grid": 8, "sharp": 1e-2}
-# CPU seconds for start, compilation and warm-up, which do not count as the run's.
-_START = 300.0
+# CPU seconds for start, compilation and warm-up, before the limit of the run applies.
+_START_LIMIT = 300.0
 
 
 @dataclass(frozen=True)
 class Run:
-    """What is measured.
+    """Method, setting and limits of a measured loop.
 
     Attributes
     ----------
@@ -68,12 +69,12 @@ class Run:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a run cost and gave; NaN and zero where it did not finish.
+    """Cost and result of a run; NaN and zero if it did not finish.
 
     Attributes
     ----------
     cpu_seconds : float
-        From the problem to the finished loop.
+        Time from the problem to the finished loop.
     megabytes, megabytes_before : float
         Largest resident memory of the process, and the same before the loop: interpreter,
         libraries, compiled code.
@@ -84,13 +85,13 @@ class Measurement:
     audit_residual : float
         (loop integral - sum of drops) / loop integral.
     solutions : int
-        Elastic solutions for given edges or contact sets.
+        Number of elastic solutions for given edges or contact sets.
     jumps, patches : int
         Number of jumps, and most patches at a time.
     compiled : bool
-        Whether something was compiled during the loop, so that time and memory are too large.
+        Whether code was compiled during the loop, so that time and memory are too large.
     note : str
-        Why the run did not finish; else empty.
+        Reason why the run did not finish; else empty.
     """
 
     cpu_seconds: float = float("nan")
@@ -111,8 +112,9 @@ def measure(run: Run) -> Measurement:
 
     A run that fails or takes too long is a :class:`Measurement` with a note, not an exception.
     """
-    # Threads of the linear algebra would burn CPU time on matrices of a few dozen rows.
-    # What the warm-up does not meet may be compiled once; the next process finds it in the cache.
+    # One thread: on matrices of a few dozen rows, threads of the linear algebra only add CPU time.
+    # Code that the warm-up does not use may be compiled in the first process; the second finds it
+    # in the cache.
     for _ in range(2):
         child = subprocess.run(
             python("-m", "adhesis.ensemble.bench.measure", json.dumps(asdict(run))),
@@ -135,14 +137,14 @@ def measure(run: Run) -> Measurement:
 def measure_here(run: Run, *, limited: bool = False) -> Measurement:
     """Run and measure in this process; if ``limited``, end it when ``run.seconds`` are over."""
     if limited:
-        _limit(_START)
+        _limit(_START_LIMIT)
     if run.method == "tamaas":
         if limited:
             _limit(run.seconds)
         return _measure_tamaas(run)
     _loop(run.method, WARM_UP, _WARM_UP_SETTING[run.method], WARM_UP.load_steps)
     if run.method == "sharp" and run.scene.shape == "rough":
-        warm(("sharp",))  # loads the code for many gaps, too
+        warm(("sharp",))  # load the code for many gaps, too
     before = peak_megabytes()
     if limited:
         _limit(run.seconds)
@@ -194,15 +196,15 @@ def _measure_tamaas(run: Run) -> Measurement:
 
 
 def _limit(seconds: float) -> None:
-    """End this process once it has taken so many more seconds of CPU time (rounded up)."""
+    """End this process after so many more seconds of CPU time (rounded up)."""
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(process_time() + seconds), hard))
 
 
 def peak_megabytes() -> float:
-    """Largest resident memory of this process so far, in MB (2²⁰ bytes)."""
+    """Return the largest resident memory of this process so far, in MB (2²⁰ bytes)."""
     try:
-        # getrusage would count what the parent had when it started this process.
+        # getrusage also counts the memory of the parent when it started this process.
         with open("/proc/self/status") as status:
             peak = next(line for line in status if line.startswith("VmHWM:"))
         return int(peak.split()[1]) / 1024

@@ -1,4 +1,4 @@
-"""The tables of the benchmark as cells, as CSV records and as a Markdown page."""
+"""Write the tables of the benchmark as cells, as CSV records and as a Markdown page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GROWTH_COLUMNS = (
     *("scene", "method", "setting", "CPU s", "MB", "W~", "audit"),
     *("patches", "jumps", "solutions", "ms"),
 )
-_RATIO_COLUMNS = ("scene", "sharp", "error", "grid / sharp", "luckiest grid / sharp")
+_RATIO_COLUMNS = ("scene", "sharp", "error", "grid / sharp", "cheapest grid / sharp")
 _EXPONENT_COLUMNS = ("among", "grows with", "from", "to", "CPU time of a loop", "of a solution")
 
 
@@ -76,7 +76,7 @@ def exponent_cells(one: Exponent) -> list[str]:
 
 
 def record(line: Line) -> dict[str, object]:
-    """Return one line as a CSV record; what is not known is empty."""
+    """Return one line as a CSV record; unknown values are empty."""
     measured, run = line.measured, line.run
     fields: dict[str, object] = {
         "scene": run.scene.name,
@@ -129,8 +129,8 @@ def page(
                 ratio.line.run.scene.title,
                 ratio.line.run.described,
                 f"{abs(ratio.line.error):.1e}",
-                _quotient(ratio.kept),
-                _quotient(ratio.lucky),
+                _quotient(ratio.converged),
+                _quotient(ratio.cheapest),
             ]
             for ratio in compared
         ]

@@ -1,4 +1,4 @@
-"""The scenes of the benchmark: from one wave with an exact loss to the scale of the paper.
+"""Define the scenes of the benchmark: from one wave with an exact loss to the paper's scale.
 
 All have the paper's period 2π mm and material (E = 1 MPa, ν = 0.5, arXiv 1511.08891), in SI units.
 """
@@ -19,14 +19,14 @@ Shape = Literal["one wave", "two waves", "rough"]
 
 HALF_SPACE = HalfSpace(1e6, 0.5)
 _PERIOD = 2e-3 * np.pi
-# So shallow that the area measured along the profile (the solver's) and the flat one (the closed
-# form's) give the same loss to 1e-8.
+# With this amplitude (m) the area along the profile (solver) and the flat one (closed form) give
+# the same loss to 1e-8.
 _SHALLOW = 1e-4 * _PERIOD / (2 * np.pi)
 _ALPHA = 0.2
 _AMPLITUDE = 1e-6
-# A ripple strong enough to pin the edges some ten times on their way out and back. It is out of
-# phase: in a symmetric profile both edges of the patch lose their hold at once, and which path is
-# taken then is a matter of rounding, or of the rule.
+# The ripple pins the edges some ten times in each direction. It is out of phase: in a symmetric
+# profile both edges of the patch become unstable at once, and the path then depends on rounding, or
+# on the rule for symmetric states.
 _RIPPLE_HARMONIC, _RIPPLE, _RIPPLE_PHASE = 12, 0.06, 1.0
 _HURST, _H_RMS, _SEED = 0.8, 1e-6, 1
 
@@ -39,22 +39,22 @@ class Scene:
     ----------
     name, title : str
     shape : {"one wave", "two waves", "rough"}
-        A cos(q0 x); A cos(q0 x) with a ripple; self-affine, H = 0.8, h_rms = 1 µm, seed 1.
+        A cos(q0 x), the same with a ripple, or self-affine (H = 0.8, h_rms = 1 µm, seed 1).
     work_of_adhesion : float
-        γ in J/m²; of one wave it follows from α = 0.2 and is not read.
+        γ in J/m²; not read for one wave, where it follows from α = 0.2.
     load_steps : int
         Steps from first touch to ``max_penetration`` (Δ~max).
     n0, ratio : int
         Lowest harmonic, and highest over lowest, of the rough shape.
     grids : tuple of int
-        Least numbers of nodes per shortest wave, coarse to fine.
+        Lower bounds of the nodes per shortest wave, coarse to fine.
     accuracies : tuple of float
-        Wanted accuracies of the loss, low to high.
+        Requested accuracies of the loss, low to high.
     ranges : tuple of float
-        Ranges of adhesion for tamaas in units of h_max, as small as is feasible.
+        Ranges of adhesion for tamaas in units of h_max, as small as feasible.
     tightest : tuple of float
-        Accuracies of the reference run of ``sharp``, the best first; the first that succeeds is
-        taken. Empty where the loss is known exactly.
+        Accuracies of the reference run of ``sharp``, best first; the first that succeeds is
+        used. Empty if the loss is known exactly.
     reference_load_steps : int
         Load steps of the reference run.
     """
@@ -90,7 +90,7 @@ class Scene:
 
     @property
     def exact_loss(self) -> float | None:
-        """Loss in J/m² of nominal area where it is known in closed form."""
+        """Loss in J/m² of nominal area, if it is known in closed form."""
         return _single_wave().loop.loss if self.shape == "one wave" else None
 
 
@@ -104,7 +104,7 @@ ONE_WAVE = Scene(
     shape="one wave",
     max_penetration=0.5,
     load_steps=10,
-    # One wave is the whole profile: its contact of 0.18 λ needs the nodes.
+    # The wave is the whole profile: its contact of 0.18 λ needs many nodes.
     grids=(64, 256, 1024, 4096),
     ranges=(0.05, 0.03),
 )
@@ -156,7 +156,7 @@ PAPER = Scene(
 QUICK = (ONE_WAVE, TWO_WAVES, SMALL_ROUGH)
 FULL = (ONE_WAVE, TWO_WAVES, ROUGH, PAPER)
 
-# Highest over lowest harmonic, γ, and the grid beside sharp: the coarsest, where that ends in time.
+# Highest over lowest harmonic, γ, and the grid beside sharp: the coarsest, if it ends in time.
 _GROWTH = (
     *((25, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025)),
     *((100, gamma, (8,)) for gamma in (0.04, 0.01, 0.0025, 0.0006)),
@@ -177,9 +177,10 @@ GROWTH = tuple(
     )
     for ratio, gamma, grids in _GROWTH
 )
-"""How cost grows with the number of patches (small γ) and of wave numbers."""
+"""Scenes for the growth of cost with the number of patches (small γ) and of wave numbers."""
 
-# Meets touch, jumps, merging and vanishing in well below a second: compiles what a method compiles.
+# Has touch, jumps, merging and vanishing in well below a second, so that a method compiles all
+# code.
 WARM_UP = Scene(
     name="warm-up",
     title="warm-up",

@@ -26,7 +26,7 @@ from adhesis.ensemble.loop.record import (
     write_npz,
 )
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
-from adhesis.ensemble.ticker import tell, ticking
+from adhesis.ensemble.ticker import log, ticking
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -70,7 +70,7 @@ def execute(args: argparse.Namespace) -> int:
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
     nodes = _field_nodes(args, method, penetrations) if penetrations else 0
-    warm_missing([method.name], _quiet if args.quiet else tell)
+    warm_missing([method.name], _quiet if args.quiet else log)
     picked = FieldStates(method, penetrations)
     try:
         results = _run(args, method, cycle, picked.visit if penetrations else None)

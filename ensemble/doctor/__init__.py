@@ -1,5 +1,5 @@
-"""Which MPI, HDF5, FFTW and writer this installation has, tried out.
+"""Test MPI, HDF5, FFTW and the writer of this installation.
 
 Import :func:`adhesis.ensemble.doctor.examine.examine`; :mod:`adhesis.ensemble.doctor.probe` runs in
-its processes.
+the processes that it starts.
 """

@@ -1,8 +1,8 @@
-"""Which MPI, HDF5, FFTW and writer this installation has, and why.
+"""Test which MPI, HDF5, FFTW and writer this installation has, and report why.
 
-Nothing is assumed: a separate process loads the libraries, and two ranks started by ``mpirun`` say
-whether they see each other and write one file together. Those processes get a time limit and a
-clean environment, so that a broken MPI can neither hang the caller nor be blamed on it.
+A separate process loads the libraries, and two ranks started by ``mpirun`` report whether they see
+each other and can write one file together. The processes have a time limit and a clean environment,
+so that a broken MPI cannot hang the caller, and the caller's environment cannot break an MPI.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _TIME_LIMIT = 60.0  # s; the first load of the libraries from a cold network dis
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was tried."""
+    """Result of one test."""
 
     name: str
     ok: bool
@@ -42,7 +42,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What `examine` found."""
+    """Result of :func:`examine`."""
 
     versions: dict[str, str]
     cores: int
@@ -58,7 +58,7 @@ class Diagnosis:
         return all(check.ok or not check.needed for check in self.checks)
 
     def as_dict(self) -> dict[str, Any]:
-        """For ``--json``."""
+        """Return the results as a dictionary, for ``--json``."""
         return {
             "usable": self.usable,
             "writer": self.writer,
@@ -72,13 +72,13 @@ class Diagnosis:
 
 
 def examine(directory: Path | str | None = None) -> Diagnosis:
-    """Try everything out.
+    """Run all checks.
 
     Parameters
     ----------
     directory : path, optional
-        Where two ranks write a file together (and remove it). A parallel file system can differ
-        from the default, the folder for temporary files.
+        Folder in which two ranks write a file together, and remove it; without it that of temporary
+        files, which can differ from a parallel file system.
     """
     checks = [_loopback()]
     alone = _run_probe([], directory)
@@ -129,7 +129,7 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
 
 @dataclass(frozen=True)
 class _Probe:
-    """What the processes of one probe reported, and how the command ended."""
+    """Reports of the processes of one probe, and the end of their command."""
 
     reports: list[dict[str, Any]]
     failure: str  # empty if the command ended well
@@ -146,7 +146,7 @@ def _run_probe(launch: list[str], directory: Path | str | None) -> _Probe:
 
 
 def _failure_of(command: list[str], env: dict[str, str]) -> str:
-    """Run it to its end or the time limit; empty if it ended well."""
+    """Run a command to its end or the time limit; return its failure, empty if there is none."""
     try:
         process = subprocess.Popen(
             command,
@@ -163,7 +163,7 @@ def _failure_of(command: list[str], env: dict[str, str]) -> str:
     try:
         output, _ = process.communicate(timeout=_TIME_LIMIT)
     except subprocess.TimeoutExpired:
-        process.terminate()  # a launcher then ends its ranks, which a kill would leave behind
+        process.terminate()  # a launcher then ends its ranks; a kill would leave them running
         try:
             process.communicate(timeout=5)
         except subprocess.TimeoutExpired:
@@ -188,7 +188,7 @@ def _loopback() -> Check:
         with socket.create_server(("127.0.0.1", 0)) as server:
             socket.create_connection(server.getsockname(), timeout=5).close()
     except OSError as error:
-        text = f"127.0.0.1 cannot be reached ({error}); launchers talk to their ranks through it"
+        text = f"127.0.0.1 cannot be reached ({error}); launchers reach their ranks through it"
         return Check("loopback", False, text, needed=False)
     return Check("loopback", True, "up")
 
@@ -203,13 +203,15 @@ def _libraries(probe: _Probe, texts: Mapping[str, str]) -> Check:
 
 
 def compiled_code() -> Check:
-    """Whether the compiler loads, and where its code lies."""
+    """Check that the compiler loads, and where compiled code is stored."""
     try:
         from adhesis.solver import precompile as warm
     except (ImportError, RuntimeError, OSError) as error:
         return Check("compiled code", False, f"does not load: {last_lines(str(error))}")
-    told = warm.settings()
-    kind = f"for {warm.processor()}, numba {told['numba']}, optimised at level {told['opt']}"
+    settings = warm.settings()
+    kind = (
+        f"for {warm.processor()}, numba {settings['numba']}, optimised at level {settings['opt']}"
+    )
     places = {method: warm.compiled_in(method) for method in warm.COMPILED_METHODS}
     missing = " and ".join(method for method, place in places.items() if place is None)
     if missing:
@@ -257,5 +259,5 @@ def _mpirun_version(mpirun: str) -> str:
     except (OSError, subprocess.TimeoutExpired) as error:
         return str(error)
     lines = [" ".join(line.split()) for line in done.stdout.splitlines()]
-    # Open MPI says it in its first line, MPICH's Hydra in its second.
+    # The version is in the first line of Open MPI, in the second of MPICH's Hydra.
     return next((line for line in lines if any(c.isdigit() for c in line)), "")

@@ -1,4 +1,4 @@
-"""What a process or a rank that `adhesis doctor` starts tries out and reports.
+"""Test the libraries in a process or a rank that ``adhesis doctor`` starts, and report.
 
 Run as ``python -m adhesis.ensemble.doctor.probe SCRATCH [together]``.
 """
@@ -16,7 +16,7 @@ from adhesis.ensemble.versions import installed, last_lines
 
 
 def report(scratch: Path, together: bool) -> None:
-    """Load everything, and as one of several ranks write a file together; leave a report."""
+    """Load the libraries, write a file together if one of several ranks, and write a report."""
     found: dict[str, Any] = {}
     comm: Any = None
     if together:
@@ -25,7 +25,7 @@ def report(scratch: Path, together: bool) -> None:
         comm = MPI.COMM_WORLD
         found["size"] = comm.size
     else:
-        # Alone, MPI is loaded but not initialised: that can hang where the network is odd.
+        # MPI is loaded but not initialised, which can hang if the network is misconfigured.
         found["mpi_loads"] = True
         try:
             import mpi4py
@@ -54,7 +54,7 @@ def report(scratch: Path, together: bool) -> None:
 
 
 def _write_together(path: Path, comm: Any) -> str:
-    """Lay a file out collectively and write one row a rank: "ok" or the reason."""
+    """Create a file collectively and write one row a rank; return "ok" or the reason."""
     import h5py
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""One loop without a campaign: what ``adhesis loop`` writes.
+"""Read the input and write the output of ``adhesis loop``: one loop without a campaign.
 
 Import from its modules.
 """

@@ -1,4 +1,4 @@
-"""One loading-unloading loop of one profile: its losses, its jumps and its energy audit.
+"""Compute one loading-unloading loop of one profile: its losses, its jumps and its energy audit.
 
 The profile is either given as heights (one period, equally spaced, band-limited interpolation
 between them), a measured trace, or self-affine with random phases. Lengths in m, stresses in Pa.
@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
     output.add_argument(
-        "--strict", action="store_true", help="exit code 1 where something makes the loss doubtful"
+        "--strict", action="store_true", help="exit code 1 if the loss is doubtful"
     )
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
 

@@ -1,4 +1,4 @@
-"""The loading path of ``adhesis loop``: turning points, any path, and what holds the half-space."""
+"""Read the loading path of ``adhesis loop``: turning points or any path, and the control."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ _MAX_PENETRATION = 0.9
 
 @dataclass(frozen=True)
 class Cycle:
-    """What is to be followed.
+    """Loading path and control of a loop.
 
     Attributes
     ----------
     control : Control
     turning_points : tuple of float
-        Of loops, one each; or of one path, in order, if ``is_path``. Δ/h_max, u_tot/h_max, or Pa
-        under a load.
+        One for each loop; those of one path, in order, if ``is_path``. Δ/h_max, u_tot/h_max, or
+        Pa under a load.
     is_path : bool
     out : bool
-        Whether a path goes on until contact is lost.
+        Whether a path continues until contact is lost.
     load_steps : int
     """
 
@@ -45,12 +45,12 @@ class Cycle:
         return max(self.turning_points)
 
     def check(self, problem: Problem) -> None:
-        """Refuse a cycle that cannot be followed.
+        """Check that the cycle can be followed.
 
         Raises
         ------
         ValueError
-            With the rule.
+            If it breaks a rule, which the message gives.
         """
         if self.is_path:
             check_path(self.turning_points, self.load_steps, problem)
@@ -66,7 +66,7 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     InputError
         If the options contradict one another or are no numbers.
     ValueError
-        If there is no such control.
+        If stiffness or layer break their rule.
     """
     control = _control(args, half_space)
     given = [n for n in ("max_penetration", "max_stress", "path") if getattr(args, n) is not None]
@@ -93,7 +93,7 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
 def _control(args: argparse.Namespace, half_space: HalfSpace) -> Control:
     if args.layer is not None:
         if args.stiffness is not None:
-            raise InputError("--stiffness and --layer are given: one of them says the stiffness")
+            raise InputError("--stiffness and --layer are given: give one of them")
         return Control(half_space.layer_stiffness(args.layer))
     return Control(math.inf if args.stiffness is None else args.stiffness)
 

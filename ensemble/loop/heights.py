@@ -1,4 +1,4 @@
-"""The heights of ``adhesis loop --heights``: one period, read as traces are, and its closure."""
+"""Read the heights of ``adhesis loop --heights``, and check that the ends of the period meet."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from adhesis.ensemble.trace.text import Table, read_column
 from adhesis.ensemble.trace.units import METRES, length_text, parse_units, units_of_header
 from adhesis.solver.model.profile import Array
 
-# A word in brackets, as long as a unit is: "z [æm]" after a wrong conversion.
-_PERHAPS_A_UNIT = re.compile(r"[(\[<{]\s*([^\W\d_]{1,3})\s*[)\]>}]")
+# A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
+_POSSIBLE_UNIT = re.compile(r"[(\[<{]\s*([^\W\d_]{1,3})\s*[)\]>}]")
 
-# The ends do not meet where the step from the last height to the first is so many times the
-# largest step within. Over a period the steps add up to zero, so steps of the other sign make up
-# for that at the ends: of a profile that is resolved, or has a jump elsewhere, some of them are
-# about as large, while a trace that is cut out of a surface returns over its whole length. Among
-# fewer points than _FEWEST a steep flank cannot be distinguished from a jump.
-_TIMES_LARGEST, _FEWEST = 3.0, 8
-# A straight line with no roughness at all is a saw of one tooth, not a trace.
+# The ends do not meet where the step from the last height to the first is more than this many times
+# the largest step within. Over a period the steps add up to zero: a profile that is resolved, or
+# has a jump elsewhere, has other steps about as large, while a trace that is cut out of a surface
+# returns over its whole length. With fewer points than _MIN_POINTS a steep flank looks like a jump.
+_CLOSURE_FACTOR, _MIN_POINTS = 3.0, 8
+# Steps that differ by less than this share of the largest one are a straight line, which is taken
+# as a saw of one tooth.
 _STRAIGHT = 1e-3
 
 
@@ -42,7 +42,7 @@ def read_heights(
     unit : str, optional
         Unit of the heights; without it that of the header, and without that metres.
     delimiter, decimal : str, optional
-        Where a text can be read in two ways.
+        Delimiter and decimal sign, where a text can be read in two ways.
 
     Returns
     -------
@@ -52,8 +52,8 @@ def read_heights(
     Raises
     ------
     InputError
-        With one sentence, if the file holds anything but one column of finite numbers, or its
-        header does not make clear which unit they have.
+        If the file holds anything but one column of finite numbers, or its header leaves their unit
+        unclear.
     """
     given = None if unit is None else _unit(unit)
     if not holds_numbers(path):
@@ -94,7 +94,7 @@ def _unit(text: str) -> str:
 
 
 def _unit_of(path: Path, table: Table, given: str | None) -> str:
-    """Unit of the heights: of the option, the header, or metres where neither names one."""
+    """Return the unit of the heights: of the option, of the header, or metres without either."""
     found = units_of_header(table.header, table.fields)[-1]
     if given is not None:
         if found not in (None, given):
@@ -106,7 +106,7 @@ def _unit_of(path: Path, table: Table, given: str | None) -> str:
     if found is not None:
         return found
     for line in table.header:
-        word = _PERHAPS_A_UNIT.search(line)
+        word = _POSSIBLE_UNIT.search(line)
         if word is not None:
             raise InputError(
                 f"the header of {path} has {word[0]!r}, from which the unit of the heights is not "
@@ -116,24 +116,24 @@ def _unit_of(path: Path, table: Table, given: str | None) -> str:
 
 
 def closure_warning(heights: Array, name: str) -> str | None:
-    """Return a sentence where the ends of one period do not meet, or None.
+    """Return a warning if the ends of one period do not meet, else None.
 
     Parameters
     ----------
     heights : array, shape (n,)
-        In m, equally spaced; the period goes on with the first of them.
+        In m, equally spaced; the first one follows the last.
     name : str
-        What the heights are called in the sentence.
+        Name of the heights in the warning.
     """
-    if heights.size < _FEWEST:
+    if heights.size < _MIN_POINTS:
         return None
-    # The median of three keeps edges and takes out single spikes, which would hide the jump.
-    middle = np.median([np.roll(heights, k) for k in (1, 0, -1)], axis=0)
-    largest = float(np.abs(np.diff(middle)).max())
-    jump = abs(float(middle[0] - middle[-1]))
+    # A median of three keeps edges and removes single spikes, which would hide the jump.
+    smoothed = np.median([np.roll(heights, k) for k in (1, 0, -1)], axis=0)
+    largest = float(np.abs(np.diff(smoothed)).max())
+    jump = abs(float(smoothed[0] - smoothed[-1]))
     steps = np.diff(heights)
     is_line = np.ptp(steps) <= _STRAIGHT * np.abs(steps).max()
-    if is_line or not jump > _TIMES_LARGEST * largest:
+    if is_line or not jump > _CLOSURE_FACTOR * largest:
         return None
     return (
         f"the ends of {name} do not meet: from its last height to its first it is "

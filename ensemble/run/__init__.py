@@ -1,4 +1,4 @@
-"""A run of a campaign: one session, hand-out to ranks, lock, signals, progress.
+"""Run a campaign: session, hand-out to ranks, lock, signals, progress.
 
-Import from its modules; :mod:`adhesis.ensemble.run.ranks` is the door to MPI.
+Import from its modules; only :mod:`adhesis.ensemble.run.ranks` imports MPI.
 """

@@ -1,4 +1,4 @@
-"""One task, tried: its result, or why it has none; given up when the run is to stop."""
+"""Compute one task within its limits: a result, an error, or an interruption."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from typing import Any
 from adhesis.ensemble.run.interrupt import raised_by_handler
 
 StopCheck = Callable[[], None]
-"""Called by a task now and then; raises what ends the task."""
+"""Called by a task now and then; it raises an exception to end the task."""
 Compute = Callable[[int, StopCheck], Any]
 
-# How often a task in progress looks whether it is to stop, in s.
+# Interval at which a task in progress checks whether to stop, in s.
 WATCH_INTERVAL = 0.5
 
 
 class GivenUp(BaseException):
-    """The run is to stop: the task in progress is given up. Not an Exception: nobody handles it."""
+    """Raised in a task when the run stops; not an Exception, so that no task handles it."""
 
 
 class TimeLimit(BaseException):
-    """The task took longer than it may."""
+    """Raised in a task that exceeds its time limit."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task.
+    """Outcome of a task.
 
     Attributes
     ----------
     task : int
     rank : int
-        Who computed it.
+        Rank that computed it.
     seconds : float
         Wall time.
     error : str or None
-        Why it failed.
+        Reason of a failure.
     result : object
-        What ``compute`` returned, until ``deliver`` has taken care of it.
+        Return value of ``compute``, until ``deliver`` has stored it.
     """
 
     task: int
@@ -64,15 +64,15 @@ def attempt(
     GivenUp
         If ``stop()`` was true while it ran.
     Exception
-        What the handler of a signal raised meanwhile.
+        One that the handler of a signal raised meanwhile.
     """
     started = time.perf_counter()
-    over = started + (math.inf if limit is None else limit)
+    end = started + (math.inf if limit is None else limit)
 
     def check() -> None:
         if stop():
             raise GivenUp
-        if time.perf_counter() > over:
+        if time.perf_counter() > end:
             raise TimeLimit(f"longer than the time limit of {limit:g} s")
 
     result, error = None, None
@@ -90,23 +90,23 @@ def attempt(
 
 @contextmanager
 def _watched(check: StopCheck) -> Iterator[None]:
-    """Call ``check`` from a timer too: a task may hang long before it next calls it itself.
+    """Call ``check`` from a timer too: a task may hang before it calls it itself.
 
-    A timer that the caller has set goes on, and its handler is called when its time has come.
+    A timer of the caller keeps running, and its handler is called when it expires.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    over = False
+    finished = False
 
     def on_alarm(number: int, frame: FrameType | None) -> None:
-        nonlocal over
+        nonlocal finished
         try:
             callers.pass_on(number, frame)
-            if not over:
+            if not finished:
                 check()
         except BaseException:
-            over = True  # once is enough: not again while the first one unwinds
+            finished = True  # a second exception would interrupt the unwinding of this one
             raise
 
     callers = _CallersTimer()
@@ -115,12 +115,12 @@ def _watched(check: StopCheck) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, min(WATCH_INTERVAL, callers.left), WATCH_INTERVAL)
         yield
     finally:
-        over = True
+        finished = True
         callers.restore()
 
 
 class _CallersTimer:
-    """The timer and the handler of SIGALRM that were set before a task began."""
+    """Timer and handler of SIGALRM as they were before a task began."""
 
     def __init__(self) -> None:
         self._handler = signal.getsignal(signal.SIGALRM)
@@ -129,11 +129,11 @@ class _CallersTimer:
 
     @property
     def left(self) -> float:
-        """Time until it goes off, in s; infinite if it was not set."""
+        """Time until it expires, in s; infinite if it was not set."""
         return max(self._due - time.monotonic(), 1e-6)
 
     def pass_on(self, number: int, frame: FrameType | None) -> None:
-        """Call the caller's handler if its time has come."""
+        """Call the caller's handler if its timer has expired."""
         if time.monotonic() < self._due:
             return
         self._due = self._due + self._interval if self._interval > 0 else math.inf
@@ -141,7 +141,7 @@ class _CallersTimer:
             self._handler(number, frame)
 
     def restore(self) -> None:
-        """Set handler and timer again, as they would be by now."""
+        """Restore handler and timer, less the time that has passed."""
         signal.setitimer(signal.ITIMER_REAL, 0)
         if self._handler is not None:  # None: it was not set from Python
             signal.signal(signal.SIGALRM, self._handler)

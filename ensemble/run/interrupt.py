@@ -1,4 +1,4 @@
-"""What ends a run from outside: signals, and the walltime of the batch system."""
+"""Handle what ends a run from outside: signals, and the walltime of the batch system."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from typing import Any, Self
 
 from adhesis.ensemble.errors import InputError
 
-# Before the walltime ends, what is in flight is given up and the file closed: this long before (s),
-# but at most this share of the walltime.
+# Tasks in progress are given up, and the file is closed, this long (s) before the walltime ends, or
+# this share of it if that is shorter.
 RESERVE, RESERVE_SHARE = 30.0, 0.1
-# Workers may take so long to answer a stop (s), and where there is a walltime at most this share of
-# the reserve: the rest is for closing the file and ending the ranks.
+# Time for workers to answer a stop (s); with a walltime at most this share of the reserve. The rest
+# is for closing the file and ending the ranks.
 GRACE, GRACE_SHARE = 30.0, 0.5
 
 _CLOCK = re.compile(r"(?:(\d+)-)?(?:(\d+):)?(\d+):(\d+)")
@@ -35,7 +35,7 @@ def stop_signals() -> tuple[signal.Signals, ...]:
 
 
 class StopSignals:
-    """Notes the signals of :func:`stop_signals` instead of dying from them; a context manager.
+    """Context manager that records the signals of :func:`stop_signals` instead of ending.
 
     A second SIGINT (Ctrl-C) interrupts at once.
 
@@ -65,9 +65,9 @@ class StopSignals:
 
 
 def raised_by_handler(error: BaseException) -> bool:
-    """Find out whether the handler of a signal raised an exception.
+    """Check whether the handler of a signal raised an exception.
 
-    Then it is an interrupt, whatever its class, and no failure of what was under way.
+    Such an exception is an interrupt, whatever its class, and no failure of the task in progress.
     """
     handlers = [signal.getsignal(number) for number in signal.valid_signals()]
     codes = {code for each in handlers if (code := getattr(each, "__code__", None)) is not None}
@@ -97,14 +97,14 @@ def parse_duration(text: str) -> float:
 
 @dataclass(frozen=True)
 class Deadline:
-    """When a run has to stop.
+    """Time at which a run has to stop.
 
     Attributes
     ----------
     at : float
-        When what is in flight is given up, as ``time.time()`` counts.
+        Time at which tasks in progress are given up, in s of ``time.time()``.
     grace : float
-        How long workers may take from then on, in s.
+        Time that workers may take from then on, in s.
     """
 
     at: float
@@ -114,15 +114,15 @@ class Deadline:
 def deadline(
     walltime: float | None, started: float, environ: Mapping[str, str] = os.environ
 ) -> Deadline | None:
-    """Return when to give up what is in flight; None if never.
+    """Return when to give up the tasks in progress; None if never.
 
     Parameters
     ----------
     walltime : float, optional
-        Seconds from ``started``. If not given, the batch system is asked: Slurm tells when the job
-        ends, Torque how long it may run.
+        Seconds from ``started``. If not given, it is taken from the batch system: Slurm sets
+        the end of the job, Torque its length.
     started : float
-        When this process started.
+        Start of this process, in s of ``time.time()``.
     """
     if walltime is not None:
         return _before(started + walltime, started)

@@ -1,10 +1,10 @@
-"""Starting ranks from within a program: which ``mpirun``, how many cores, which environment.
+"""Start ranks from within a program: choose ``mpirun``, number of cores and environment.
 
-Every Python process that adhesis starts is started by :func:`python` in :func:`python_environment`:
-neither lets it import from the working directory, where a user's ``numpy.py`` may lie.
+Every Python process of adhesis is started by :func:`python` in :func:`python_environment`: neither
+lets it import from the working directory, where a user's ``numpy.py`` may lie.
 
-One thread a rank: the ranks share the cores among themselves, small matrices gain nothing from
-threads, and sums split over a number of threads would tie the last bits to it.
+A rank has one thread: the ranks share the cores, small matrices gain nothing from threads, and the
+last bits of sums split over threads would depend on their number.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from types import FrameType
 from adhesis import _version
 from adhesis.ensemble.run.interrupt import stop_signals
 
-# What a launcher tells its ranks. A program that passes it on to a launcher of its own is taken
-# for one of those ranks, and both wait for each other or end without a word.
+# Variables that a launcher sets for its ranks. A second launcher that inherits them passes for one
+# of those ranks: both wait for each other, or end without a message.
 _RANK_MARKS = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_SIZE")
 _LAUNCHER_PREFIXES = ("OMPI_", "OPAL_", "ORTE_", "PRTE_", "PMIX_", "PMI_", "HYDI_", "HYDRA_")
 
@@ -34,12 +34,12 @@ _LAUNCHER_PREFIXES = ("OMPI_", "OPAL_", "ORTE_", "PRTE_", "PMIX_", "PMI_", "HYDI
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
-# Set for ranks that :func:`run_ranks` starts, which start none themselves: the file by which they
-# hand over their exit code. mpirun buries the sentence of a rank that ends with a code of its own
-# under a page of text.
+# Set for ranks that :func:`run_ranks` starts, which start none themselves: the file to which they
+# write their exit code and last message. After a nonzero exit code mpirun prints a page of text, in
+# which the message of the rank is lost.
 STARTED = "ADHESIS_STARTED"
-_RANKS_A_CORE = 16
-KILLED = 137  # what a shell says of a process that signal 9 has ended
+_RANKS_PER_CORE = 16
+KILLED = 137  # exit code that a shell reports for a process ended by signal 9
 
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
@@ -47,38 +47,38 @@ _LIBC = ctypes.CDLL(None)
 
 
 def python(*words: str) -> list[str]:
-    """Return the command that starts this interpreter, with nothing of the working directory."""
+    """Return the command that starts this interpreter without the working directory in its path."""
     return [sys.executable, "-P", *words]
 
 
 def python_environment(environ: Mapping[str, str] = os.environ) -> dict[str, str]:
-    """Return an environment in which a process of :func:`python` finds this very package.
+    """Return an environment in which a process of :func:`python` imports this very package.
 
-    PYTHONPATH keeps its entries but the empty ones, which stand for the working directory.
+    PYTHONPATH keeps its entries except empty ones, which mean the working directory.
     """
     here = str(Path(_version.__file__).resolve().parent.parent)
     entries = [entry for entry in environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
-    # as an entry of PYTHONPATH, packages of the interpreter's own would come before its library
+    # In PYTHONPATH, the folder of installed packages would come before the standard library.
     if here not in (sysconfig.get_path("purelib"), sysconfig.get_path("platlib")):
         entries.insert(0, here)
     return {**environ, "PYTHONPATH": os.pathsep.join(entries)}
 
 
 def end_with_parent() -> None:
-    """Let the system end this process (SIGTERM) when its parent ends, however that ends; Linux."""
+    """Have the system end this process (SIGTERM) when its parent ends in any way; Linux only."""
     if sys.platform == "linux":
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def launcher() -> str | None:
-    """Find this installation's ``mpirun``: ``$MPIRUN``, set-up's choice, or the one in PATH."""
+    """Find this installation's ``mpirun``: ``$MPIRUN``, that of set-up, or the one in PATH."""
     recorded = Path(sys.prefix, "mpirun")
     beside = str(Path(sys.executable).parent)
     candidates = [os.environ.get("MPIRUN", "")]
@@ -96,9 +96,9 @@ def launcher() -> str | None:
 
 
 def launch_environment(ranks: int) -> dict[str, str]:
-    """Environment in which a launcher starts ``ranks`` ranks here, also from within a rank.
+    """Return an environment in which a launcher starts ranks here, also from within a rank.
 
-    As root, or for more ranks than cores, Open MPI must be told that this is meant.
+    Open MPI starts ranks as root, or more ranks than cores, only with the variables set here.
     """
     # A copy of os.environ already lacks what an MPI in this process has put into C's environment.
     nested = any(mark in os.environ for mark in _RANK_MARKS)
@@ -120,15 +120,15 @@ def launch_environment(ranks: int) -> dict[str, str]:
 
 
 def largest_number_of_ranks(environ: Mapping[str, str] = os.environ) -> int:
-    """How many ranks :func:`run_ranks` may start: some for each core of this job's nodes."""
+    """Return the limit of ranks of :func:`run_ranks`: some for each core of this job's nodes."""
     nodes = environ.get("SLURM_JOB_NUM_NODES", "1")
-    return _RANKS_A_CORE * cores() * (int(nodes) if nodes.isdecimal() else 1)
+    return _RANKS_PER_CORE * cores() * (int(nodes) if nodes.isdecimal() else 1)
 
 
 def hand_over(code: int, sentence: str = "") -> bool:
-    """Leave exit code and a last sentence to the process that started the ranks.
+    """Pass exit code and last message to the process that started the ranks.
 
-    False if there is none, or if it is on another node.
+    Returns False if there is none, or if it is on another node.
     """
     try:
         with open(os.environ.get(STARTED, ""), "r+", encoding="utf-8") as stream:
@@ -143,8 +143,8 @@ def run_ranks(
 ) -> tuple[int, str]:
     """Start ranks with a command of adhesis and wait for their end.
 
-    Returns exit code and last sentence: those that the ranks handed over, else what the launcher
-    ended with, and no sentence.
+    Returns exit code and last message: those that the ranks passed on, else the exit code of the
+    launcher and no message.
 
     SIGTERM, SIGHUP, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C ends them at once.
     If this process is killed, the launcher ends them.
@@ -155,11 +155,11 @@ def run_ranks(
         An ``mpirun``.
     ranks : int
     words : sequence of str
-        What follows ``adhesis``.
+        Arguments of ``adhesis``.
     program : sequence of str, optional
-        What a rank runs instead of adhesis, before the words.
+        Program that a rank runs instead of adhesis, with these arguments.
     """
-    # An error that a rank does not handle must end the others, too: mpi4py sees to it.
+    # With -m mpi4py, an error that a rank does not handle ends the others, too.
     program = program or python("-m", "mpi4py", "-m", "adhesis")
     handle, handed_over = tempfile.mkstemp(prefix="adhesis-")
     started = {STARTED: handed_over}
@@ -168,10 +168,10 @@ def run_ranks(
         [launcher, "-n", str(ranks), *program, *words],
         env=env,
         stdin=subprocess.DEVNULL,
-        process_group=0,  # Ctrl-C would make mpirun end its ranks; here it becomes a stop in order
-        preexec_fn=end_with_parent,  # else ranks would go on, and keep the results file locked
+        process_group=0,  # else Ctrl-C reaches mpirun, which ends its ranks without a stop in order
+        preexec_fn=end_with_parent,  # else ranks would continue and keep the results file locked
     )
-    with _passed_on(process), open(handle, encoding="utf-8") as stream:
+    with _signals_passed_to(process), open(handle, encoding="utf-8") as stream:
         try:
             code = process.wait()
         finally:
@@ -181,8 +181,8 @@ def run_ranks(
 
 
 @contextmanager
-def _passed_on(process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Turn signals to this process into stops of the ranks: mpirun passes SIGUSR1 on to them."""
+def _signals_passed_to(process: subprocess.Popen[bytes]) -> Iterator[None]:
+    """Turn signals to this process into stops of the ranks, by SIGUSR1, which mpirun passes on."""
     interrupted = False
 
     def stop(number: int, _: FrameType | None) -> None:

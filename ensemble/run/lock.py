@@ -1,8 +1,8 @@
-"""One run a results file: a lock beside it, ``FILE.h5.lock``.
+"""Keep a second run out of a results file, by a lock beside it: ``FILE.h5.lock``.
 
 HDF5 keeps no second writer out (under MPI it takes no lock at all). The lock is the operating
 system's, on a file beside the results: it ends with the process that holds it, however that ends,
-and a lock file left over by a killed run locks nothing. Ranks may outlive a killed launcher by
+so the lock file of a killed run is not locked. Ranks may outlive a killed launcher by
 seconds; each rank that writes therefore holds its share, and a new run waits for the last of them.
 
 The lock belongs to the file itself: a symbolic link to a results file has no lock of its own. Where
@@ -28,18 +28,18 @@ from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.escape import one_line
 from adhesis.ensemble.outputs import target_of
 
-# Two bytes far beyond the text: the run as a whole, and the ranks that write.
+# Two bytes far beyond the text are locked: for the run as a whole, and for ranks that write.
 _RUN, _WRITERS = 1 << 30, (1 << 30) + 1
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
 _FULL = {errno.ENOSPC, errno.EDQUOT}
-# O_NONBLOCK: a pipe in place of the lock would be waited for.
+# Without O_NONBLOCK, opening a pipe in place of the lock file would block.
 _SAFELY = os.O_NOFOLLOW | os.O_NONBLOCK
-_LONGEST_CARD = 4096  # bytes
-_PAUSE = 0.1
+_MAX_RECORD = 4096  # bytes
+_RETRY_INTERVAL = 0.1  # s
 
 
 class RunLock:
-    """Held while a run writes to a results file.
+    """Lock that a run holds while it writes to a results file.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ class RunLock:
         Parameters
         ----------
         ranks : int
-            Told to whoever is refused.
+            Number of ranks, for the message to a run that is refused.
         patience : float
-            How long to wait for a run that holds it, in s: one that was just killed needs a moment.
+            Time to wait for a run that holds it, in s: one that was just killed needs a moment.
 
         Raises
         ------
@@ -71,19 +71,19 @@ class RunLock:
             If the disk is full.
         """
         deadline = time.monotonic() + patience
-        told = False
+        announced = False
         while not self._try(_RUN):
             if time.monotonic() >= deadline:
                 raise InputError(f"{self._results} is being written by another run{self._holder()}")
-            if not told and patience > 1:
+            if not announced and patience > 1:
                 print(
                     f"{self._results} is held by another run{self._holder()}; "
                     f"waiting up to {patience:g} s for it to end",
                     file=sys.stderr,
                     flush=True,
                 )
-                told = True
-            time.sleep(_PAUSE)
+                announced = True
+            time.sleep(_RETRY_INTERVAL)
         self._owner = True
         while not self._lock(_WRITERS, fcntl.LOCK_EX):
             if time.monotonic() >= deadline:
@@ -92,9 +92,9 @@ class RunLock:
                     f"{self._results} is still being written by ranks of an earlier run: "
                     "end them, or wait until they have ended"
                 )
-            time.sleep(_PAUSE)
+            time.sleep(_RETRY_INTERVAL)
         self._lock(_WRITERS, fcntl.LOCK_SH)
-        self._sign(ranks)
+        self._write_record(ranks)
 
     def join(self) -> None:
         """Hold a share of the lock, by any other rank that writes, after rank 0 has acquired it."""
@@ -105,11 +105,11 @@ class RunLock:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        # After a failure other ranks may still write, and a new run must meet their shares here.
+        # After a failure other ranks may still write: a new run finds their locks on this file.
         self.release(keep_file=kind is not None and not issubclass(kind, InputError))
 
     def release(self, *, keep_file: bool = False) -> None:
-        """Let go; does nothing if nothing is held."""
+        """Release the lock, if it is held."""
         if self._descriptor is None:
             return
         if self._owner and not keep_file:
@@ -122,12 +122,12 @@ class RunLock:
         self._open()
         assert self._descriptor is not None
         if self._lock(byte, fcntl.LOCK_EX):
-            mine = os.fstat(self._descriptor)
+            locked = os.fstat(self._descriptor)
             try:
-                there = os.stat(self.path)
+                current = os.stat(self.path)
             except FileNotFoundError:
-                there = None
-            if there is not None and (there.st_ino, there.st_dev) == (mine.st_ino, mine.st_dev):
+                current = None
+            if current is not None and os.path.samestat(current, locked):
                 return True
         os.close(self._descriptor)
         self._descriptor = None
@@ -143,7 +143,8 @@ class RunLock:
                 kind = WriteError if error.errno in _FULL else InputError
                 raise kind(f"{self._results} cannot be written: {error.strerror}") from error
             found = os.fstat(descriptor)
-            # Another name of it would be that of a file which the lock's text would replace.
+            # With a second name (hard link) it may be a file of the user's: the record would
+            # overwrite it.
             if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
                 os.close(descriptor)
                 raise self._no_lock()
@@ -170,9 +171,9 @@ class RunLock:
             return False
         return True
 
-    def _sign(self, ranks: int) -> None:
+    def _write_record(self, ranks: int) -> None:
         assert self._descriptor is not None
-        card = {
+        record = {
             "host": socket.gethostname(),
             "pid": os.getpid(),
             "ranks": ranks,
@@ -180,7 +181,7 @@ class RunLock:
         }
         try:
             os.ftruncate(self._descriptor, 0)
-            os.pwrite(self._descriptor, json.dumps(card).encode(), 0)
+            os.pwrite(self._descriptor, json.dumps(record).encode(), 0)
         except OSError as error:
             self.release()
             raise WriteError(f"{self.path} cannot be written: {error.strerror}") from error
@@ -191,10 +192,10 @@ class RunLock:
         except OSError:
             return ""
         try:
-            card = _card(descriptor)
+            record = _read_record(descriptor)
         finally:
             os.close(descriptor)
-        return f" ({described(card)})" if card else ""
+        return f" ({described(record)})" if record else ""
 
 
 def _lock_of(results: Path) -> Path:
@@ -203,10 +204,9 @@ def _lock_of(results: Path) -> Path:
 
 
 def holder(results: Path | str) -> dict[str, Any] | None:
-    """Tell which run writes to a results file now: host, pid, ranks, since; None if none does.
+    """Return which run writes to a results file now: host, pid, ranks, since; None if none does.
 
-    Takes nothing that a run would wait for longer than a moment. Where the file system has no locks
-    nothing is known, and None is returned.
+    The lock is held for a moment only. On a file system without locks None is returned.
     """
     try:
         descriptor = os.open(_lock_of(Path(results)), os.O_RDONLY | _SAFELY)
@@ -215,25 +215,26 @@ def holder(results: Path | str) -> dict[str, Any] | None:
     try:
         fcntl.lockf(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB, 1, _RUN)
     except OSError as error:
-        return None if error.errno in _UNSUPPORTED else _card(descriptor) or {}
+        return None if error.errno in _UNSUPPORTED else _read_record(descriptor) or {}
     finally:
         os.close(descriptor)
     return None
 
 
-def described(card: Mapping[str, Any]) -> str:
-    """Return in words which run holds a lock."""
-    if not card:
+def described(record: Mapping[str, Any]) -> str:
+    """Describe the run that holds a lock."""
+    if not record:
         return "of which nothing more is known"
     return one_line(
-        f"host {card['host']}, process {card['pid']}, {card['ranks']} ranks, since {card['since']}"
+        f"host {record['host']}, process {record['pid']}, {record['ranks']} ranks, "
+        f"since {record['since']}"
     )
 
 
-def _card(descriptor: int) -> dict[str, Any] | None:
-    """Read what the holder of a lock has written into it."""
+def _read_record(descriptor: int) -> dict[str, Any] | None:
+    """Read the record that the holder of a lock has written into it."""
     try:
-        card = json.loads(os.pread(descriptor, _LONGEST_CARD, 0))
-        return {name: card[name] for name in ("host", "pid", "ranks", "since")}
+        record = json.loads(os.pread(descriptor, _MAX_RECORD, 0))
+        return {name: record[name] for name in ("host", "pid", "ranks", "since")}
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -1,4 +1,4 @@
-"""One task: the loop of one (H, γ, realisation), computed and turned into a row of results.
+"""Compute the loop of one task, (H, γ, realisation), as a row of results.
 
-Import from its modules; the only room of ``ensemble`` that runs loops of a campaign.
+Import from its modules; no other folder of ``ensemble`` runs the loops of a campaign.
 """

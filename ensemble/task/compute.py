@@ -1,4 +1,4 @@
-"""One loop of a campaign: a pure function from its description to its row of the results file."""
+"""Compute one loop of a campaign: a pure function of its task, returning its row of results."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
 
 
 def check_task(campaign: Campaign, task: Task) -> None:
-    """Refuse a campaign of which a task cannot be set up, before any work.
+    """Check that a task can be set up, before any work.
 
     Raises
     ------
     InputError
-        With the solver's sentence.
+        If it cannot; the message is the solver's.
     """
     try:
         _make_method(campaign, task)
@@ -75,36 +75,36 @@ def _make_method(campaign: Campaign, task: Task) -> Method:
 
 
 def methods_of(campaign: Campaign, tasks: Iterable[Task]) -> set[str]:
-    """Return the names of the methods that compute these tasks."""
+    """Return the names of the methods that compute the tasks."""
     of_adhesion = {task.work_of_adhesion: task for task in tasks}
     return {_make_method(campaign, task).name for task in of_adhesion.values()}
 
 
 def run_task(campaign: Campaign, task: Task, progress: Progress | None = None) -> Row:
-    """Compute one loop. No ranks, no files: the same in a notebook and on rank 317.
+    """Compute one loop, independently of ranks and files.
 
     Parameters
     ----------
     campaign : Campaign
     task : Task
     progress : callable, optional
-        Called after each load step; it may raise to give the task up.
+        Called after each load step; it may raise an exception to give the task up.
     """
     return Runner()(campaign, task, progress)
 
 
 @dataclass(frozen=True)
 class _Shared:
-    """The loading branch of the last task, which the next one may go on with."""
+    """Loading branch of the last task, which the next one may continue."""
 
     campaign: Campaign
     key: Hashable
-    turn: float
+    turning_point: float
     branch: LoadingBranch
 
 
 class Runner:
-    """Computes tasks one after the other, each with the bits of :func:`run_task`.
+    """Runner of tasks one after the other, each with the bits of :func:`run_task`.
 
     The tasks of a campaign with several turning points share a loading branch
     (:meth:`adhesis.ensemble.campaign.tables.Campaign.branch_of`): it is kept from one task to the
@@ -117,8 +117,8 @@ class Runner:
     def __call__(self, campaign: Campaign, task: Task, progress: Progress | None = None) -> Row:
         """Compute one loop; arguments as those of :func:`run_task`.
 
-        The times in the row are those of this call, so that what a loading branch took counts once:
-        with the first loop that needed it.
+        The times in the row are those of this call: the time of a shared loading branch counts
+        once, in the first loop that needs it.
         """
         wall, cpu = time.perf_counter(), time.process_time()
         here = campaign.at(task)
@@ -128,7 +128,7 @@ class Runner:
         turn = here.cycle.turning_point
         load = here.cycle.under_load
         unit = campaign.penetration_unit(task)
-        # where the load steps of the loop are not the axes of the curves
+        # for loops whose load steps differ from the axes of the curves
         axes: dict[Branch, Array] = {
             "loading": unit * campaign.loading_penetration,
             "unloading": unit * campaign.unloading_penetration,
@@ -148,7 +148,7 @@ class Runner:
             row = row_of(loop, sizes, axes if load else None)
         else:
             branch = self._branch(campaign, task, key, turn)
-            self._shared = None  # what is interrupted is not gone on with
+            self._shared = None  # an interrupted branch is not continued
             recorder = FieldRecorder(plan, branch.method, keep=keep)
             try:
                 loop = branch.loop(
@@ -167,9 +167,14 @@ class Runner:
         return {"wall_time": wall, "cpu_time": cpu, **row}
 
     def _branch(self, campaign: Campaign, task: Task, key: Hashable, turn: float) -> LoadingBranch:
-        """The loading branch that a task leaves, as far as it was followed for the last one."""
+        """Return the loading branch of a task: that of the last task, if they share one."""
         last = self._shared
-        if last is not None and last.campaign is campaign and last.key == key and last.turn < turn:
+        if (
+            last is not None
+            and last.campaign is campaign
+            and last.key == key
+            and last.turning_point < turn
+        ):
             return last.branch
         others = campaign.sharing(task)
         return LoadingBranch(
@@ -181,6 +186,6 @@ class Runner:
 
 
 def _marks(plan: FieldPlan) -> list[float]:
-    """Where a loop passes through the states whose fields are kept."""
-    places: list[float] = (plan.penetration * (plan.max_stress or 1.0)).tolist()
-    return places
+    """Return the prescribed values of the states whose fields are kept."""
+    marks: list[float] = (plan.penetration * (plan.max_stress or 1.0)).tolist()
+    return marks

@@ -1,9 +1,8 @@
-"""Which losses are doubtful: those that by their own account miss the accuracy asked for.
+"""Decide which losses are doubtful: those whose estimated error exceeds the requested accuracy.
 
-A loop is checked twice by what it knows itself: the audit compares the loop integral with the sum
-of the energy drops, and the estimated numerical error is that of both. How the latter compares with
-the errors that are made is measured (docs/methods.md, "Error of the loss"), so that it can be held
-against the accuracy as it is.
+A loop has two estimates of its error: the audit compares the loop integral with the sum of the
+energy drops, and ``loss_error`` is the estimated numerical error of both. The latter was compared
+with actual errors (docs/methods.md, "Error of the loss"), and is used without a safety factor.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ BEYOND_LIMIT = (
 
 
 def bound(accuracy: float) -> float:
-    """Return the relative error above which a loss is doubtful: the accuracy asked for."""
+    """Return the relative error above which a loss is doubtful: the requested accuracy."""
     return accuracy
 
 
@@ -35,12 +34,12 @@ def doubtful(
     Parameters
     ----------
     accuracy : float
-        The relative error that was asked for.
+        Requested relative error.
     loss, loss_error : float or array
         In J/m².
     audit_residual : float or array
         (loss - loss_from_drops) / loss.
     """
-    most = bound(accuracy)
-    error = np.asarray(loss_error) > most * np.abs(np.asarray(loss))
-    return np.asarray((np.abs(np.asarray(audit_residual)) > most) | error)
+    largest = bound(accuracy)
+    error = np.asarray(loss_error) > largest * np.abs(np.asarray(loss))
+    return np.asarray((np.abs(np.asarray(audit_residual)) > largest) | error)

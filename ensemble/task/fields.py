@@ -1,7 +1,7 @@
-"""Fields of chosen states of a loop, reduced to a bounded size.
+"""Reduce the fields of chosen states of a loop to a bounded size.
 
 At the chosen penetrations, on both branches, every task keeps the power spectral density of the
-deformed surface and the density of the gap, in bins that depend on the campaign alone, so that they
+deformed surface and the density of the gap. Their bins depend on the campaign alone, so that they
 can be averaged over realisations. The first realisations of each (H, γ) keep the fields themselves,
 thinned to a bounded number of nodes.
 
@@ -38,7 +38,7 @@ HEIGHT_EDGES: Array = np.linspace(-5, 5, 81)
 
 @dataclass(frozen=True)
 class FieldPlan:
-    """Which states a campaign keeps fields of, and in which bins.
+    """States of which a campaign keeps fields, and bins of their statistics.
 
     Attributes
     ----------
@@ -55,10 +55,10 @@ class FieldPlan:
     load_steps : int
     wanted : tuple of float
         Penetrations Δ/h_max as the campaign gives them.
-    most_nodes : int
-        Of the fields that are kept themselves.
+    max_nodes : int
+        Largest number of nodes of a stored field.
     realisations : int
-        So many first realisations of each (H, γ) keep the fields themselves.
+        Number of first realisations of each (H, γ) whose fields are stored.
     """
 
     period: float
@@ -68,7 +68,7 @@ class FieldPlan:
     max_penetration: float
     load_steps: int
     wanted: tuple[float, ...]
-    most_nodes: int
+    max_nodes: int
     realisations: int
     max_stress: float | None = None
 
@@ -86,21 +86,21 @@ class FieldPlan:
 
     @cached_property
     def stride(self) -> int:
-        """Every so manieth node of a kept field is stored."""
+        """Distance of the nodes of a stored field, in nodes of the computed one; a power of two."""
         stride = 1
-        while self.nodes // stride > self.most_nodes:
+        while self.nodes // stride > self.max_nodes:
             stride *= 2
         return stride
 
     @cached_property
     def position(self) -> Array:
-        """Places x of the stored nodes, in m."""
+        """Positions x of the stored nodes, in m."""
         count = self.nodes // self.stride
         return np.linspace(0, self.period, count, endpoint=False)
 
     @cached_property
     def harmonic_edges(self) -> NDArray[np.int64]:
-        """First harmonic of each bin of the spectra, and one past the last; each bin has one."""
+        """First harmonic of each bin of the spectra, and one past the last; no bin is empty."""
         top = self.nodes // 2
         count = max(2, int(np.ceil(np.log10(top) * _BINS_PER_DECADE)) + 1)
         return np.unique(np.rint(np.logspace(0, np.log10(top), count)).astype(np.int64))
@@ -119,7 +119,7 @@ class FieldPlan:
         return np.asarray(middle * (2 * np.pi / self.period))
 
     def spectral_density(self, values: Array) -> Array:
-        """Spectral density in the bins, of values with unit u on the nodes, in u² m."""
+        """Return the spectral density in the bins, in u² m, of values on the nodes with unit u."""
         power = spectral_density(values, self.period)
         edges = self.harmonic_edges
         total = np.add.reduceat(power[: edges[-1]], edges[:-1])
@@ -133,14 +133,15 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
     ----------
     plan : FieldPlan
     several : collection of str
-        Keys that have several values; lengths in units of these are named so.
+        Keys that have several values; lengths are then in units of these.
     """
     if "period" in several:
         waves = Scale("wave_number", plan.wave_number, "1", "wave number/q0, middle of its bin")
-        places = Scale("field_position", plan.position, "1", "q0 times the position of a node")
+        positions = Scale("field_position", plan.position, "1", "q0 times the position of a node")
     else:
         waves = Scale("wave_number", plan.wave_number, "rad m-1", "wave number, middle of its bin")
-        places = Scale("field_position", plan.position, "m", "position of a node of a kept field")
+        meaning = "position of a node of a kept field"
+        positions = Scale("field_position", plan.position, "m", meaning)
     depth = f"penetration/{'max_penetration' if 'max_penetration' in several else 'h_max'}"
     if plan.max_stress is not None:
         depth = "mean stress/max_stress"
@@ -160,7 +161,7 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
         ),
         Scale("field_branch", np.arange(2), "1", "branch of a field: 0 loading, 1 unloading"),
         Scale("field_penetration", plan.penetration, "1", f"{depth} of a field"),
-        places,
+        positions,
     )
 
 
@@ -198,9 +199,9 @@ FIELD_DATASETS = (
 
 
 def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
-    """Return the plan of a task, or of the file: lengths in units of what the tasks differ in.
+    """Return the plan of a task, or of the file, with lengths in units of what tasks differ in.
 
-    Bins of the spectra are those of the finest profile of the campaign for all of its tasks.
+    All tasks have the spectral bins of the finest profile of the campaign.
     """
     here = campaign if task is None else campaign.at(task)
     profile, cycle, output = here.profile, here.cycle, here.output
@@ -218,14 +219,14 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
         max_penetration=top,
         load_steps=cycle.load_steps,
         wanted=(top / 3, 2 * top / 3, top) if wanted is None else wanted,
-        most_nodes=output.field_nodes,
+        max_nodes=output.field_nodes,
         realisations=min(output.field_realisations, campaign.realisations),
         max_stress=cycle.turning_point if cycle.under_load else None,
     )
 
 
 class FieldRecorder:
-    """Collects the fields of one loop; :meth:`on_state` goes to ``run_loop``.
+    """Recorder of the fields of one loop; :meth:`on_state` is passed to ``run_loop``.
 
     Parameters
     ----------
@@ -233,7 +234,7 @@ class FieldRecorder:
     method : Method
         The one that runs the loop.
     keep : bool
-        Whether the fields themselves are kept.
+        Whether the fields themselves are stored.
     """
 
     def __init__(self, plan: FieldPlan, method: Method, keep: bool) -> None:
@@ -258,30 +259,30 @@ class FieldRecorder:
         if not state.patches or not self._plan.penetration.size:
             return
         problem = self._method.problem
-        # of the path: of the far side, where a stiffness holds the half-space
+        # with a stiffness, the penetration of the far side
         if self._plan.max_stress is None:
             penetration = problem.penetration(problem.prescribed_in(state))
         else:
             penetration = state.mean_stress / self._plan.max_stress
         distance = np.abs(self._plan.penetration - penetration)
         nearest = int(np.argmin(distance))
-        # States between load steps lie beside the axis by far more than rounding.
+        # States between load steps differ from the axis by far more than rounding.
         if distance[nearest] > 1e-9:
             return
         self._record((BRANCHES.index(branch), nearest), state)
 
-    def _record(self, place: tuple[int, int], state: ContactState) -> None:
+    def _record(self, index: tuple[int, int], state: ContactState) -> None:
         plan, profile = self._plan, self._method.problem.profile
         fields = self._method.fields(state, plan.nodes)
-        self._row["psd_displacement"][place] = plan.spectral_density(fields.displacement)
+        self._row["psd_displacement"][index] = plan.spectral_density(fields.displacement)
         openings = self._method.openings(state)
         shares = gap_shares(openings, profile.period, GAP_EDGES * profile.h_max)
-        self._row["gap_density"][place] = shares / np.diff(GAP_EDGES)
+        self._row["gap_density"][index] = shares / np.diff(GAP_EDGES)
         if self._keep:
             pick = slice(None, None, plan.stride)
-            self._kept["field_displacement"][place] = fields.displacement[pick]
-            self._kept["field_stress"][place] = fields.stress[pick]
-            self._kept["field_gap"][place] = fields.gap[pick]
+            self._kept["field_displacement"][index] = fields.displacement[pick]
+            self._kept["field_stress"][index] = fields.stress[pick]
+            self._kept["field_gap"][index] = fields.gap[pick]
 
     def row(self) -> dict[str, NDArray[np.float32]]:
         """Return the values by dataset; NaN where a state had no contact."""
@@ -289,6 +290,6 @@ class FieldRecorder:
 
 
 def _density(values: Array, edges: Array) -> Array:
-    """Histogram over bins, divided by the number of values and by the width of the bin."""
+    """Return a histogram, divided by the number of values and by the width of each bin."""
     count, _ = np.histogram(values, edges)
     return np.asarray(count / (np.diff(edges) * values.size))

@@ -320,8 +320,8 @@ def _quantity(answer: Answer, name: str) -> Quantity:
         if changes:
             doubts[doubt] = float(np.sqrt(np.mean(np.square(changes))))
     if name == "loss" and value:
-        told = answer.main["loss_error"]
-        numerics = abs(answer.main["audit_residual"]) if told is None else abs(told) / abs(value)
+        error = answer.main["loss_error"]
+        numerics = abs(answer.main["audit_residual"]) if error is None else abs(error) / abs(value)
         doubts["numerics"] = float(numerics)
     spread = float(np.sqrt(sum(d * d for d in doubts.values())))
     return Quantity(value, abs(value) * max(_LEAST, COVERAGE * spread), doubts)

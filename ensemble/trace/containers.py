@@ -1,4 +1,4 @@
-"""Files that hold no trace as they are: compressed files, archives, workbooks, pictures."""
+"""Refuse files that have to be unpacked or exported: archives, workbooks, pictures."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
 
-# By their first bytes; what stands behind FILE in the message.
+# By their first bytes: name of the format, and program that unpacks it.
 _COMPRESSED = {
     b"\x1f\x8b": ("gzip", "gunzip"),
     b"BZh": ("bzip2", "bunzip2"),
@@ -32,8 +32,8 @@ def beginning(path: Path) -> bytes:
     Raises
     ------
     InputError
-        If it is missing, no regular file, unreadable, empty, or of a kind that holds no trace
-        before it is unpacked or exported; one sentence.
+        If it is missing, no regular file, unreadable, empty, or has to be unpacked or exported
+        first.
     """
     try:
         if path.is_dir():
@@ -65,7 +65,7 @@ def _refuse(path: Path, begin: bytes) -> None:
 
 
 def container(path: Path) -> str | None:
-    """Return what to do with a workbook or an archive that is no instrument's file, or None."""
+    """Return a message for a workbook or an archive that is no instrument's file, else None."""
     with path.open("rb") as stream:
         begin = stream.read(_BEGIN)
     suffix = path.suffix.lower()

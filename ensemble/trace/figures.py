@@ -1,4 +1,4 @@
-"""Figures of an answer: trace, spectrum, loop, loss against cut-off, γ and turning point."""
+"""Draw the figures of an answer: trace, spectrum, loop, loss against cut-off, γ, turning point."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from adhesis.solver.model.measured_profile import trace_spectrum
 from adhesis.solver.model.profile import Array
 
 _GREY, _BLUE, _ORANGE = "0.62", "#0072B2", "#D55E00"
-_MOST_SHOWN = 4000  # points of a curve; of more, the lowest and highest of each stretch
+_MAX_POINTS = 4000  # of a curve; of more, lowest and highest of each interval are drawn
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure on disk and what it shows."""
+    """Figure on disk, with title and caption."""
 
     path: Path
     title: str
@@ -37,7 +37,7 @@ class Drawn:
 
 
 def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
-    """Draw every figure for which there are numbers, as PNG (200 dpi)."""
+    """Draw all figures for which the answer has data, as PNG (200 dpi)."""
     drawn = []
     with style():
         for stem, title, build in (
@@ -58,7 +58,7 @@ def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
 
 
 def _scale(size: float) -> tuple[float, str]:
-    """Unit in which a length of this size reads well, and its name."""
+    """Return the unit for a length of this size: its factor and name."""
     for factor, name in ((1e3, "mm"), (1e6, "µm"), (1e9, "nm")):
         if size * factor >= 1:
             return factor, name
@@ -66,10 +66,10 @@ def _scale(size: float) -> tuple[float, str]:
 
 
 def _thinned(x: Any, y: Any) -> tuple[Array, Array]:
-    """Few points that look like all: lowest and highest of each stretch, in order."""
-    if x.size <= _MOST_SHOWN:
+    """Reduce a curve to the lowest and highest points of each interval, in order."""
+    if x.size <= _MAX_POINTS:
         return x, y
-    each = int(np.ceil(x.size / (_MOST_SHOWN // 2)))
+    each = int(np.ceil(x.size / (_MAX_POINTS // 2)))
     whole = (x.size // each) * each
     rows = np.where(np.isfinite(y[:whole]), y[:whole], 0.0).reshape(-1, each)
     base = np.arange(rows.shape[0]) * each
@@ -107,13 +107,13 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     below.plot(*_thinned(by_x * x, by_z * level), color=_GREY, lw=0.7, label="level")
     n = max(4 * profile.highest_harmonic, 2000) + 1
     used = profile.heights(n)
-    place = profile.period * np.arange(n) / n
-    below.plot(*_thinned(by_x * place, by_z * used), color=_BLUE, lw=0.8, label="used, one period")
+    at = profile.period * np.arange(n) / n
+    below.plot(*_thinned(by_x * at, by_z * used), color=_BLUE, lw=0.8, label="used, one period")
     below.set(xlabel=f"position ({unit_x})", ylabel=f"height ({unit_z})")
     below.legend(loc="best", ncols=2)
     return figure, (
-        "Above: heights as they were read, the form that is taken off, and the heights that were "
-        "interpolated. Below: the level trace, and the period of the profile that is pressed on."
+        "Above: heights as read, the form that is subtracted, and interpolated heights. "
+        "Below: the level trace, and the period of the profile that is used."
     )
 
 
@@ -145,8 +145,8 @@ def _spectrum(answer: Answer) -> tuple[Figure, str]:
     axes.legend(loc="best")
     return figure, (
         "Power spectrum with Hann's window, averaged over bands, before and after levelling, and "
-        "of the profile that is used; where it meets the noise or bends down at its end, heights "
-        "are no longer those of the surface."
+        "of the profile that is used. Where it meets the noise or bends down at its end, it is no "
+        "longer that of the surface."
     )
 
 
@@ -248,8 +248,8 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
     panels[2, 0].set_xlabel("work of adhesion γ (J/m²)")
     panels[2, 1].set_xlabel(r"turning point $\Delta/h_{\max}$")
     return figure, (
-        "Bars: the relative uncertainty of the answer, taken over to the other points, where it "
-        "was not measured."
+        "Bars: the relative uncertainty of the answer; at the other points it is assumed to be "
+        "the same."
     )
 
 

@@ -1,9 +1,9 @@
-"""Instrument formats, through SurfaceTopography: an optional extra.
+"""Read instrument formats through SurfaceTopography, an optional dependency.
 
-The extra ``instruments`` brings it. It is under the MIT licence, reads line scans as
-such (Dektak, Mahr, Mitutoyo, Igor, netCDF) beside some forty formats of maps, and its conventions
-differ by format: a physical size is n steps where the file tells the distance of first and last
-point, n - 1 steps. Here the step is always taken from its positions.
+The extra ``instruments`` installs it. It is under the MIT licence, and reads line scans as such
+(Dektak, Mahr, Mitutoyo, Igor, netCDF) beside some forty formats of maps. Its conventions differ by
+format: a physical size is n steps in some, and n - 1 in those whose files hold the distance from
+first to last point. So the step is always computed from its positions.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
 
 
 class UnknownFormatError(InputError):
-    """No reader of instrument files gets heights out of the file."""
+    """Raised if no reader of instrument files finds heights in the file."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Positions and heights (NaN: not measured) of an instrument file in m, and what was read."""
+    """Positions and heights (NaN: not measured) of an instrument file in m, and a description."""
 
     positions: Array
     heights: Array
@@ -38,7 +38,7 @@ class Scan:
 
 
 def available() -> bool:
-    """Whether the extra is installed."""
+    """Return whether the optional dependency is installed."""
     from importlib.util import find_spec
 
     return find_spec("SurfaceTopography") is not None
@@ -59,11 +59,11 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
     import warnings
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the readers' own affairs
+        warnings.simplefilter("ignore")  # they concern the readers, not the file
         try:
             reader = io.open_topography(str(path))
             channels = list(reader.channels)
-        except Exception as error:  # every reader has failures of its own
+        except Exception as error:  # each reader raises exceptions of its own
             raise UnknownFormatError(
                 f"{path} is no instrument format that can be read: {_one_line(error)}"
             ) from None
@@ -93,7 +93,7 @@ def _library() -> ModuleType:
         raise InputError(
             f"an instrument's file needs the optional package SurfaceTopography: {HINT}"
         )
-    # Its NuMPI would start MPI as soon as it can import mpi4py; reading a file needs no ranks.
+    # NuMPI, which it imports, initialises MPI if it can import mpi4py; reading needs no ranks.
     hidden = "mpi4py" not in sys.modules
     if hidden:
         sys.modules["mpi4py"] = None  # type: ignore[assignment]  # None: cannot be imported
@@ -122,7 +122,7 @@ def _channel(path: Path, channels: list[Any], wanted: int | None) -> Any:
 
 
 def _line(path: Path, topography: Any, heights: Array, row: int | None) -> tuple[Array, Array, str]:
-    """Positions and heights of the line scan, or of one row of a map, in the file's unit."""
+    """Return positions and heights of a line scan, or of one row of a map, in the file's unit."""
     if heights.ndim == 1:
         if row is not None:
             raise InputError(f"{parameter('row')} is {row}: {path} holds a line, no map")
@@ -143,8 +143,8 @@ def _line(path: Path, topography: Any, heights: Array, row: int | None) -> tuple
 
 def _tip_radius(topography: Any) -> float | None:
     try:
-        told = topography.info["instrument"]["parameters"]["tip_radius"]
-        return float(told["value"]) * METRES[unit_named(str(told["unit"]))]
+        radius = topography.info["instrument"]["parameters"]["tip_radius"]
+        return float(radius["value"]) * METRES[unit_named(str(radius["unit"]))]
     except (KeyError, TypeError, ValueError, InputError):
         return None
 

@@ -1,4 +1,4 @@
-"""Options of the command line that say how a trace is read and prepared."""
+"""Read and prepare a trace by the options of the command line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NAMES = (
 
 
 def trace_of(args: argparse.Namespace, path: Path) -> Trace:
-    """Read the trace as the options say."""
+    """Read the trace by the options."""
     columns = None
     if args.columns is not None:
         try:
@@ -42,7 +42,7 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
 
 
 def delimiter_of(args: argparse.Namespace) -> str | None:
-    """Delimiter of a text, as the option names it; None to find it out."""
+    """Return the delimiter that the option names; None to detect it."""
     sign: str | None = args.delimiter
     delimiter = {"\\t": "\t", "tab": "\t", "space": " "}.get(sign, sign) if sign else sign
     if delimiter is not None and delimiter not in DELIMITERS:
@@ -52,7 +52,7 @@ def delimiter_of(args: argparse.Namespace) -> str | None:
 
 
 def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:
-    """Prepare the trace as the options say."""
+    """Prepare the trace by the options."""
 
     def length(text: str | None, option: str) -> float | None:
         return None if text is None else parse_length(text, option)
@@ -69,7 +69,7 @@ def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:
 
 
 def what_was_read(prepared: Prepared) -> str:
-    """What was read and done, line by line, for the terminal."""
+    """Describe reading and preparation, line by line, for the terminal."""
     trace = prepared.trace
     lines = [
         f"read        {trace.path}: {trace.points} points, step {length_text(trace.step, 5)}, "
@@ -82,5 +82,5 @@ def what_was_read(prepared: Prepared) -> str:
 
 
 def given(args: argparse.Namespace) -> list[str]:
-    """Options of reading and preparing that were given."""
+    """Return the given options of reading and preparation."""
     return [f"--{name.replace('_', '-')}" for name in _NAMES if getattr(args, name)]

@@ -1,4 +1,4 @@
-"""What to run for an answer, what it will cost, and what would make it cheaper."""
+"""Plan the loops of an answer, estimate their cost, and suggest cheaper settings."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName
 from adhesis.solver.values import ByValue
 
-# Loops beyond this many waves are compared at a coarser cut-off when a doubt is measured.
-_MOST_WAVES_OF_VARIANTS = 8000
-_SECONDS_TO_HINT, _FEWEST_WAVES = 120.0, 50
+# Longer profiles are compared at a coarser cut-off when a doubt is measured.
+_MAX_WAVES_OF_VARIANTS = 8000
+# A plan of more seconds gets hints, down to this number of waves.
+_SECONDS_TO_HINT, _MIN_WAVES = 120.0, 50
 
 # CPU seconds of a loop by `sharp`, 40 load steps: measured from 320 waves and 6 patches (0.9 s) to
-# 20,000 waves and 8 patches (35 s); a guess within a factor of about three.
+# 20,000 waves and 8 patches (35 s); right within a factor of about three.
 _SECONDS, _WAVES_POWER, _MANY_PATCHES = 0.7e-3, 0.85, 20.0
 _START = 2.0  # seconds for a process to start
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """Contact and cycle of the answer, in SI units; the first value of each is the answer's."""
+    """Contact and cycle in SI units; the answer has the first value of each tuple."""
 
     half_space: HalfSpace
     works_of_adhesion: tuple[float, ...]
@@ -43,9 +44,9 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Run:
-    """One loop of the plan: the answer's, or one that differs from ``reference`` in one decision.
+    """Loop of the plan: that of the answer, or one that differs from ``reference`` in one decision.
 
-    ``group`` is the doubt or the table that it belongs to.
+    ``group`` is the doubt or the table to which it belongs.
     """
 
     name: str
@@ -66,9 +67,9 @@ class Plan(ByValue):
     seconds : dict
         Expected CPU seconds by run.
     waves, patches : int
-        Of the answer's loop; the patches are expected.
+        Number of waves of the answer's loop, and expected number of patches.
     wall : float
-        Expected seconds on this machine's cores.
+        Expected wall seconds on this machine's cores.
     hints : tuple of str
     """
 
@@ -83,7 +84,7 @@ class Plan(ByValue):
 
     @property
     def said(self) -> str:
-        """The plan in two or three lines."""
+        """Description of the plan in two or three lines."""
         lines = [
             f"plan        {self.waves} waves, about {self.patches} "
             f"patch{'es' if self.patches != 1 else ''} at a time: "
@@ -94,7 +95,7 @@ class Plan(ByValue):
 
 
 def clock(seconds: float) -> str:
-    """A duration in words, no more exact than it is known."""
+    """Return a duration in words, rounded to the accuracy of an estimate."""
     if seconds < 90:
         return f"{max(1, round(seconds))} s"
     if seconds < 5400:
@@ -105,16 +106,16 @@ def clock(seconds: float) -> str:
 def make_plan(
     prepared: Prepared, cycle: Cycle, *, quick: bool = False, processes: int | None = None
 ) -> Plan:
-    """List the loops of an answer and price them; nothing is run.
+    """List the loops of an answer and estimate their cost; none is run.
 
     Parameters
     ----------
     prepared : Prepared
     cycle : Cycle
     quick : bool
-        The loop and its doubts alone, without the tables against γ and turning point.
+        Leave out the tables against γ and turning point.
     processes : int, optional
-        Processes side by side; without it all cores at hand, 0 for none beside this one.
+        Number of processes side by side, 0 for this one alone; without it one a core.
     """
     processes = cores() if processes is None else processes
     runs = [*_doubts(prepared), *([] if quick else _tables(cycle))]
@@ -128,7 +129,7 @@ def make_plan(
         jobs[run.name] = job
         seconds[run.name] = expected_seconds(profiles[key], job)
     base = profiles[repr([])]
-    # The cheapest first, alone, as it makes the machine code; then the longest ones.
+    # The cheapest loop is first and alone, as it compiles; then the longest ones, for balance.
     first = min(runs, key=lambda run: seconds[run.name])
     order = sorted(runs, key=lambda run: (run is not first, -seconds[run.name]))
     wall = max(
@@ -149,7 +150,7 @@ def make_plan(
 
 
 def _doubts(prepared: Prepared) -> list[Run]:
-    """The answer's loop, and one more for each decision that could have been made otherwise."""
+    """List the answer's loop, and one for each decision that could have been made otherwise."""
     cut, step = prepared.cut_off, prepared.step
     length = prepared.filled.size * step
     runs = [Run("answer", "answer", "the loop")]
@@ -170,9 +171,9 @@ def _doubts(prepared: Prepared) -> list[Run]:
     if cut / math.sqrt(2.0) >= 2.5 * step:
         cut_off(1 / math.sqrt(2.0))
 
-    # On long traces doubts about the whole are measured with fewer waves, all else being equal.
+    # On long traces the other doubts are measured with fewer waves, all else being equal.
     factor = 1.0
-    while length / (factor * cut) > _MOST_WAVES_OF_VARIANTS and 2 * factor in (2.0, 4.0, 8.0, 16.0):
+    while length / (factor * cut) > _MAX_WAVES_OF_VARIANTS and 2 * factor in (2.0, 4.0, 8.0, 16.0):
         factor *= 2
     reference = "answer" if factor == 1 else f"cut-off × {factor:.3g}"
 
@@ -243,11 +244,11 @@ def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
     )
 
 
-# ---------------------------------------------------------------------- price
+# ---------------------------------------------------------------------- cost
 
 
 def expected_patches(profile: Profile, half_space: HalfSpace, work_of_adhesion: float) -> float:
-    """Guess of the most patches at a time.
+    """Estimate the largest number of patches at a time.
 
     Waves up to the mean one stay apart as far as the energy of full contact, E*/2 Σ q|a|² per area,
     exceeds the work of adhesion; the exponent is fitted to loops of self-affine profiles.
@@ -261,7 +262,7 @@ def expected_patches(profile: Profile, half_space: HalfSpace, work_of_adhesion: 
 
 
 def expected_seconds(profile: Profile, job: Job) -> float:
-    """Guess of the CPU seconds of one loop."""
+    """Estimate the CPU seconds of one loop."""
     patches = expected_patches(profile, HalfSpace(job.young, job.poisson), job.work_of_adhesion)
     steps = max(job.load_steps / 40, 0.5)
     waves: float = profile.highest_harmonic**_WAVES_POWER
@@ -275,7 +276,7 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
     while plan.wall * factor**-_WAVES_POWER > _SECONDS_TO_HINT / 2 and factor < 64:
         factor *= 2
     hints = []
-    if plan.waves / factor >= _FEWEST_WAVES:
+    if plan.waves / factor >= _MIN_WAVES:
         hints.append(
             f"{parameter('cut_off')} {factor * prepared.cut_off * 1e6:.2g}um "
             f"({plan.waves / factor:.0f} waves) would take about "
@@ -291,7 +292,7 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
 def default_tables(
     work_of_adhesion: Sequence[float], max_penetration: Sequence[float]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Values of γ and turning points to run: those given, or half and twice, one and two thirds."""
+    """Complete a single γ by half and twice of it, a single turning point by one and two thirds."""
     gammas, depths = tuple(work_of_adhesion), tuple(max_penetration)
     if len(gammas) == 1 and gammas[0] > 0:
         gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)

@@ -1,4 +1,4 @@
-"""Loops side by side in processes of their own on the cores at hand; no MPI."""
+"""Run loops side by side in processes of their own, without MPI."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ Watch = Callable[["Pool"], None]
 
 
 class Pool:
-    """Runs jobs, the first one alone, so that machine code is made once and not in every process.
+    """Pool of processes; the first job runs alone, so that one process compiles for all.
 
     Parameters
     ----------
     jobs : sequence of Job
     processes : int
-        Side by side; 0 runs them one after the other in this process.
+        Number of processes; 0 runs the jobs one after the other in this process.
 
     Attributes
     ----------
     done : dict
-        Result by job name; a text where the loop failed.
+        Result by job name; the error text of a failed loop.
     running : dict
-        By job name: when it started (monotonic seconds), and branch and penetration it has come to.
+        By job name: start (monotonic seconds), and the branch and penetration reached.
     took : dict
-        Wall seconds by name of the jobs that are done.
+        Wall seconds by name of the finished jobs.
     """
 
     def __init__(self, jobs: Sequence[Job], processes: int) -> None:
@@ -54,7 +54,7 @@ class Pool:
         return [process.pid for process in self._workers]
 
     def run(self, watch: Watch | None = None, every: float = 1.0) -> dict[str, Result | str]:
-        """Run all jobs; ``watch`` is called every so many seconds, and when a loop is done."""
+        """Run all jobs; ``watch`` is called at this interval (s), and when a loop is done."""
         if self.processes == 0:
             return self._run_here(watch)
         try:
@@ -125,7 +125,7 @@ class Pool:
             pickle.dump(job, stdin)
             stdin.flush()
         except BrokenPipeError:
-            pass  # its end is on its way through the inbox
+            pass  # the process has ended: _listen reports it
 
     def _take(self, worker: int, kind: str, content: Any) -> None:
         job = self._job_of.get(worker)

@@ -1,4 +1,4 @@
-"""From a trace to level heights and a cut-off: each step explicit, and on the record."""
+"""Prepare a trace: level heights and a cut-off, with a record of each step."""
 
 from __future__ import annotations
 
@@ -24,27 +24,30 @@ from adhesis.solver.model.measured_profile import (
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
 
-MOST_DEGREE = 6
-_DEGREE = Bounds(0, MOST_DEGREE, whole=True)
+MAX_DEGREE = 6
+_DEGREE = Bounds(0, MAX_DEGREE, whole=True)
 _LENGTH_OR_NONE = Bounds(0.0, LENGTH.high, unit="m")
 
-# A spike stands out of the four heights on either side by so many robust standard deviations.
+# A spike exceeds the medians of the four heights on either side by so many robust standard
+# deviations. More than this share of the heights are no spikes.
 _SIDE, _SPIKE = 4, 10.0
-_MOST_SPIKES = 0.01
-# A gap is interpolated up to this length: so many steps, or this share of the trace.
+_MAX_SPIKES = 0.01
+# Gaps are interpolated up to this length: number of steps, or share of the trace if that is more.
 _GAP_STEPS, _GAP_SHARE = 5, 0.01
-_MOST_MISSING = 0.10
-# A form stands out of the six degrees above it by this factor in mean square height.
+# Share of heights that may be missing in all.
+_MAX_MISSING = 0.10
+# A degree is a form if its mean square height exceeds each of the six degrees above by this factor,
+# and surely one at the second factor; looked for up to the last number.
 _FORM, _SURE_FORM, _FORM_TO = 8.0, 30.0, 4
-# A trace whose rms height is no more than so many times its noise is nothing but noise.
-_ALL_NOISE = 1.1
-# Of the mean square height, the share of the two longest waves at which they decide alone.
+# A trace is refused as noise if its rms height is below this multiple of the noise.
+_MIN_TO_NOISE = 1.1
+# Warn above this share of the two longest waves in the mean square height.
 _LONG_WAVES = 0.5
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the preparation: what was done, in words and in numbers (SI)."""
+    """One step of the preparation, described in words and in numbers (SI)."""
 
     name: str
     said: str
@@ -53,7 +56,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Prepared(ByValue):
-    """A trace ready for the loop, with everything that was decided on the way.
+    """Trace that is ready for the loop, with all decisions of its preparation.
 
     Attributes
     ----------
@@ -61,15 +64,15 @@ class Prepared(ByValue):
     filled : array, shape (n,)
         Heights in m without outliers and gaps, not yet level.
     degree : int
-        Degree of the polynomial that is taken off.
+        Degree of the polynomial that is subtracted.
     form_is_sure : bool
-        Whether a form of that degree stands out so far that less of it is no alternative.
+        Whether a form of that degree stands out so far that a lower one is no alternative.
     cut_off : float
         Shortest wavelength kept, in m.
     limits : dict
-        Shortest wavelength that the trace can be trusted with, by what limits it, in m.
+        Shortest reliable wavelength in m, by what limits it.
     spectrum : TraceSpectrum
-        Of the level heights.
+        Spectrum of the level heights.
     steps : tuple of Step
     warnings : tuple of str
     """
@@ -87,7 +90,7 @@ class Prepared(ByValue):
     warnings: tuple[str, ...]
 
     def __repr__(self) -> str:
-        """One line: the file, its points and what was decided."""
+        """Return one line: the file, its number of points, and the decisions."""
         return (
             f"Prepared({str(self.trace.path)!r}, {self.filled.size} points, degree={self.degree}, "
             f"cut_off={length_text(self.cut_off)}, {counted(len(self.warnings), 'warning')})"
@@ -95,11 +98,11 @@ class Prepared(ByValue):
 
     @property
     def step(self) -> float:
-        """Step in m."""
+        """Distance of two heights, in m."""
         return self.trace.step
 
     def level(self, degree: int | None = None) -> Array:
-        """Heights less their form, in m; of another degree on demand."""
+        """Subtract the form, also one of another degree; return heights in m."""
         return self.filled - polynomial_form(self.filled, self.degree if degree is None else degree)
 
     def profile(
@@ -111,9 +114,9 @@ class Prepared(ByValue):
         cut_off: float | None = None,
         noise_seed: int | None = None,
     ) -> Profile:
-        """One period of a profile made of the trace, with one decision made otherwise on demand.
+        """Make one period of a profile of the trace; arguments replace single decisions.
 
-        ``noise_seed`` adds once more what the instrument adds: white noise of the estimated size.
+        ``noise_seed`` adds white noise of the size that the instrument is estimated to add.
         """
         heights = self.level(degree)
         if noise_seed is not None:
@@ -133,36 +136,36 @@ def prepare_trace(
     keep_outliers: bool = False,
     invert: bool = False,
 ) -> Prepared:
-    """Fill gaps, take outliers and form off, and choose the shortest wave to keep.
+    """Remove outliers and form, fill gaps, and choose the shortest wave to keep.
 
     Parameters
     ----------
     trace : Trace
     degree : int, optional
-        Of the polynomial that is taken off, 0 … 6; without it 1 (tilt), or more where a form
+        Degree of the polynomial that is subtracted, 0 … 6; without it 1 (tilt), or more if a form
         stands out.
     cut_off : float, optional
         Shortest wavelength kept, in m; without it the longest of the limits that step, noise and
         tip set (:func:`adhesis.solver.model.measured_profile.trusted_wavelength`).
     tip_radius : float, optional
-        In m; without it that of the file, if it tells one.
+        In m; without it that of the file, if there is one.
     longest_gap : float, optional
         Drop-outs up to this length (m) are interpolated, longer ones refused.
     keep_outliers : bool
-        Leave spikes in.
+        Keep spikes.
     invert : bool
-        Turn the heights over: for an instrument whose z points into the sample.
+        Change the sign of the heights, for an instrument whose z points into the sample.
 
     Raises
     ------
     InputError
-        If a gap is too long, too much is missing, or a value breaks its rule.
+        If a gap is too long, too many heights are missing, or a value breaks its rule.
     TypeError
-        If the trace is no Trace, or a value of the wrong type.
+        If the trace is no Trace, or a value has the wrong type.
 
     References
     ----------
-    docs/measured-profile.md, "What is done to it"
+    docs/measured-profile.md, "Preparation"
     """
     instance("trace", trace, Trace, "read_trace(path)")
     flag(parameter("keep_outliers"), keep_outliers)
@@ -217,7 +220,7 @@ def _length(name: str, value: float | None, bounds: Bounds) -> float | None:
 
 
 def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
-    """Cut missing heights off both ends: there is nothing to interpolate between."""
+    """Cut missing heights off both ends, where interpolation is impossible."""
     good = np.flatnonzero(np.isfinite(heights))
     if good.size < 2:
         raise InputError(f"{trace.path} has {counted(good.size, 'height')}: a trace needs more")
@@ -240,16 +243,16 @@ def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) ->
     around = sliding_window_view(np.pad(row, _SIDE, mode="edge"), 2 * _SIDE + 1)
     left = np.median(around[:, :_SIDE], axis=1)
     right = np.median(around[:, _SIDE + 1 :], axis=1)
-    # Beyond both sides: the edge of a step is beyond one only.
+    # A spike exceeds both sides, the edge of a step only one.
     rest = np.maximum(row - np.maximum(left, right), np.minimum(left, right) - row)
     spread = 1.4826 * float(np.median(np.abs(row - (left + right) / 2)))
-    # Crests of a smooth or saw-like trace stand out by no more than its sides rise.
+    # Crests of a smooth or saw-like trace exceed their sides by no more than these rise.
     spread = max(spread, 0.15 * float(np.median(np.abs(right - left))), 1e-6 * float(np.std(row)))
     spikes = rest > _SPIKE * spread
     count = int(spikes.sum())
     if not count:
         return heights, 0
-    if count > max(3, _MOST_SPIKES * row.size):
+    if count > max(3, _MAX_SPIKES * row.size):
         warnings.append(
             f"{count} heights stand {_SPIKE:g} standard deviations out of their surroundings: too "
             "many for outliers, so they stay; is the surface made of steps, or the trace faulty?"
@@ -272,7 +275,7 @@ def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) ->
 def _filled(
     heights: Array, trace: Trace, longest: float | None, steps: list[Step]
 ) -> tuple[Array, Array]:
-    """Heights with their gaps filled by straight lines, and which those were."""
+    """Fill gaps by straight lines; return heights, and which of them were filled."""
     gaps = ~np.isfinite(heights)
     if not gaps.any():
         return heights, gaps
@@ -292,14 +295,14 @@ def _filled(
             f"is interpolated ({parameter('longest_gap')} allows more)"
         )
     share = float(gaps.mean())
-    if share > _MOST_MISSING:
+    if share > _MAX_MISSING:
         raise InputError(
             f"{trace.path} lacks {100 * share:.1f} % of its heights: up to "
-            f"{100 * _MOST_MISSING:.0f} % may lack"
+            f"{100 * _MAX_MISSING:.0f} % may lack"
         )
-    place = np.arange(heights.size)
+    index = np.arange(heights.size)
     filled = heights.copy()
-    filled[gaps] = np.interp(place[gaps], place[~gaps], heights[~gaps])
+    filled[gaps] = np.interp(index[gaps], index[~gaps], heights[~gaps])
     steps.append(
         Step(
             "drop-outs",
@@ -316,7 +319,7 @@ def _filled(
 
 
 def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list[str]) -> int:
-    """Degree of the form, chosen or given, with its step; a form left in is warned of."""
+    """Choose the degree of the form, unless given; warn of a form that is not subtracted."""
     shares = form_shares(filled)
     stands_out = [d for d in range(2, _FORM_TO + 1) if _is_form(shares, d)]
     found = max(stands_out, default=1)
@@ -355,14 +358,14 @@ def _is_form(shares: Array, degree: int) -> bool:
 
 
 def _prominence(shares: Array, degree: int) -> float:
-    """Mean square height of a degree over the most of the six degrees above it."""
+    """Return the mean square height of a degree over the largest of the six degrees above."""
     above = shares[degree + 1 : degree + 7]
     return float(shares[degree] / above.max()) if above.size and above.max() > 0 else 0.0
 
 
 def _long_waves(spectrum: TraceSpectrum, rms: float, warnings: list[str]) -> None:
     q, power = spectrum.wave_number, spectrum.power
-    # The bands at the long end hold one wave each, q0 apart: a wave's mean square is 2 C q0/2π.
+    # The first bands hold one wave each, q0 apart: the mean square of a wave is 2 C q0/2π.
     share = float(2 * power[:2].sum() * q[0] / (2 * np.pi) / rms**2)
     if share > _LONG_WAVES:
         warnings.append(
@@ -415,7 +418,7 @@ def _cut_off(
                 f"{length_text(shortest)} on ({why}): give {parameter('cut_off')} to go on all the "
                 "same"
             )
-        if shortest > length / 4 or rms < _ALL_NOISE * spectrum.noise:
+        if shortest > length / 4 or rms < _MIN_TO_NOISE * spectrum.noise:
             raise InputError(
                 f"{trace.path} holds no roughness above its noise: of {length_text(rms)} rms "
                 f"{length_text(spectrum.noise)} are noise, waves can be trusted from "

@@ -1,4 +1,4 @@
-"""Reading a trace: equally spaced heights in m, and what was understood of the file."""
+"""Read a trace: equally spaced heights in m, and a description of how the file was read."""
 
 from __future__ import annotations
 
@@ -25,38 +25,39 @@ from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue
 
-FEWEST_POINTS = 32
+MIN_POINTS = 32
 _COLUMN = checks.Bounds(1, 1_000_000, whole=True)
-MOST_POINTS = 5_000_000
+MAX_POINTS = 5_000_000
 TEXT = frozenset(("txt", "csv", "tsv", "dat", "asc", "prn", "xy", "xyz", "tab", "text", "prf"))
 
-# Positions may scatter about equal steps by so much of a step, and are put on equal steps.
+# Positions may scatter about equal steps by this share of a step; heights are then interpolated.
 _UNEVEN = 0.10
-# Without a unit, numbers are taken as metres only where nothing else is likely.
+# Without a unit, numbers are taken as metres only up to these lengths, steps and heights (m).
 _LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES, _HIGHEST_IN_METRES = 0.02, 2e-5, 1e-3
-# What no trace of a rough surface is.
+# Beyond these limits (m, m, median slope) the unit is wrong.
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
-# A height so many times the range of the others beyond it, and there several times, stands for
-# none; a number that instruments write for it need not be so far out.
+# A repeated height that lies this many ranges of the other heights outside them stands for a
+# missing one. For numbers that instruments write for missing heights the second value holds, and
+# once is enough.
 _BEYOND, _BEYOND_KNOWN = 5.0, 0.2
 _SENTINELS = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trace(ByValue):
-    """A measured trace on equal steps.
+    """Measured trace with equal steps.
 
     Attributes
     ----------
     path : Path
     heights : array, shape (n,)
-        In m; NaN where the instrument has none.
+        In m; NaN where not measured.
     step : float
         In m.
     said : tuple of str
-        How the file was understood, line by line.
+        How the file was read, line by line.
     tip_radius : float or None
-        In m, where the file tells it.
+        In m, if the file holds it.
     """
 
     path: Path
@@ -72,12 +73,12 @@ class Trace(ByValue):
 
     @property
     def length(self) -> float:
-        """From the first to the last point, in m."""
+        """Distance from the first to the last point, in m."""
         return (self.points - 1) * self.step
 
     @property
     def drop_outs(self) -> int:
-        """Number of heights that are missing."""
+        """Number of missing heights."""
         return int(np.isnan(self.heights).sum())
 
     @property
@@ -106,24 +107,24 @@ def read_trace(
         instrument's file (extra ``instruments``).
     unit : str, optional
         Unit of both columns of a text ("um"), or of positions and heights ("mm,um"). Without it,
-        the header must tell, or the numbers must be sure to be metres.
+        the header must have them, or the numbers can only be metres.
     step : float, optional
         Step in m, for heights without positions.
     columns : sequence of two int, optional
-        Which columns of a text are positions and heights, from 1; shape (2,).
+        Columns of positions and heights in a text, counted from 1; shape (2,).
     row, channel : int, optional
-        Row of a map and channel of an instrument file, from 0.
+        Row of a map and channel of an instrument file, counted from 0.
     delimiter, decimal : str, optional
-        Where a text can be read in two ways.
+        Delimiter and decimal sign, where a text can be read in two ways.
 
     Raises
     ------
     InputError
-        With one sentence, if the file cannot be read or cannot be understood beyond doubt.
+        If the file cannot be read, or can be understood in several ways.
 
     References
     ----------
-    docs/measured-profile.md, "What is read"
+    docs/measured-profile.md, "Reading"
     """
     path = checks.path("path", path)
     with refused_as_input():
@@ -149,7 +150,7 @@ def read_trace(
                 f"{parameter(name)} belongs to texts: an instrument's file states its own lengths"
             )
     if not available():
-        # Say which of both is missing: the extra, or any sense in the file.
+        # Without the extra it is not known whether this is a file of an instrument.
         raise InputError(
             container(path)
             or f"{path} is no text: export the trace as text, or, if it is an instrument's file, "
@@ -160,21 +161,21 @@ def read_trace(
     except UnknownFormatError as error:
         raise InputError(container(path) or str(error)) from None
     heights, step, said = _even(path, scan.positions, scan.heights, None)
-    return _checked(Trace(path, heights, step, (scan.said, *said), scan.tip_radius), told=True)
+    return _checked(Trace(path, heights, step, (scan.said, *said), scan.tip_radius))
 
 
 def holds_numbers(path: Path) -> bool:
-    """Whether a file is a text or a .npy, and no instrument's file.
+    """Return whether a file is a text or a .npy, and no instrument's file.
 
     Raises
     ------
     InputError
-        If it cannot be read, or holds no trace before it is unpacked or exported.
+        If it cannot be read, or has to be unpacked or exported first.
     """
     begin, suffix = beginning(path), path.suffix.lower()
     if suffix == ".npy" or begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return True
-    # Text formats of instruments: a header of their own, then numbers that are no two columns.
+    # Text formats of instruments, whose numbers are not two columns.
     if begin[:8] in (b"aISO-1.0", b"aBCR-1.0", b"aISO-2.0") or begin[:7] in (
         b"fileFor",
         b"bISO-1.",
@@ -205,7 +206,7 @@ def load_array(path: Path) -> Array:
             f"{path} holds {table.dtype} of {table.ndim} dimensions: heights are real numbers in "
             "one row or column"
         )
-    with np.errstate(over="ignore"):  # of a longer float; it is refused as not finite
+    with np.errstate(over="ignore"):  # a longer float that overflows is refused as not finite
         return np.asarray(table, dtype=float)
 
 
@@ -239,12 +240,12 @@ def _from_table(
             f"{path} has {len(columns)} columns: {parameter('columns')} X,Z says which are "
             "positions and heights"
         )
-    if columns.shape[1] < FEWEST_POINTS:
+    if columns.shape[1] < MIN_POINTS:
         raise InputError(
-            f"{path} holds {columns.shape[1]} rows of numbers: at least {FEWEST_POINTS}"
+            f"{path} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS}"
         )
-    if columns.shape[1] > MOST_POINTS:
-        raise InputError(f"{path} holds {columns.shape[1]} rows of numbers: at most {MOST_POINTS}")
+    if columns.shape[1] > MAX_POINTS:
+        raise InputError(f"{path} holds {columns.shape[1]} rows of numbers: at most {MAX_POINTS}")
     said = [
         f"text, {table.said}" if table.fields or table.header or path.suffix != ".npy" else "npy"
     ]
@@ -271,7 +272,7 @@ def _from_table(
                 f"give {parameter('step')}"
             )
         said.append(f"step {length_text(step, 6)} (header)")
-    return _checked(Trace(path, heights, float(step), tuple(said)), told=source != "numbers")
+    return _checked(Trace(path, heights, float(step), tuple(said)))
 
 
 # ---------------------------------------------------------------------- units
@@ -285,21 +286,21 @@ def _units(
     columns: Array,
     step: float | None,
 ) -> tuple[tuple[str, str], str]:
-    told = units_of_header(table.header, fields)
-    told = [*told, *told][:2] if len(columns) == 1 else told
+    found = units_of_header(table.header, fields)
+    found = [*found, *found][:2] if len(columns) == 1 else found
     if unit is not None:
         given = parse_units(unit)
-        for name, known, wanted in zip(("positions", "heights"), told, given, strict=True):
+        for name, known, wanted in zip(("positions", "heights"), found, given, strict=True):
             if known not in (None, wanted) and not (len(columns) == 1 and name == "positions"):
                 raise InputError(
                     f"{parameter('unit')} says {wanted} and the header of {path} {known} for the "
                     f"{name}: take the wrong one out"
                 )
         return given, parameter("unit")
-    if told[0] is not None and told[1] is not None:
-        return (told[0], told[1]), "header"
-    if told[0] is not None or told[1] is not None:
-        known = "positions" if told[0] else "heights"
+    if found[0] is not None and found[1] is not None:
+        return (found[0], found[1]), "header"
+    if found[0] is not None or found[1] is not None:
+        known = "positions" if found[0] else "heights"
         raise InputError(
             f"the header of {path} states the unit of the {known} alone: give {parameter('unit')} "
             "X,Z, as in mm,um"
@@ -337,7 +338,7 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
 
 
 def _without_sentinels(heights: Array) -> tuple[Array, str]:
-    """Heights with NaN for numbers that stand for "none", and a sentence on them."""
+    """Replace numbers that stand for missing heights by NaN; return heights and a description."""
     good = heights[np.isfinite(heights)]
     for value in (good.min(), good.max()) if good.size else ():
         others = good[good != value]
@@ -363,7 +364,7 @@ def _is_sentinel(value: float) -> bool:
 def _even(
     path: Path, x: Array, heights: Array, lines: Array | None
 ) -> tuple[Array, float, list[str]]:
-    """Heights on equal steps, the step in m, and what was done for it."""
+    """Return heights at equal steps, the step in m, and a description of what was done."""
     said: list[str] = []
     where = "point {} of {}" if lines is None else "line {} of {}"
 
@@ -392,7 +393,7 @@ def _even(
     step = float((x[-1] - x[0]) / index[-1])
     off = np.abs(x - x[0] - index * step)
     if off.max() > _UNEVEN * step:
-        # Drift of the scanner: the number of steps is right, the places are not.
+        # Drift of the scanner: the number of steps is right, the positions are not.
         if np.all(apart == 1) and np.abs(steps / step - 1).max() <= _UNEVEN:
             even = np.linspace(x[0], x[-1], x.size)
             said.append(
@@ -413,11 +414,11 @@ def _even(
     return heights, step, said
 
 
-def _checked(trace: Trace, told: bool) -> Trace:
-    """Refuse what is no trace of a rough surface in the units that were understood."""
+def _checked(trace: Trace) -> Trace:
+    """Check that the trace is one of a rough surface, in the units that were found."""
     good = trace.heights[np.isfinite(trace.heights)]
-    if good.size < FEWEST_POINTS:
-        raise InputError(f"{trace.path} holds {good.size} heights: at least {FEWEST_POINTS}")
+    if good.size < MIN_POINTS:
+        raise InputError(f"{trace.path} holds {good.size} heights: at least {MIN_POINTS}")
     if np.ptp(good) == 0:
         raise InputError(f"{trace.path}: every height is {good[0]:g} m: a flat trace has no loss")
     if not _SHORTEST <= trace.length <= _LONGEST:

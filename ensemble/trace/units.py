@@ -1,4 +1,4 @@
-"""Units of length: their names in files and options, and where a header tells them."""
+"""Find units of length in files, headers and options."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ _OTHER_NAMES = {
     "inches": "inch",
 }
 
-# In running text only words that mean nothing else; "m", "in" and "A" need brackets around them.
-_CLEAR = [n for n in (*METRES, *_OTHER_NAMES) if n.lower() not in ("m", "in", "a")]
-_WORD = "|".join(sorted(map(re.escape, _CLEAR), key=len, reverse=True))
+# Units that are recognised in running text; "m", "in" and "A" are ambiguous and need brackets.
+_UNAMBIGUOUS = [n for n in (*METRES, *_OTHER_NAMES) if n.lower() not in ("m", "in", "a")]
+_WORD = "|".join(sorted(map(re.escape, _UNAMBIGUOUS), key=len, reverse=True))
 _IN_TEXT = re.compile(rf"(?<![^\W\d_])({_WORD})(?![^\W_])(?!\s*[/^²])", re.IGNORECASE)
 _IN_BRACKETS = re.compile(r"(?:[(\[<{/=:]|\bin\s)\s*(m|in|a)\s*(?=[)\]>}]|$)", re.IGNORECASE)
 
@@ -67,7 +67,7 @@ _STEP = re.compile(
 
 
 def unit_named(name: str) -> str:
-    """Return the unit that goes by this name ("um" is "µm").
+    """Return the unit of this name ("um" is "µm").
 
     Raises
     ------
@@ -84,7 +84,7 @@ def unit_named(name: str) -> str:
 
 
 def parse_units(text: str) -> tuple[str, str]:
-    """Units of positions and heights of the parameter ``unit``: "um" for both, or "mm,um"."""
+    """Parse the parameter ``unit``: "um" for positions and heights, or "mm,um"."""
     words = text.split(",")
     if len(words) > 2:
         raise InputError(
@@ -94,7 +94,7 @@ def parse_units(text: str) -> tuple[str, str]:
 
 
 def parse_length(text: str, option: str) -> float:
-    """Length in m of an option: a number in m, or a number and its unit as in 2.5um.
+    """Parse a length of an option, in m: a number in m, or a number and its unit as in 2.5um.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def parse_length(text: str, option: str) -> float:
 
 
 def length_text(metres: float, digits: int = 3) -> str:
-    """Return a length in the unit that it reads best in: "5 µm"."""
+    """Format a length in a unit of its size: "5 µm"."""
     for unit in ("m", "mm", "µm"):
         if abs(metres) >= METRES[unit]:
             return f"{metres / METRES[unit]:.{digits}g} {unit}"
@@ -129,29 +129,29 @@ def _units_in(text: str) -> list[str]:
 
 
 def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> list[str | None]:
-    """Units of two columns (or of one, twice) as a header tells them; None where it does not.
+    """Find the units of two columns (or of one, twice) in a header; None where it has none.
 
     Parameters
     ----------
     header : sequence of str
         Its lines.
     fields : sequence of sequence of str
-        Those of its lines that have as many fields as the data, split up, columns in order.
+        Fields of those of its lines that have as many fields as the data.
     """
     names = [row for row in fields if not any(_VALUE.search(field) for field in row)]
     for row in reversed(names):
-        told = [_units_in(field) for field in row]
-        if all(len(set(units)) == 1 for units in told):
-            return [units[0] for units in told]
+        found = [_units_in(field) for field in row]
+        if all(len(set(units)) == 1 for units in found):
+            return [units[0] for units in found]
     for row in reversed(names):
-        told = [_units_in(field) for field in row]
-        if any(told) and not any(re.search(r"[\d:=]", field) for field in row):
-            return [units[0] if len(set(units)) == 1 else None for units in told]
+        found = [_units_in(field) for field in row]
+        if any(found) and not any(re.search(r"[\d:=]", field) for field in row):
+            return [units[0] if len(set(units)) == 1 else None for units in found]
     columns = len(fields[0]) if fields else 2
     known: list[set[str]] = [set(), set()]
     for line in header:
         if re.search(r"[=:]\s*[-+]?[\d.,]+\s*\S*\s*$", line):
-            continue  # a length with its value ("Length: 2 mm") says nothing of the columns
+            continue  # a length with its value ("Length: 2 mm") is not about the columns
         units = set(_units_in(line))
         if len(units) != 1:
             continue
@@ -168,7 +168,7 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
 
 
 def step_of_header(header: Sequence[str], decimal: str) -> float | None:
-    """Step in m that a header tells with its unit; None where it does not."""
+    """Find a step with its unit in a header; return it in m, None if there is none."""
     for line in header:
         found = _STEP.search(line.replace("_", " "))
         if found and found[3]:

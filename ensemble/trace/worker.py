@@ -1,7 +1,7 @@
-"""One process that runs loops for a parent: jobs in on stdin, messages out on stdout, pickled.
+"""Run loops for a parent process: jobs on stdin, messages on stdout, pickled.
 
-Started as ``python -m adhesis.ensemble.trace.worker``: it neither forks nor imports the caller's
-script, so it serves a notebook as well as the command line.
+Started as ``python -m adhesis.ensemble.trace.worker``. It neither forks nor imports the caller's
+script, so it works from a notebook as well as from the command line.
 """
 
 from __future__ import annotations
@@ -25,19 +25,18 @@ if TYPE_CHECKING:
 
 _SECONDS_BETWEEN_REPORTS = 1.0
 
-
-# What a loop may end with; anything else is a fault of the program's and ends the process.
+# Errors with which a loop may fail; any other is a fault of the program and ends the process.
 FAILURES = (RuntimeError, ValueError, ArithmeticError, MemoryError)
 
 
 def failure(error: Exception) -> str:
-    """Return a failure in words."""
+    """Return class and message of an error."""
     return f"{type(error).__name__}: {error}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Job(ByValue):
-    """One loop: everything that the solver needs, in SI units."""
+    """Arguments of one loop, in SI units."""
 
     name: str
     period: float
@@ -53,9 +52,9 @@ class Job(ByValue):
 
 def main() -> None:
     """Run jobs until the parent closes the pipe."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends its workers at Ctrl-C
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at Ctrl-C the parent ends its workers
     jobs, messages = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever prints, prints to stderr: stdout is for messages alone
+    os.dup2(2, 1)  # prints go to stderr: stdout carries messages alone
 
     def send(kind: str, content: Any) -> None:
         pickle.dump((kind, content), messages)
@@ -73,7 +72,7 @@ def main() -> None:
 
 
 def run(job: Job, report: Any = None) -> dict[str, Any]:
-    """Run one loop; returns its numbers, and its states as lists."""
+    """Run one loop and return its numbers, and its states as lists."""
     from adhesis.solver.interior import range_warnings
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.method import Branch, ContactState
@@ -138,7 +137,7 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
 
 
 def _number(loop: Any, name: str) -> float | None:
-    """What a loop says of its own error, where it says it."""
+    """Return an estimate of error of a loop, None if its method has none."""
     value = getattr(loop, name, None)
     return None if value is None else float(value)
 

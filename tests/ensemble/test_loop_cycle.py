@@ -78,7 +78,7 @@ def test_a_stiffness_and_a_load(tmp_path, capsys):
         (["--stiffness", "0"], "needs --max-stress"),
         (["--max-stress", "100"], "belongs to load control"),
         (["--layer", "1e-3"], "poisson is 0.5"),
-        (["--layer", "1e-3", "--stiffness", "1"], "one of them says the stiffness"),
+        (["--layer", "1e-3", "--stiffness", "1"], "--layer are given: give one of them"),
         (["--figure", "loop.bmp"], "must end in .png"),
         (["--path", "0.5,out", "--fields", "f.npz"], "--fields belongs to one loop"),
     ],
