@@ -82,8 +82,8 @@ class Cell:
         ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
         spent per largest contact area, in J/m²).
     estimates : dict of Estimate
-        Means of these, but not of ``valid_range``, ``edge_range``, ``largest_interior_tension``. Only
-        losses, pull-off and largest contact have an interval.
+        Means of these, but not of ``valid_range``, ``edge_range``, ``largest_interior_tension``.
+        Only losses, pull-off and largest contact have an interval.
     curves : dict of Curve
         ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
         (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,
