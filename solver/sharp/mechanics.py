@@ -23,18 +23,19 @@ from adhesis.solver.sharp.descent.gradient_flow import LOST, MET, NARROW, RESTIN
 from adhesis.solver.sharp.descent.local_descent import Start
 from adhesis.solver.sharp.descent.windowed_descent import descend_many
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.edge_elimination import between_edges
-from adhesis.solver.sharp.equilibrium.griffith import Law, imbalance, narrowest
+from adhesis.solver.sharp.equilibrium.edge_elimination import openings_between_edges
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, imbalance, shortest_length
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import equilibrium_many
-from adhesis.solver.sharp.equilibrium.linear_exterior import About, known_about
+from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation, linearise_equilibrium
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many_plain
-from adhesis.solver.sharp.field.solution import FIXED, Hold, Solution
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
+from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward, widths, without_small
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 
 MANY = 30  # from so many gaps on, windows and the tree of gaps replace dense matrices
 CORRECTED = 0.05  # longest correction of an equilibrium that is looked for nearby, in λ_min
@@ -115,7 +116,7 @@ class EdgeMechanics:
         4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
     tolerance : float
         Relative accuracy of the field.
-    hold : Hold
+    device : LoadingDevice
         What is prescribed.
 
     Attributes
@@ -127,7 +128,11 @@ class EdgeMechanics:
     """
 
     def __init__(
-        self, source: StressSource, critical: float, tolerance: float, hold: Hold = FIXED
+        self,
+        source: StressSource,
+        critical: float,
+        tolerance: float,
+        device: LoadingDevice = FIXED_SEPARATION,
     ) -> None:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.wave = 2 * np.pi / source.top  # shortest wavelength in θ
@@ -144,18 +149,22 @@ class EdgeMechanics:
             self.smallest = min(self.smallest, 0.05 * seed)
         # an opening this far below zero is an overlap that descent cannot weigh
         rough = np.sqrt(source.m2 * self.wave)
-        self.law = Law(
+        self.law = EdgeLaw(
             critical=float(critical),
-            digits=float(-np.log(tolerance)),
-            settled=self.settled,
-            coarse=self.coarse,
-            near=_NEAR * self.wave,
-            longest=self.longest_step,
+            newton_tolerance=self.settled,
+            field_error=self.coarse,
+            rest_step=_NEAR * self.wave,
+            longest_step=self.longest_step,
             smallest=float(self.smallest),
-            overlapping=float(0.1 * max(critical, rough)),
-            hold=hold,
-            faint=max(_FAINT * tolerance, 1e-12) * float(critical) ** 2,
+            overlap_limit=float(0.1 * max(critical, rough)),
+            force_error=max(_FAINT * tolerance, 1e-12) * float(critical) ** 2,
             origin=source.highest,
+        )
+        self.model = FieldModel(
+            device=device,
+            digits=float(-np.log(tolerance)),
+            rules=GAUSS_RULES,
+            panels=source.panels,
         )
         self.many = MANY
         self.lost = -1
@@ -166,15 +175,11 @@ class EdgeMechanics:
         self.count.fields += 1
         solution = None
         if len(gaps) >= self.many:
-            digits = self.law.digits - math.log(share)
-            kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
-            solution = Solution(
-                *solve_many_plain(
-                    gaps, prescribed, self.law.hold, kinds, digits, 2, RULES, self.source.panels
-                )
-            )
+            model = self.model._replace(digits=self.model.digits - math.log(share))
+            orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+            solution, _ = solve_many(gaps, prescribed, orders, 2, model)
         tolerance = share * self.tolerance
-        return GapField(self.source, gaps, prescribed, tolerance, self.law.hold, solution)
+        return GapField(self.source, gaps, prescribed, tolerance, self.model.device, solution)
 
     def stiffness(self, point: Point, edges: NDArray[np.int64]) -> Array:
         """∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
@@ -185,11 +190,8 @@ class EdgeMechanics:
         if len(gaps) < self.many:
             by_edge = point.field.derivatives[0][np.ix_(edges, edges)]
         else:
-            of = point.field.solution
-            by_edge = between_edges(
-                gaps, point.at, self.law.hold, of.kinds, self.law.digits, edges, RULES,
-                self.source.panels,
-            )  # fmt: skip
+            orders = point.field.solution.nodes.orders
+            by_edge = openings_between_edges(gaps, point.at, orders, edges, self.model)
         return np.asarray(by_edge * outward(gaps)[edges])
 
     def equilibrium(
@@ -207,14 +209,18 @@ class EdgeMechanics:
         equilibrium is not stable. ``kinds`` are the least kinds of the gaps. If not ``patient``,
         gaps that are nearly in equilibrium are taken as they are.
         """
-        if not narrowest(gaps) > 0:
+        if not shortest_length(gaps) > 0:
             return None
         try:
-            newton = equilibrium if len(gaps) < self.many else equilibrium_many
-            found, at, solution, rate, slope, steps = newton(
-                gaps, prescribed, max(reach, self.settled), kinds, patient, self.law, RULES,
-                self.source.panels,
+            given = (
+                gaps, prescribed, max(reach, self.settled), kinds, patient, self.law, self.model
             )  # fmt: skip
+            linearisation: Linearisation | None = None
+            if len(gaps) < self.many:
+                found, at, solution, rate, slope, steps = equilibrium(*given, NO_EXTERIOR)
+            else:
+                found, at, linearisation, rate, slope, steps = equilibrium_many(*given)
+                solution = linearisation.solution
         except np.linalg.LinAlgError:
             return None
         self.count.newton_steps += steps
@@ -225,19 +231,17 @@ class EdgeMechanics:
             if len(gaps) >= self.many and np.isfinite(rate).all():
                 self.lost = int(np.argmax(np.abs(rate)))
             return None
-        about = solution if isinstance(solution, About) else None
-        of = about.of if about else Solution(*solution)
-        field = GapField(self.source, at, prescribed, self.tolerance, self.law.hold, of)
-        return Point(prescribed, field, rate, slope, about=about)
+        field = GapField(self.source, at, prescribed, self.tolerance, self.model.device, solution)
+        return Point(prescribed, field, rate, slope, linearisation=linearisation)
 
-    def about(self, point: Point) -> About:
-        """What windows on a point of many gaps are opened with."""
-        if point.about is not None:
-            return point.about
+    def linearisation(self, point: Point) -> Linearisation:
+        """Linearise a point of many gaps, for windows on it."""
+        if point.linearisation is not None:
+            return point.linearisation
         self.count.fields += 1
         self.count.derivatives += 1
-        known: About = known_about(
-            point.gaps, point.at, point.field.solution.kinds, self.law, RULES, self.source.panels
+        known: Linearisation = linearise_equilibrium(
+            point.gaps, point.at, point.field.solution.nodes.orders, self.law, self.model
         )
         return known
 
@@ -246,7 +250,7 @@ class EdgeMechanics:
         if point is None or len(point.gaps) < self.many:
             return None
         leads = int(np.argmax(np.abs(point.rate))) // 2
-        return Start(point.gaps, self.about(point), leads)
+        return Start(point.gaps, self.linearisation(point), leads)
 
     def _begun(
         self, start: Start, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
@@ -254,7 +258,7 @@ class EdgeMechanics:
     ) -> Point | Array | None:  # fmt: skip
         """As :meth:`relax`, in a window on a known state; gaps to go on from if that is no end."""
         rest = start.descend(
-            gaps, prescribed, self.law, self.source.panels, self.count, self.smallest,
+            gaps, prescribed, self.law, self.model, self.count, self.smallest,
             equal_speeds=equal_speeds,
         )  # fmt: skip
         if rest is None:
@@ -318,12 +322,11 @@ class EdgeMechanics:
                 if rest is not None:
                     return rest
         while left > 0:
-            panels = self.source.panels
             if len(gaps) < self.many:
                 begin = gaps
                 gaps, ended, fields, tangents, kinds, way, track.astray, taken = descend(
-                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels, other,
-                    track.astray,
+                    gaps, prescribed, left, kinds, equal_speeds, law, self.model, NO_EXTERIOR,
+                    other, track.astray,
                 )  # fmt: skip
                 if not equal_speeds:
                     track.ways.append(way)
@@ -332,7 +335,7 @@ class EdgeMechanics:
             else:
                 track.whole = False
                 gaps, ended, fields, tangents, kinds = descend_many(
-                    gaps, prescribed, left, kinds, equal_speeds, law, RULES, panels
+                    gaps, prescribed, left, kinds, equal_speeds, law, self.model
                 )
             self.count.fields += fields
             self.count.descent_steps += fields
@@ -349,7 +352,7 @@ class EdgeMechanics:
                     return rest
                 if len(gaps) == 1:
                     length, _ = widths(gaps)
-                    if length[0] < self.smallest and law.hold.give > 0:
+                    if length[0] < self.smallest and self.model.device.compliance > 0:
                         raise FullContact
                     # at fixed separation the last gap never closes, however narrow it gets
                     law = law._replace(smallest=min(law.smallest, 0.05 * float(length[0])))
@@ -378,6 +381,6 @@ class EdgeMechanics:
         length, patch = widths(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
-        step[e] = min(0.5 * times * self.law.longest, 0.25 * length[e // 2], 0.25 * beside)
+        step[e] = min(0.5 * times * self.law.longest_step, 0.25 * length[e // 2], 0.25 * beside)
         onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
         return onwards

@@ -12,7 +12,7 @@ from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.continuation.local_branch import Astray, advance, confirmed, led_by
 from adhesis.solver.sharp.continuation.predictor import Course
 from adhesis.solver.sharp.continuation.trail import Walk
-from adhesis.solver.sharp.equilibrium.branch_point import Before, Point
+from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics
 from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN
@@ -107,7 +107,7 @@ class Follower:
 
     def equilibrium(self, point: Point, at: float) -> Point | None:
         """Stable equilibrium at q0 s = ``at`` near the one predicted from ``point``."""
-        return self.edges.equilibrium(point.predicted(at), at, CORRECTED * self.edges.wave)
+        return self.edges.equilibrium(point.extrapolate(at), at, CORRECTED * self.edges.wave)
 
     def run(self, trace: Trace, point: Point, target: Target) -> tuple[float, Point | None]:
         """Walk along a stable branch to the target or through its next jump.
@@ -192,7 +192,7 @@ class Follower:
                 wanted = 0.5 * abs(step)
                 finest = min(finest, wanted)
                 continue
-            reached = reached.behind(Before(point.at, point.rate, point.gaps))
+            reached = reached.with_previous(PreviousPoint(point.at, point.rate, point.gaps))
             walk.add(reached, closed)
             if error > 1 or there:
                 exact = None
@@ -219,7 +219,7 @@ class Follower:
             windows = len(point.gaps) >= self.edges.many
         trace.states += walk.pending
         # What has not closed since the last look need not be looked at again.
-        point = point.cleared(max(walk.clearance - walk.closed, 0.0))
+        point = point.with_clearance(max(walk.clearance - walk.closed, 0.0))
         remembered = Memory(
             point.field.gaps,
             point.clearance,
@@ -228,7 +228,7 @@ class Follower:
         )
         # Few gaps have one field, whichever way it was come to; of many it depends on the way.
         few = len(point.field.gaps) < self.edges.many
-        self._last = (remembered, point.behind(None)) if few else None
+        self._last = (remembered, point.with_previous(None)) if few else None
         trace.states[-1] = replace(trace.states[-1], internal=remembered)
         return target.at, point
 
@@ -262,9 +262,9 @@ class Follower:
         closing = self._held_closing(point)
         if self.states.problem.control.is_fixed:
             return closing
-        # d(q0 s)/dd along the branch, from d = share q0 s - give p and dY/dd
-        share, give = self.edges.law.hold
-        mean = 1 + give * point.slope if share else point.slope
+        # d(q0 s)/dd along the branch, from d = weight q0 s - compliance p and dY/dd
+        weight, compliance = self.edges.model.device
+        mean = 1 + compliance * point.slope if weight else point.slope
         return closing * max(1.0, abs(mean))
 
     def _held_closing(self, point: Point) -> float:

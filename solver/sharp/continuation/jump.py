@@ -77,7 +77,7 @@ class Jumps:
         trace.jumps.append(self.states.jump(before, after, branch, other))
         trace.states.append(after)
         if known is not None and point is not None and len(point.gaps) >= self.edges.many:
-            point = point.heir(known, CORRECTED * self.edges.wave)
+            point = point.carry_rates(known, CORRECTED * self.edges.wave)
         return point
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
@@ -123,7 +123,7 @@ class Jumps:
                 continue
             least, minima = self.nucleation.least(point.field)
             if least > 0:
-                return point.cleared(least)
+                return point.with_clearance(least)
             grown = descend(point.field.gaps, self.nucleation.ready(minima), point)
             if grown is not None and self._same(grown.field.gaps, point.field.gaps):
                 if adhesive and least < -self.nucleation.overlap:

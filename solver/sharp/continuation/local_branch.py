@@ -22,9 +22,7 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.gap.quadrature import RULES
 from adhesis.solver.sharp.mechanics import CORRECTED, EdgeMechanics
 
 _HALF_WIDTH = 3  # gaps of a window on each side of the edge that leads
@@ -82,9 +80,9 @@ class Stretch:
         """Distance in d of the fold that the past of each edge tells of; inf for none."""
         start = self.start
         out = np.full(start.rate.shape, np.inf)
-        if start.past is not None:
-            ratio = start.past.rate / start.rate
-            way = np.abs(start.at - start.past.at)
+        if start.earlier is not None:
+            ratio = start.earlier.rate / start.rate
+            way = np.abs(start.at - start.earlier.at)
             rising = (ratio > 0) & (ratio < 1) & (way > 0)
             share = ratio[rising] ** 2
             out[rising] = way[rising] * share / (1 - share)
@@ -98,11 +96,11 @@ class Stretch:
         """
         start = self.start
         out = np.zeros(start.rate.shape)
-        if start.past is not None:
-            way = start.at - start.past.at
+        if start.earlier is not None:
+            way = start.at - start.earlier.at
             on = at - start.at
             known = way * on > 0
-            change = (start.rate - start.past.rate)[known]
+            change = (start.rate - start.earlier.rate)[known]
             bend = change * on * on / (2 * way[known])
             fold, way = self._folds[known], np.abs(way[known])
             near = fold < _FAR * way
@@ -116,7 +114,7 @@ class Stretch:
 
     def expected(self, local: Array, at: float) -> Array:
         """All gaps at d = ``at`` where those of the window are ``local``."""
-        gaps = self.window.everywhere(local, self.window.kinds, at)
+        gaps = self.window.extend(local, self.window.orders, at)
         gaps[self.others] += self._bent(at)[self.others]
         return gaps
 
@@ -125,7 +123,7 @@ class Stretch:
         rates = np.abs(point.rate).reshape(-1, 2).max(axis=1)
         still = _STILL * self.edges.wave / float(rates[self.others].max())
         self.span = min(self.span, still)
-        point = point.after(self.start)
+        point = point.with_earlier(self.start)
         point.__dict__["stretch"] = self
         return point
 
@@ -142,8 +140,8 @@ class Stretch:
         """The window."""
         edges, start = self.edges, self.start
         return Window(
-            start.gaps, edges.about(start), self.first, len(self.inside), edges.law,
-            edges.source.panels,
+            start.gaps, edges.linearisation(start), self.first, len(self.inside), edges.law,
+            edges.model,
         )  # fmt: skip
 
     def equilibrium(self, gaps: Array, at: float, reach: float) -> LocalPoint | None:
@@ -157,9 +155,9 @@ class Stretch:
             return None
         edges = self.edges
         try:
-            found, local, solution, rate, slope, steps = equilibrium(
-                local, at, max(reach, edges.settled), window.kinds, True, edges.law, RULES,
-                window.panels,
+            found, local, of, rate, slope, steps = equilibrium(
+                local, at, max(reach, edges.settled), window.orders, True, edges.law, edges.model,
+                window.exterior,
             )  # fmt: skip
         except np.linalg.LinAlgError:
             return None
@@ -169,11 +167,10 @@ class Stretch:
         if not found:
             return None
         # the others along their first tangent
-        gaps = self.start.predicted(at)
+        gaps = self.start.extrapolate(at)
         gaps[self.inside] = local[:-1] - np.round(turn / (2 * np.pi)) * 2 * np.pi
         rates = self.start.rate.copy().reshape(-1, 2)
         rates[self.inside] = rate[:-2].reshape(-1, 2)
-        of = Solution(*solution)
         return LocalPoint(self, at, gaps, local, rates.ravel(), slope, of.pressure, of.separation)
 
 
@@ -284,7 +281,7 @@ def advance(edges: EdgeMechanics, course: Course, at: float, windows: bool) -> P
         return edges.equilibrium(course.gaps(at), at, reach)
     if not windows:
         reached = edges.equilibrium(course.gaps(at), at, reach)
-        return None if reached is None else reached.after(confirmed(point))
+        return None if reached is None else reached.with_earlier(confirmed(point))
     stretch: Stretch | None = point.__dict__.get("stretch")
     if stretch is None or not (stretch.holds(at) or stretch.begins(point)):
         point = confirmed(point)

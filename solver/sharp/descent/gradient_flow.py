@@ -9,22 +9,22 @@ from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.bound_constrained_step import off_saddle, running_step
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian, leaving_step
 from adhesis.solver.sharp.equilibrium.griffith import (
-    Law,
-    at_least,
+    EdgeLaw,
+    edge_tangent,
     imbalance,
-    moved_gaps,
-    narrowest,
+    move_edges,
+    raise_orders,
+    shortest_length,
     step_limits,
-    symmetric,
-    tangent_of,
+    symmetrise,
 )
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.field.dense_solver import solve, solve_again
-from adhesis.solver.sharp.field.force_along_step import first_fall, forces_on
-from adhesis.solver.sharp.field.solution import Solution
+from adhesis.solver.sharp.field.exterior import Exterior
+from adhesis.solver.sharp.field.force_along_step import first_zero, force_derivatives
+from adhesis.solver.sharp.field.solution import FieldModel, Solution
 from adhesis.solver.sharp.gap.conformal_map import LEFT, map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
 
 # Further running steps with one tangent: of an edge that runs alone only the size of its step
 # depends on it, of several the direction, too.
@@ -58,14 +58,14 @@ def descend(
     gaps: Array,
     prescribed: float,
     most: int,
-    least: Kinds,
+    least: Integers,
     equal_speeds: bool,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
+    law: EdgeLaw,
+    model: FieldModel,
+    exterior: Exterior,
     track: Array,
     astray: bool,
-) -> tuple[Array, int, int, int, Kinds, Array, bool, Array]:
+) -> tuple[Array, int, int, int, Integers, Array, bool, Array]:
     """Descend in energy, d being ``prescribed``, for at most ``most`` steps.
 
     Edges move in proportion to their excess energy release rates, by no more than the longest step
@@ -81,12 +81,13 @@ def descend(
 
     Returns
     -------
-    gaps, how it ended, fields, tangents, kinds, passed, astray, taken
+    gaps, how it ended, fields, tangents, orders, passed, astray, taken
         RESTING where the steps have become short, NARROW where a patch or gap is below the smallest
         length, UNFINISHED after the last step, LOST where the edges have no field, MET where they
         are on the track again. ``passed`` is the way of this descent, as ``track``; ``taken`` the
         force that the outward motion of each edge (columns) took from every edge (rows).
     """
+    rules, panels = model.rules, model.panels
     edges = 2 * gaps.shape[0]
     fields = 0
     tangents = 0
@@ -99,7 +100,7 @@ def descend(
     d = np.zeros(edges)
     values = np.zeros(edges)
     matrix = np.zeros((edges, edges))  # tangent, or eigenvectors of the Hessian
-    kinds = least
+    orders = least
     stride = 0.0
     checked = np.empty(0, dtype=np.int64)  # edges that ran far in the last step
     departed = np.empty(0)  # how their forces changed at its start
@@ -115,13 +116,13 @@ def descend(
         fields += 1
         held = runners > 0 and reuses < (_REUSES_ALONE if runners == 1 else _REUSES)
         table = map_gaps(gaps)
-        kinds = at_least(choose_kinds(table, law.digits, rules.counts), kinds)
+        orders = raise_orders(choose_orders(table, model.digits, rules.counts), orders)
         if fields == 1:
-            of = solve(gaps, prescribed, law.hold, kinds, 2, rules, panels)
+            of = solve(gaps, prescribed, orders, 2, model, exterior)
         else:
-            of = solve_again(gaps, prescribed, law.hold, kinds, rules, panels, of)
+            of = solve_again(gaps, prescribed, orders, model, exterior, of)
         if not np.isfinite(of.pressure):
-            return gaps, LOST, fields, tangents, kinds, passed[:count], astray, taken
+            return gaps, LOST, fields, tangents, orders, passed[:count], astray, taken
         residual, drift = imbalance(of, law, panels)
         known[:] = 0
         # the energy's change over the last step, in units of π/8: dU/dn = C² - C_c²; where the
@@ -136,7 +137,7 @@ def descend(
             rise += work
             fall += abs(work)
         if checked.shape[0] > 0:
-            forces_on(of, checked, rules, rows, known)
+            force_derivatives(of, checked, rules, rows, known)
             arrived = _rates(of, residual, drift, last, checked, rows)
             clear = 1.0
             for i in range(checked.shape[0]):
@@ -144,11 +145,11 @@ def descend(
                 onwards = -np.sign(last[e])
                 clear = min(
                     clear,
-                    first_fall(onwards * force[e], departed[i], onwards * fresh[e], arrived[i]),
+                    first_zero(onwards * force[e], departed[i], onwards * fresh[e], arrived[i]),
                 )
             checked = np.empty(0, dtype=np.int64)
             if clear < 1:
-                gaps = moved_gaps(before, clear * last)
+                gaps = move_edges(before, clear * last)
                 _take(rows, clear * last, taken)
                 passed[count - 1] = gaps.ravel()
                 stride = 0.0
@@ -167,7 +168,7 @@ def descend(
         _take(rows, last, taken)
         force = fresh
         pace = _SHORTENED ** max(turned - _TO_AND_FRO, 0)
-        longest = share * max(pace, _LEAST_SHARE) * law.longest
+        longest = share * max(pace, _LEAST_SHARE) * law.longest_step
         unchecked = _UNCHECKED_ALONE * longest if runners == 1 else longest
         reach = unchecked
         if runners > 0:
@@ -175,25 +176,25 @@ def descend(
             reach = max(reach, stride * longest)
         limit = step_limits(table, reach)
         if track.shape[0] > 0 and fields % _LOOK_EVERY == 0:
-            away = _distance(gaps.ravel(), track, law.longest)
-            off = away > _MET * law.longest
+            away = _distance(gaps.ravel(), track, law.longest_step)
+            off = away > _MET * law.longest_step
             astray = astray or off
             looks = looks + 1 if astray and not off else 0
             if looks == _LOOKS:
-                return gaps, MET, fields, tangents, kinds, passed[:count], astray, taken
+                return gaps, MET, fields, tangents, orders, passed[:count], astray, taken
         if held:
             reuses += 1
         else:
             tangents += 1
             reuses = 0
-            tangent, _ = tangent_of(of, drift, rules)
+            tangent, _ = edge_tangent(of, drift, rules)
             for e in range(edges):
                 for f in range(edges):
                     rows[e, f] = of.opening[e] * tangent[e, f]
                 rows[e, e] += of.opening[e] * drift[e] * (1 - 2 * (e % 2))
             known[:] = 1
             if equal_speeds:
-                d, matrix = symmetric(of, tangent, law.overlapping)
+                d, matrix = symmetrise(of, tangent, law.overlap_limit)
             else:
                 values, matrix = np.linalg.eigh(
                     hessian(np.maximum(of.opening, 0.0), residual, drift, tangent)
@@ -201,7 +202,7 @@ def descend(
         if equal_speeds:
             step = running_step(matrix, d, -residual, limit)
         else:
-            step = flow_step(values, matrix, -force, limit, law.faint)
+            step = flow_step(values, matrix, -force, limit, law.force_error)
         if held:
             turns = False
             for e in range(edges):
@@ -214,23 +215,23 @@ def descend(
                 continue
         for e in range(edges):
             # Where surfaces would overlap beside an edge there is nothing to weigh: contact grows.
-            if of.opening[e] < -law.overlapping:
+            if of.opening[e] < -law.overlap_limit:
                 step[e] = limit[e]
         size = np.abs(step).max()
-        if size <= law.coarse and not held:
+        if size <= law.field_error and not held:
             if equal_speeds:
                 if not is_definite(matrix):
                     step = off_saddle(matrix, d, limit)
             elif values[0] < 0:
                 way = leaving_step(values, matrix, limit, _places(table, law.origin))
                 fields += 2
-                onwards = _gain(gaps, way, prescribed, kinds, law, rules, panels)
-                backwards = _gain(gaps, -way, prescribed, kinds, law, rules, panels)
+                onwards = _gain(gaps, way, prescribed, orders, law, model, exterior)
+                backwards = _gain(gaps, -way, prescribed, orders, law, model, exterior)
                 if max(onwards, backwards) > 0:
                     step = way if onwards >= backwards * (1 - _TIE) else -way
             size = np.abs(step).max()
         if not size < np.inf:
-            return gaps, LOST, fields, tangents, kinds, passed[:count], astray, taken
+            return gaps, LOST, fields, tangents, orders, passed[:count], astray, taken
         runners = 0
         if size > 0.5 * longest:
             running = np.flatnonzero(np.abs(step) > max(_RUNS * size, 0.5 * longest))
@@ -243,10 +244,10 @@ def descend(
                     step *= unchecked / size
                 else:
                     checked = running
-                    forces_on(of, checked, rules, rows, known)
+                    force_derivatives(of, checked, rules, rows, known)
                     departed = _rates(of, residual, drift, step, checked, rows)
         before = gaps
-        gaps = moved_gaps(gaps, step)
+        gaps = move_edges(gaps, step)
         last = step
         if count == passed.shape[0]:
             longer = np.empty((2 * count, edges))
@@ -254,12 +255,12 @@ def descend(
             passed = longer
         passed[count] = gaps.ravel()
         count += 1
-        if narrowest(gaps) < law.smallest:
+        if shortest_length(gaps) < law.smallest:
             _take(rows, last, taken)
-            return gaps, NARROW, fields, tangents, kinds, passed[:count], astray, taken
-        if size < law.near:
-            return gaps, RESTING, fields, tangents, kinds, passed[:count], astray, taken
-    return gaps, UNFINISHED, fields, tangents, kinds, passed[:count], astray, taken
+            return gaps, NARROW, fields, tangents, orders, passed[:count], astray, taken
+        if size < law.rest_step:
+            return gaps, RESTING, fields, tangents, orders, passed[:count], astray, taken
+    return gaps, UNFINISHED, fields, tangents, orders, passed[:count], astray, taken
 
 
 @compiled
@@ -272,11 +273,11 @@ def _take(rows: Array, step: Array, taken: Array) -> None:
 
 @compiled
 def _rates(
-    of: Solution, residual: Array, drift: Array, way: Array, edges: Kinds, rows: Array
+    of: Solution, residual: Array, drift: Array, way: Array, edges: Integers, rows: Array
 ) -> Array:
     """How the force on each of ``edges``, along its own way, changes along the way of all.
 
-    ``rows`` are those of :func:`forces_on`.
+    ``rows`` are those of :func:`force_derivatives`.
     """
     rates = np.empty(edges.shape[0])
     for i in range(edges.shape[0]):
@@ -322,14 +323,14 @@ def _gain(
     gaps: Array,
     step: Array,
     prescribed: float,
-    kinds: Kinds,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
+    orders: Integers,
+    law: EdgeLaw,
+    model: FieldModel,
+    exterior: Exterior,
 ) -> float:
     """Force along ``step`` after it, from a state without force: positive where energy falls."""
-    of = solve(moved_gaps(gaps, step), prescribed, law.hold, kinds, 1, rules, panels)
-    residual, _ = imbalance(of, law, panels)
+    of = solve(move_edges(gaps, step), prescribed, orders, 1, model, exterior)
+    residual, _ = imbalance(of, law, model.panels)
     gain = 0.0
     for e in range(step.shape[0]):
         gain -= residual[e] * (2 * of.opening[e] - residual[e]) * step[e]

@@ -16,12 +16,11 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.descent.gradient_flow import LOST, NARROW, descend
-from adhesis.solver.sharp.equilibrium.griffith import Law
-from adhesis.solver.sharp.equilibrium.linear_exterior import About
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation
 from adhesis.solver.sharp.equilibrium.window import Window
+from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.ends import without_small
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import RULES
 
 _BESIDE = 4  # gaps of a window on each side of what has changed
 _WIDEST = 24  # changes further apart are not those of one window
@@ -43,16 +42,16 @@ class Start:
     ----------
     known : array, shape (L, 2)
         Its gaps.
-    about : About
+    about : Linearisation
     leads : int
         The gap that leads where no gap is different.
     """
 
-    def __init__(self, known: Array, about: About, leads: int) -> None:
+    def __init__(self, known: Array, about: Linearisation, leads: int) -> None:
         self._known, self._about, self._leads = known, about, leads
         self._windows: dict[tuple[int, int], Window] = {}  # two descents begin in one
 
-    def window(self, gaps: Array, law: Law, panels: Panels) -> Window | None:
+    def window(self, gaps: Array, law: EdgeLaw, model: FieldModel) -> Window | None:
         """Window around what is different in ``gaps``; None if that lies in many places."""
         known = self._known
         count = len(known)
@@ -69,15 +68,15 @@ class Start:
             return None
         place_of = (begin - _BESIDE) % count, width
         if place_of not in self._windows:
-            self._windows[place_of] = Window(known, self._about, *place_of, law, panels)
+            self._windows[place_of] = Window(known, self._about, *place_of, law, model)
         return self._windows[place_of]
 
     def descend(
         self,
         gaps: Array,
         at: float,
-        law: Law,
-        panels: Panels,
+        law: EdgeLaw,
+        model: FieldModel,
         count: Counters,
         smallest: float,
         *,
@@ -87,15 +86,15 @@ class Start:
 
         Gaps and patches shorter than ``smallest`` are left out on the way; the work is counted.
         """
-        window = self.window(gaps, law, panels)
-        if window is None or not window.sound:
+        window = self.window(gaps, law, model)
+        if window is None or not window.exterior_is_stable:
             return None
-        local, kinds = window.rows(gaps), window.kinds
+        local, orders = window.restrict(gaps), window.orders
         while True:
-            if len(local) != len(kinds):
-                kinds = np.zeros(len(local), dtype=np.int64)
-            local, ended, fields, tangents, kinds, _, _, _ = descend(
-                local, at, _STEPS, kinds, equal_speeds, law, RULES, window.panels,
+            if len(local) != len(orders):
+                orders = np.zeros(len(local), dtype=np.int64)
+            local, ended, fields, tangents, orders, _, _, _ = descend(
+                local, at, _STEPS, orders, equal_speeds, law, model, window.exterior,
                 np.empty((0, local.size)), False,
             )  # fmt: skip
             count.fields += fields
@@ -107,5 +106,5 @@ class Start:
             local = rest
         if ended == LOST:
             return None
-        found = window.everywhere(local, kinds, at)
+        found = window.extend(local, orders, at)
         return Rest(found, local, ended) if np.isfinite(found).all() else None
