@@ -117,14 +117,14 @@ class _MovingEnds(NamedTuple):
 
 @compiled
 def _end_charges(
-    of: Solution, e: int, rules: GaussRules
+    state: Solution, e: int, rules: GaussRules
 ) -> tuple[Array, Array, float]:
-    """Load on the own gap, charges and area of the singular opening of edge e."""
-    nodes = of.nodes
+    """Compute load on the own gap, charges and area of the singular opening of edge e."""
+    nodes = state.nodes
     k, side = e // 2, e % 2
     density, strength, area = end_singularity(nodes, e, rules)
     m = density.shape[0]
-    block = of.equations.matrix[nodes.offset[k] : nodes.offset[k + 1], :m]
+    block = state.equations.matrix[nodes.offset[k] : nodes.offset[k + 1], :m]
     load = own_singular_load(nodes, e, block, density, strength, rules)
     start = rules.vector_start[nodes.orders[k]]
     point = np.pi / (m + 1)
@@ -136,10 +136,10 @@ def _end_charges(
 
 
 @compiled
-def _moving_ends(of: Solution, system: HierarchicalSystem, rules: GaussRules) -> _MovingEnds:
+def _moving_ends(state: Solution, system: HierarchicalSystem, rules: GaussRules) -> _MovingEnds:
     """Compute the singular openings of all edges, and the translation of all together."""
-    nodes = of.nodes
-    edges = of.opening.shape[0]
+    nodes = state.nodes
+    edges = state.opening.shape[0]
     n = nodes.theta.shape[0]
     load = np.empty((n, 2))
     charge = np.empty((n, 2))
@@ -148,12 +148,12 @@ def _moving_ends(of: Solution, system: HierarchicalSystem, rules: GaussRules) ->
     together_charge = np.zeros((n, 1))
     area = 0.0
     for i in range(n):
-        together[i, 0] = -of.equations.load[i, 2]
+        together[i, 0] = -state.equations.load[i, 2]
     for e in range(edges):
         k, side = e // 2, e % 2
         own = slice(nodes.offset[k], nodes.offset[k + 1])
-        load[own, side], charge[own, side], area_of_end = _end_charges(of, e, rules)
-        strength[e] = -of.opening[e] * np.sqrt(nodes.slope[k, side] / 8)
+        load[own, side], charge[own, side], area_of_end = _end_charges(state, e, rules)
+        strength[e] = -state.opening[e] * np.sqrt(nodes.slope[k, side] / 8)
         to_right = (1 - 2 * side) * strength[e]
         area += area_of_end * to_right
         for i in range(nodes.offset[k], nodes.offset[k + 1]):
@@ -163,27 +163,27 @@ def _moving_ends(of: Solution, system: HierarchicalSystem, rules: GaussRules) ->
     p = -area
     for i in range(n):
         p += nodes.weight[i] * regular[i, 0]
-    p *= of.mean.separation_weight / of.mean.resistance
+    p *= state.mean.separation_weight / state.mean.resistance
     for i in range(n):
-        regular[i, 0] -= p * of.solved[i, 1]
+        regular[i, 0] -= p * state.solved[i, 1]
     shift = edge_openings(regular, nodes, rules)[:, 0].copy()
-    subtract_end_terms(shift, nodes.slope, of.equations.end_terms, 1)
+    subtract_end_terms(shift, nodes.slope, state.equations.end_terms, 1)
     return _MovingEnds(strength, load, charge, shift)
 
 
 @compiled
 def eliminate_edges(
-    of: Solution, system: HierarchicalSystem, residual: Array, drift: Array, rules: GaussRules
+    state: Solution, system: HierarchicalSystem, residual: Array, drift: Array, rules: GaussRules
 ) -> EliminatedEdges:
     """Eliminate the edges, which keep C_e = C_c, from a solution with S and S'.
 
     ``residual`` is the imbalance C_e - C_c, ``drift`` the derivative of C_c by θ.
     """
-    nodes = of.nodes
+    nodes = state.nodes
     count, n = nodes.orders.shape[0], nodes.theta.shape[0]
-    ends = _moving_ends(of, system, rules)
+    ends = _moving_ends(state, system, rules)
     regular = apply_inverse(nodes.offset, system.inverse, ends.load)
-    by_mean = apply_inverse(nodes.offset, system.inverse, of.equations.load[:, 1:2])
+    by_mean = apply_inverse(nodes.offset, system.inverse, state.equations.load[:, 1:2])
     regular_openings = edge_openings(regular, nodes, rules)
     mean_openings = edge_openings(by_mean, nodes, rules)
     out = EliminatedEdges(
@@ -255,7 +255,7 @@ def _condense(inverse: Array, w: Array, moving: Array, follows: Array, out: Arra
 def _own_tangent(
     strength: Array, slope: Array, regular: Array, together: Array, drift: Array
 ) -> Array:
-    """∂(C_e - C_c)/∂n_f between both edges of a gap, all other gaps held."""
+    """Compute ∂(C_e - C_c)/∂n_f between both edges of a gap, all other gaps held."""
     tangent = np.empty((2, 2))
     for side in range(2):
         end = np.sqrt(slope[side] / 2)
@@ -288,18 +288,18 @@ def _invert_tangent(tangent: Array) -> tuple[Array, int]:
 
 @compiled
 def newton_step(
-    of: Solution, system: HierarchicalSystem, edges: EliminatedEdges, device: LoadingDevice
+    state: Solution, system: HierarchicalSystem, edges: EliminatedEdges, device: LoadingDevice
 ) -> NewtonStep:
     """Compute Newton's step of every edge, with d prescribed."""
     factor = factor_tree(system.tree, edges.response, edges.negative)
     charge = upward_pass(system.tree, factor, edges.charge)
     potential = downward_pass(system.tree, factor, charge, np.zeros((0, 2)))
-    offset = of.nodes.offset
+    offset = state.nodes.offset
     motion = edges.motion.copy()
     mean = np.zeros(2)  # of the opening, times 2π
     for k in range(offset.shape[0] - 1):
         for i in range(offset[k], offset[k + 1]):
-            stretch = of.nodes.weight[i] / system.weights[i]
+            stretch = state.nodes.weight[i] / system.weights[i]
             for column in range(2):
                 mean[column] += stretch * charge[i, column]
                 for side in range(2):
@@ -326,18 +326,18 @@ def openings_between_edges(
     gaps: Array, prescribed: float, orders: Integers, wanted: Integers, model: FieldModel
 ) -> Array:
     """Compute ∂C_e/∂θ_f between the edges ``wanted`` of many gaps; 0 for e = f."""
-    of, system = solve_many(gaps, prescribed, orders, 1, model)
-    offset = of.nodes.offset
+    state, system = solve_many(gaps, prescribed, orders, 1, model)
+    offset = state.nodes.offset
     count = wanted.shape[0]
-    load = np.zeros((of.nodes.theta.shape[0], count))
-    charge = np.zeros((of.nodes.theta.shape[0], count))
+    load = np.zeros((state.nodes.theta.shape[0], count))
+    charge = np.zeros((state.nodes.theta.shape[0], count))
     area = np.zeros(count)
     for c in range(count):
         k = wanted[c] // 2
         own = slice(offset[k], offset[k + 1])
-        load[own, c], charge[own, c], area[c] = _end_charges(of, wanted[c], model.rules)
+        load[own, c], charge[own, c], area[c] = _end_charges(state, wanted[c], model.rules)
     regular = solve_loads(system, offset, load, charge)
-    by_edge, _ = openings_by_edges(of, wanted, regular, area, model.rules)
+    by_edge, _ = openings_by_edges(state, wanted, regular, area, model.rules)
     out = by_edge[wanted]
     for c in range(count):
         out[c, c] = 0.0

@@ -64,28 +64,28 @@ def shortest_length(gaps: Array) -> float:
 
 @compiled
 def critical_opening(theta: float, law: EdgeLaw, panels: Panels) -> tuple[float, float]:
-    """C_c at θ, and its derivative."""
+    """Compute C_c at θ, and its derivative."""
     measure, slope = measure_at(theta, panels)
     root = np.sqrt(measure)
     return law.critical * root, law.critical * slope / (2 * root)
 
 
 @compiled
-def imbalance(of: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Array]:
-    """C_e - C_c at every edge; positive where contact recedes. And the derivative of C_c by θ."""
-    edges = of.opening.shape[0]
+def imbalance(state: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Array]:
+    """Compute C_e - C_c at every edge, positive where contact recedes, and dC_c/dθ."""
+    edges = state.opening.shape[0]
     residual = np.empty(edges)
     drift = np.empty(edges)
     for e in range(edges):
-        critical, drift[e] = critical_opening(of.nodes.table[e // 2, LEFT + e % 2], law, panels)
-        residual[e] = of.opening[e] - critical
+        critical, drift[e] = critical_opening(state.nodes.table[e // 2, LEFT + e % 2], law, panels)
+        residual[e] = state.opening[e] - critical
     return residual, drift
 
 
 @compiled
-def edge_tangent(of: Solution, drift: Array, rules: GaussRules) -> tuple[Array, Array]:
-    """∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂Y/∂θ_f."""
-    matrix, conjugate = derivatives(of, rules)
+def edge_tangent(state: Solution, drift: Array, rules: GaussRules) -> tuple[Array, Array]:
+    """Compute ∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂Y/∂θ_f."""
+    matrix, conjugate = derivatives(state, rules)
     for e in range(matrix.shape[0]):
         matrix[e, e] -= drift[e]
         for f in range(1, matrix.shape[0], 2):
@@ -94,10 +94,10 @@ def edge_tangent(of: Solution, drift: Array, rules: GaussRules) -> tuple[Array, 
 
 
 @compiled
-def symmetrise(of: Solution, tangent: Array, overlap_limit: float) -> tuple[Array, Array]:
+def symmetrise(state: Solution, tangent: Array, overlap_limit: float) -> tuple[Array, Array]:
     """Scale the tangent: factors d, and the symmetric matrix d_e tangent_ef / d_f."""
     n = tangent.shape[0]
-    d = np.sqrt(np.maximum(of.opening, overlap_limit))
+    d = np.sqrt(np.maximum(state.opening, overlap_limit))
     matrix = np.empty((n, n))
     for e in range(n):
         for f in range(e + 1):
@@ -121,7 +121,7 @@ def move_edges(gaps: Array, step: Array) -> Array:
 def accept_correction(
     gaps: Array, step: Array, travelled: Array, reach: float, longest: float
 ) -> tuple[bool, Array]:
-    """Correct gaps in Newton's iteration: whether that is accepted, and the gaps then.
+    """Correct gaps in Newton's iteration; returns whether that is accepted, and the gaps then.
 
     It is where no edge goes further than ``longest``, nor all corrections together, which are added
     up in ``travelled``, further than ``reach``, and every gap and patch keeps a length.
@@ -136,7 +136,7 @@ def accept_correction(
 
 @compiled
 def raise_orders(orders: Integers, least: Integers) -> Integers:
-    """``orders``, none below ``least`` (which is empty for no bound).
+    """Raise orders to ``least`` (which is empty for no bound) where they are below.
 
     While edges move towards one state, a gap must not lose modes again, or the field's error would
     drive them to and fro.

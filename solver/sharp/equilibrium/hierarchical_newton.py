@@ -66,12 +66,12 @@ def equilibrium_many(
     steps = 0
     while True:
         steps += 1
-        of, system = solve_many(gaps, prescribed, orders, 2, model)
-        residual, drift = imbalance(of, law, model.panels)
-        edges = eliminate_edges(of, system, residual, drift, model.rules)
-        newton = newton_step(of, system, edges, model.device)
+        state, system = solve_many(gaps, prescribed, orders, 2, model)
+        residual, drift = imbalance(state, law, model.panels)
+        edges = eliminate_edges(state, system, residual, drift, model.rules)
+        newton = newton_step(state, system, edges, model.device)
         size = np.abs(newton.step).max()
-        if not np.isfinite(of.pressure):
+        if not np.isfinite(state.pressure):
             break
         if size <= law.field_error:
             found = newton.stable or not strict
@@ -91,9 +91,10 @@ def equilibrium_many(
             expected = size * (size / last) ** 2
         if newton.stable and expected <= law.field_error:
             steps += 1
-            of, system = correct_gaps(gaps, prescribed, of, system, newton.change, model)
-            found = np.isfinite(of.pressure)
+            state, system = correct_gaps(gaps, prescribed, state, system, newton.change, model)
+            found = np.isfinite(state.pressure)
             break
         last = size
     rate = newton.rate if found else newton.step
-    return EquilibriumOfMany(found, gaps, linearise(of, system, edges), rate, newton.slope, steps)
+    linearisation = linearise(state, system, edges)
+    return EquilibriumOfMany(found, gaps, linearisation, rate, newton.slope, steps)

@@ -55,24 +55,24 @@ def _interpolate_potential(
 def correct_gaps(
     edges: Array,
     prescribed: float,
-    of: Solution,
+    state: Solution,
     system: HierarchicalSystem,
     change: StepChange,
     model: FieldModel,
 ) -> tuple[Solution, HierarchicalSystem]:
-    """Solve between ``edges``, shape (L, 2), a step away from ``of``, with the step's ``change``.
+    """Solve between ``edges``, shape (L, 2), a step away from ``state``, with its ``change``.
 
     Responses to other edges and pressures (``solved``, ``mean``, the tree and its factor) are those
-    of ``of``, as they count to first order alone.
+    of ``state``, as they count to first order alone.
     """
-    rules, device, offset = model.rules, model.device, of.nodes.offset
-    nodes, equations = assemble_blocks(map_gaps(edges), of.nodes.orders, 1, model)
+    rules, device, offset = model.rules, model.device, state.nodes.offset
+    nodes, equations = assemble_blocks(map_gaps(edges), state.nodes.orders, 1, model)
     load = equations.load
     inverse, _, definite = invert_blocks(nodes, equations.matrix, rules)
-    potential = gap_potentials(of, system.weights)
+    potential = gap_potentials(state, system.weights)
     for i in range(potential.shape[0]):
         potential[i] += change.potential[i]
-    pressure = of.pressure + change.pressure
+    pressure = state.pressure + change.pressure
     own_load = np.empty((load.shape[0], 1))
     for k in range(nodes.orders.shape[0]):
         own = slice(offset[k], offset[k + 1])
@@ -81,7 +81,7 @@ def correct_gaps(
         eta, w = rules.eta[rule], rules.weights[rule]
         for i in range(offset[k], offset[k + 1]):
             there = _interpolate_potential(
-                of.nodes.table[k], eta, w, potential[own], nodes.theta[i]
+                state.nodes.table[k], eta, w, potential[own], nodes.theta[i]
             )
             own_load[i, 0] = -load[i, 0] - pressure * load[i, 1] - nodes.weight[i] * there
     f = apply_inverse(offset, inverse, own_load)
@@ -89,14 +89,14 @@ def correct_gaps(
     by_pressure = 0.0
     for i in range(load.shape[0]):
         mean += nodes.weight[i] * f[i, 0]
-        by_pressure += nodes.weight[i] * of.solved[i, 1]
+        by_pressure += nodes.weight[i] * state.solved[i, 1]
     # weight·mean - 2π compliance·p = 2π d, to rounding
     weight, compliance = device.separation_weight, device.compliance
     more = weight * mean - 2 * np.pi * (prescribed + compliance * pressure)
     more /= weight * by_pressure + 2 * np.pi * compliance
     pressure += more
     for i in range(load.shape[0]):
-        f[i, 0] -= more * of.solved[i, 1]
+        f[i, 0] -= more * state.solved[i, 1]
     separation = prescribed
     if compliance != 0:
         separation = (mean - more * by_pressure) / (2 * np.pi)
@@ -107,13 +107,13 @@ def correct_gaps(
     solution = Solution(
         nodes=nodes,
         equations=equations,
-        factor=of.factor,
-        solved=of.solved,
-        mean=of.mean,
+        factor=state.factor,
+        solved=state.solved,
+        mean=state.mean,
         separation=separation,
         pressure=pressure,
         scaled_opening=f[:, 0].copy(),
         opening=opening,
-        exterior=of.exterior,
+        exterior=state.exterior,
     )
     return solution, HierarchicalSystem(inverse, system.weights, system.tree, system.factor)

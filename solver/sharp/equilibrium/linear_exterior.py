@@ -101,9 +101,9 @@ def linearise_equilibrium(
     gaps: Array, prescribed: float, orders: Integers, law: EdgeLaw, model: FieldModel
 ) -> Linearisation:
     """Linearise an equilibrium, for a window that is opened on it."""
-    of, system = solve_many(gaps, prescribed, orders, 2, model)
-    residual, drift = imbalance(of, law, model.panels)
-    return linearise(of, system, eliminate_edges(of, system, residual, drift, model.rules))
+    state, system = solve_many(gaps, prescribed, orders, 2, model)
+    residual, drift = imbalance(state, law, model.panels)
+    return linearise(state, system, eliminate_edges(state, system, residual, drift, model.rules))
 
 
 @compiled
@@ -133,8 +133,8 @@ def open_window(
     The last of the window's gaps stands for the exterior. Edges outside follow if that moves them
     by less than ``longest_motion``.
     """
-    of, edges = linearisation.solution, linearisation.edges
-    count = of.nodes.orders.shape[0]
+    state, edges = linearisation.solution, linearisation.edges
+    count = state.nodes.orders.shape[0]
     indices = np.arange(first + width, first + count) % count
     follow = np.zeros(indices.shape[0], dtype=np.bool_)
     for i in range(indices.shape[0]):
@@ -142,7 +142,7 @@ def open_window(
         left, right = abs(edges.motion[2 * k, 0]), abs(edges.motion[2 * k + 1, 0])
         near = left < longest_motion and right < longest_motion
         follow[i] = near and edges.negative[k] == 0
-    rotated = rotate_gaps(of.nodes.table, first)
+    rotated = rotate_gaps(state.nodes.table, first)
     table = rotated[width:].copy()
     outside = _solve_exterior(linearisation, indices, follow, table, model)
     window = np.empty((width + 1, 2))
@@ -161,9 +161,9 @@ def _solve_exterior(
     model: FieldModel,
 ) -> ExteriorGaps:
     """Factor the tree of the gaps ``indices`` and compute the charges of each by itself."""
-    of, w, edges = linearisation.solution, linearisation.weights, linearisation.edges
-    nodes, load = of.nodes, of.equations.load
-    potentials = gap_potentials(of, w)
+    state, w, edges = linearisation.solution, linearisation.weights, linearisation.edges
+    nodes, load = state.nodes, state.equations.load
+    potentials = gap_potentials(state, w)
     count = indices.shape[0]
     offset = np.zeros(count + 1, dtype=np.int64)
     squares = 0
@@ -201,8 +201,8 @@ def _solve_exterior(
                 else:
                     response[at + j * m + other] = w[base + j] * inverse * w[base + other]
             charge[place, 1] = edges.charge[base + j, 1] if follow[i] else by_mean
-            held = w[base + j] * of.scaled_opening[base + j]
-            charge[place, 0] = held - of.pressure * charge[place, 1]
+            held = w[base + j] * state.scaled_opening[base + j]
+            charge[place, 0] = held - state.pressure * charge[place, 1]
             if follow[i]:
                 charge[place, 0] += edges.charge[base + j, 0]
             for other in range(m):
@@ -221,7 +221,7 @@ def _reduce_exterior(
     tree, factor = outside.tree, outside.factor
     run = tree.rank.shape[0] - 1
     r = tree.rank[run]
-    last = slice(tree.at[run], tree.at[run + 1])
+    last = slice(tree.node_start[run], tree.node_start[run + 1])
     charge = upward_pass(tree, factor, outside.charge)
     whole = charge[last].copy()
     whole[:, 1] *= -1.0
@@ -233,7 +233,7 @@ def _reduce_exterior(
     opening = np.empty(2)
     for side in range(2):
         opening[side], _ = critical_opening(ends[side], law, panels)
-    square = slice(tree.square[run], tree.square[run + 1])
+    square = slice(tree.response_start[run], tree.response_start[run + 1])
     return Exterior(
         theta=tree.theta[last].copy(),
         stretch=tree.stretch[last].copy(),
@@ -256,7 +256,7 @@ def exterior_motion(
     model: FieldModel,
 ) -> Array:
     """Compute the outward motion of the edges outside, for the window's gaps as they are now."""
-    of, edges = linearisation.solution, linearisation.edges
+    state, edges = linearisation.solution, linearisation.edges
     out = np.zeros(2 * outside.indices.shape[0])
     now = solve(window, prescribed, orders, 1, model, exterior)
     kernel, _ = exterior_kernel(now.nodes.theta, now.nodes.weight, exterior)
@@ -270,10 +270,10 @@ def exterior_motion(
     for i in range(outside.indices.shape[0]):
         if not outside.follow[i]:
             continue
-        base = of.nodes.offset[outside.indices[i]]
+        base = state.nodes.offset[outside.indices[i]]
         for side in range(2):
             e = 2 * outside.indices[i] + side
-            step = edges.motion[e, 0] + (now.pressure - of.pressure) * edges.motion[e, 1]
+            step = edges.motion[e, 0] + (now.pressure - state.pressure) * edges.motion[e, 1]
             for j in range(outside.offset[i + 1] - outside.offset[i]):
                 place = outside.offset[i] + j
                 change = potentials[place, 0] - outside.potential[place]

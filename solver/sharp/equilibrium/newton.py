@@ -57,10 +57,10 @@ class Equilibrium(NamedTuple):
 
 
 @compiled
-def _is_balanced(of: Solution, residual: Array, law: EdgeLaw) -> bool:
-    """Whether the force on every edge is that of rounding."""
+def _is_balanced(state: Solution, residual: Array, law: EdgeLaw) -> bool:
+    """Return whether the force on every edge is that of rounding."""
     for e in range(residual.shape[0]):
-        if not abs(residual[e] * (2 * of.opening[e] - residual[e])) <= law.force_error:
+        if not abs(residual[e] * (2 * state.opening[e] - residual[e])) <= law.force_error:
             return False
     return True
 
@@ -98,21 +98,21 @@ def equilibrium(
     tolerance = max(law.newton_tolerance, NEWTON_SHARE * law.field_error)
     while True:
         steps += 1
-        of = solve(gaps, prescribed, orders, 2, model, exterior)
-        if not np.isfinite(of.pressure):
+        state = solve(gaps, prescribed, orders, 2, model, exterior)
+        if not np.isfinite(state.pressure):
             break
-        residual, drift = imbalance(of, law, model.panels)
-        tangent, by_edge = edge_tangent(of, drift, rules)
+        residual, drift = imbalance(state, law, model.panels)
+        tangent, by_edge = edge_tangent(state, drift, rules)
         step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float
         size = np.abs(step).max()
         # The field has steps of the size of its error, where panels or modes change: an iteration
         # to and fro across one of them is at its end.
         stalled = size <= law.field_error and size > STALLED_SHARE * last
         if size <= tolerance or stalled:
-            _, matrix = symmetrise(of, tangent, law.overlap_limit)
+            _, matrix = symmetrise(state, tangent, law.overlap_limit)
             found = is_definite(matrix) or not strict
             break
-        if not strict and (size <= law.rest_step or _is_balanced(of, residual, law)):
+        if not strict and (size <= law.rest_step or _is_balanced(state, residual, law)):
             found = True
             break
         accepted, moved = accept_correction(gaps, step, travelled, reach, NEWTON_GROWTH * last)
@@ -123,32 +123,32 @@ def equilibrium(
         # changes until then, are known beforehand.
         share = (size / last) ** 2
         if last < np.inf and size * share <= tolerance and share <= KNOWN_TANGENT:
-            _, matrix = symmetrise(of, tangent, law.overlap_limit)
+            _, matrix = symmetrise(state, tangent, law.overlap_limit)
             if is_definite(matrix) or not strict:
                 steps += 1
-                of = solve(gaps, prescribed, orders, 2, model, exterior)
-                found = np.isfinite(of.pressure)
+                state = solve(gaps, prescribed, orders, 2, model, exterior)
+                found = np.isfinite(state.pressure)
                 break
         last = size
     if found:
-        rate, slope = _branch_rates(of, tangent, by_edge, rules)
-    return Equilibrium(found, gaps, of, rate, slope, steps)
+        rate, slope = _branch_rates(state, tangent, by_edge, rules)
+    return Equilibrium(found, gaps, state, rate, slope, steps)
 
 
 @compiled
 def _branch_rates(
-    of: Solution, tangent: Array, by_edge: Array, rules: GaussRules
+    state: Solution, tangent: Array, by_edge: Array, rules: GaussRules
 ) -> tuple[Any, float]:
     """Compute dn/dd of every edge and dY/dd along the branch, from ∂Y/∂θ of every edge."""
-    by_prescribed = -2 * np.pi / of.mean.resistance
-    unit = np.empty((of.solved.shape[0], 1))
-    for i in range(of.solved.shape[0]):
-        unit[i, 0] = -by_prescribed * of.solved[i, 1]
-    opening = edge_openings(unit, of.nodes, rules)
+    by_prescribed = -2 * np.pi / state.mean.resistance
+    unit = np.empty((state.solved.shape[0], 1))
+    for i in range(state.solved.shape[0]):
+        unit[i, 0] = -by_prescribed * state.solved[i, 1]
+    opening = edge_openings(unit, state.nodes, rules)
     rate = np.linalg.solve(tangent, -opening[:, 0])
     slope = by_prescribed
-    if of.mean.separation_weight == 0:
-        slope = of.mean.unit_mean / (2 * np.pi)
+    if state.mean.separation_weight == 0:
+        slope = state.mean.unit_mean / (2 * np.pi)
     for e in range(rate.shape[0]):
         slope += by_edge[e] * (rate[e] if e % 2 == 0 else -rate[e])
     return rate, slope

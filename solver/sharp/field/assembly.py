@@ -23,7 +23,7 @@ _MAPPED_SERIES = 0.3
 
 @compiled
 def node_offsets(orders: Integers, rules: GaussRules, exterior: Exterior) -> Integers:
-    """First node of each gap, and the number of all; the exterior, the last gap, has none."""
+    """Number the first node of each gap, and all; the exterior, the last gap, has none."""
     offset = np.zeros(orders.shape[0] + 1, dtype=np.int64)
     for k in range(orders.shape[0]):
         offset[k + 1] = offset[k] + rules.counts[orders[k]]
@@ -65,16 +65,16 @@ def assemble_changed(
     differs = np.zeros(table.shape[0], dtype=np.bool_)
     for k in range(table.shape[0]):
         differs[k] = not np.array_equal(table[k], old.table[k])
-    changed = np.flatnonzero(differs)
+    changed: Integers = np.flatnonzero(differs)
     _fill_gaps(changed, nodes, equations, offset, model)
     sine, cosine = np.sin(0.5 * nodes.theta), np.cos(0.5 * nodes.theta)
     matrix = equations.matrix
-    for k in changed:
-        _fill_rows(k, nodes, sine, cosine, matrix)
-        for i in range(offset[k], offset[k + 1]):
-            for j in range(offset[k]):
+    for gap in changed:
+        _fill_rows(gap, nodes, sine, cosine, matrix)
+        for i in range(offset[gap], offset[gap + 1]):
+            for j in range(offset[gap]):
                 matrix[j, i] = matrix[i, j]
-            for j in range(offset[k + 1], matrix.shape[0]):
+            for j in range(offset[gap + 1], matrix.shape[0]):
                 matrix[j, i] = matrix[i, j]
     return nodes, equations
 
@@ -136,7 +136,7 @@ def _fill_gaps(
 
 @compiled
 def _fill_end_terms(s: Array, ends: Array, end_terms: Array) -> None:
-    """Subtract the sums of the first modes from what drives the ends of a gap."""
+    """Subtract the first modes of a gap from the loads of its ends."""
     for field in range(s.shape[1]):
         low = 0.0
         high = 0.0
@@ -210,7 +210,7 @@ def _fill_block(k: int, nodes: Nodes, block: Array, rules: GaussRules) -> None:
 
 @compiled
 def periodic_images(x: float) -> float:
-    """1/sin²(x/2) - 4/x², x = Δθ: the kernel of a gap's own periodic images."""
+    """Compute 1/sin²(x/2) - 4/x², x = Δθ: the kernel of a gap's own periodic images."""
     if abs(x) < _PERIODIC_SERIES:
         y = x * x
         return 1 / 3 + y * (1 / 60 + y * (1 / 1512 + y * (1 / 43200 + y / 1330560)))
@@ -220,7 +220,7 @@ def periodic_images(x: float) -> float:
 
 @compiled
 def mapped_kernel(alpha: float, x: float) -> float:
-    """4 [α²/sinh²(αx) - 1/x²], x = Δη: the own gap's kernel beyond a straight crack in η."""
+    """Compute 4 [α²/sinh²(αx) - 1/x²], x = Δη: the own kernel but for a straight crack in η."""
     y = alpha * x
     if abs(y) < _MAPPED_SERIES:
         y *= y

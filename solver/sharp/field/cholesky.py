@@ -78,7 +78,7 @@ def cholesky(a: Array) -> tuple[Array, bool]:
 
 @compiled
 def is_definite(a: Array) -> bool:
-    """Whether a symmetric matrix is positive definite to rounding."""
+    """Return whether a symmetric matrix is positive definite to rounding."""
     _, definite = cholesky(a)
     return definite
 
@@ -116,7 +116,7 @@ def solve_column(factor: Array, x: Array) -> None:
 
 @compiled_sums
 def _solve_three(factor: Array, x: Array) -> None:
-    """As :func:`solve_column`, for three columns together."""
+    """Solve as :func:`solve_column` for three columns together."""
     n = factor.shape[0]
     a, b, c = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):

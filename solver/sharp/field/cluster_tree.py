@@ -1,7 +1,7 @@
 """Interaction of many gaps on a binary tree of neighbours, solved directly.
 
-In its own coordinate η (``conformal_map``) a gap acts on the others through charges q_i = w_i f_i at
-its nodes; the others' potentials g_i = (dθ/dη) g(θ_i) there are
+In its own coordinate η (``conformal_map``) a gap acts on the others through charges q_i = w_i f_i
+at its nodes; the others' potentials g_i = (dθ/dη) g(θ_i) there are
 
     g_i = -Σ_j K_ij q_j,      K_ij = (dθ/dη)_i (dθ/dη)_j / (4π sin²((θ_i - θ_j)/2)).
 
@@ -50,9 +50,9 @@ class Tree(NamedTuple):
         Both halves of a run; -1 for a gap.
     rank : int array, shape (runs,)
         Number of charges.
-    at, square, inner, mixed, lift : int array, shape (runs + 1,)
-        Offsets: of its charges, of matrices (rank, rank), of (half 1, half 1), of (half 1, half 2)
-        and of (both halves, rank).
+    node_start, response_start, pair_start, kernel_start, interpolation_start : int array
+        Offsets, shape (runs + 1,): of its charges, of matrices (rank, rank), of (half 1, half 1),
+        of (half 1, half 2) and of (both halves, rank).
     theta, stretch : array
         θ and dθ/dη of all charges.
     kernel : array
@@ -63,11 +63,11 @@ class Tree(NamedTuple):
 
     children: Integers
     rank: Integers
-    at: Integers
-    square: Integers
-    inner: Integers
-    mixed: Integers
-    lift: Integers
+    node_start: Integers
+    response_start: Integers
+    pair_start: Integers
+    kernel_start: Integers
+    interpolation_start: Integers
     theta: Array
     stretch: Array
     kernel: Array
@@ -93,6 +93,13 @@ class TreeFactor(NamedTuple):
     pair: Array
     charge: Array
     negative: int
+
+
+@compiled
+def _part(flat: Array, start: Integers, run: int) -> Array:
+    """Return the part of a flat array that belongs to a run."""
+    part: Array = flat[start[run] : start[run + 1]]
+    return part
 
 
 @compiled
@@ -286,27 +293,27 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
     """Compute the responses of all runs from those of the gaps (flat, one after the other).
 
     ``gap_negative`` are the gaps' numbers of negative eigenvalues. A whole has no fewer than each
-    of its halves; a pair's determinant tells whether their number is even. Two that appear
-    together in one pair go unseen: two places whose forces are equal to rounding.
+    of its halves; the sign of a pair's determinant gives whether their number is even. Two that
+    appear together in one pair go unseen: two places whose forces are equal to rounding.
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    responses = np.empty(tree.square[runs])
-    responses[: tree.square[gaps]] = gap_response
+    responses = np.empty(tree.response_start[runs])
+    responses[: tree.response_start[gaps]] = gap_response
     negative = np.zeros(runs, dtype=np.int64)
     negative[:gaps] = gap_negative
-    pair = np.empty(tree.inner[runs])
-    charge = np.empty(tree.lift[runs])
+    pair = np.empty(tree.pair_start[runs])
+    charge = np.empty(tree.interpolation_start[runs])
     for run in range(gaps, runs):
         one = tree.children[run, 0]
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
         r = tree.rank[run]
-        first = responses[tree.square[one] : tree.square[one + 1]].reshape(n, n)
-        second = responses[tree.square[two] : tree.square[two + 1]].reshape(m, m)
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]].reshape(n, m)
-        w = pair[tree.inner[run] : tree.inner[run + 1]].reshape(n, n)
+        first = _part(responses, tree.response_start, one).reshape(n, n)
+        second = _part(responses, tree.response_start, two).reshape(m, m)
+        kernel = _part(tree.kernel, tree.kernel_start, run).reshape(n, m)
+        w = _part(pair, tree.pair_start, run).reshape(n, n)
         # W = (R1⁻¹ - H)⁻¹ = (1 - R1 H)⁻¹ R1, H = K12 R2 K21
         half = np.dot(kernel, second)
         reflected = np.dot(half, kernel.T)
@@ -323,8 +330,8 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
         negative[run] = count
         if r == 0:
             continue
-        interpolation = tree.interpolation[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
-        charges = charge[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
+        interpolation = _part(tree.interpolation, tree.interpolation_start, run).reshape(n + m, r)
+        charges = _part(charge, tree.interpolation_start, run).reshape(n + m, r)
         # q1 = W (E1 + K12 R2 E2), q2 = R2 (E2 + K21 q1)
         drive = np.dot(half, interpolation[n:])
         for i in range(n):
@@ -336,7 +343,7 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
             for j in range(r):
                 more[i, j] += interpolation[n + i, j]
         np.dot(second, more, charges[n:])
-        response = responses[tree.square[run] : tree.square[run + 1]].reshape(r, r)
+        response = _part(responses, tree.response_start, run).reshape(r, r)
         np.dot(interpolation.T, charges, response)
         for i in range(r):
             for j in range(i):
@@ -348,7 +355,7 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
 
 @compiled_sums
 def _apply(a: Array, x: Array, out: Array) -> None:
-    """Into ``out``: a x, a flat."""
+    """Compute a x into ``out``, a flat."""
     n = x.shape[0]
     for i in range(out.shape[0]):
         row = a[i * n : (i + 1) * n]
@@ -360,7 +367,7 @@ def _apply(a: Array, x: Array, out: Array) -> None:
 
 @compiled_sums
 def _add_apply(a: Array, x: Array, out: Array) -> None:
-    """To ``out``: a x, a flat."""
+    """Add a x to ``out``, a flat."""
     n = x.shape[0]
     for i in range(out.shape[0]):
         row = a[i * n : (i + 1) * n]
@@ -372,7 +379,7 @@ def _add_apply(a: Array, x: Array, out: Array) -> None:
 
 @compiled_sums
 def _add_transposed(a: Array, x: Array, out: Array) -> None:
-    """To ``out``: aᵀ x, a flat."""
+    """Add aᵀ x to ``out``, a flat."""
     n = out.shape[0]
     for k in range(x.shape[0]):
         value = x[k]
@@ -389,7 +396,7 @@ def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Array:
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    charge = np.zeros((isolated.shape[1], tree.at[runs]))
+    charge = np.zeros((isolated.shape[1], tree.node_start[runs]))
     charge[:, : isolated.shape[0]] = isolated.T
     work = np.empty((2, tree.rank.max()))
     for run in range(gaps, runs):
@@ -397,17 +404,17 @@ def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Array:
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
-        first = factor.response[tree.square[one] : tree.square[one + 1]]
-        second = factor.response[tree.square[two] : tree.square[two + 1]]
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]]
-        w = factor.pair[tree.inner[run] : tree.inner[run + 1]]
-        up = tree.interpolation[tree.lift[run] : tree.lift[run + 1]]
+        first = _part(factor.response, tree.response_start, one)
+        second = _part(factor.response, tree.response_start, two)
+        kernel = _part(tree.kernel, tree.kernel_start, run)
+        w = _part(factor.pair, tree.pair_start, run)
+        up = _part(tree.interpolation, tree.interpolation_start, run)
         split = n * tree.rank[run]
         a = work[0, :n]
         b = work[1, :m]
         for column in range(charge.shape[0]):
-            q1 = charge[column, tree.at[one] : tree.at[one + 1]]
-            q2 = charge[column, tree.at[two] : tree.at[two + 1]]
+            q1 = _part(charge[column], tree.node_start, one)
+            q2 = _part(charge[column], tree.node_start, two)
             # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
             _apply(kernel, q2, a)
             _add_apply(first, a, q1)
@@ -420,7 +427,7 @@ def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Array:
             b[:] = 0.0
             _add_transposed(kernel, q1, b)
             _add_apply(second, b, q2)
-            q = charge[column, tree.at[run] : tree.at[run + 1]]
+            q = _part(charge[column], tree.node_start, run)
             _add_transposed(up[:split], q1, q)
             _add_transposed(up[split:], q2, q)
     return np.ascontiguousarray(charge.T)
@@ -437,23 +444,23 @@ def downward_pass(tree: Tree, factor: TreeFactor, charge: Array, outside: Array)
     gaps = (runs + 1) // 2
     charges = np.ascontiguousarray(charge.T)
     potential = np.zeros(charges.shape)
-    potential[:, tree.at[runs - 1] : tree.at[runs]] = outside.T
+    potential[:, tree.node_start[runs - 1] : tree.node_start[runs]] = outside.T
     work = np.empty(tree.rank.max())
     for run in range(runs - 1, gaps - 1, -1):
         one = tree.children[run, 0]
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]]
-        up = tree.interpolation[tree.lift[run] : tree.lift[run + 1]]
-        by_potential = factor.charge[tree.lift[run] : tree.lift[run + 1]]
+        kernel = _part(tree.kernel, tree.kernel_start, run)
+        up = _part(tree.interpolation, tree.interpolation_start, run)
+        by_potential = _part(factor.charge, tree.interpolation_start, run)
         split = n * tree.rank[run]
         for column in range(charges.shape[0]):
-            q1 = charges[column, tree.at[one] : tree.at[one + 1]]
-            q2 = charges[column, tree.at[two] : tree.at[two + 1]]
-            g1 = potential[column, tree.at[one] : tree.at[one + 1]]
-            g2 = potential[column, tree.at[two] : tree.at[two + 1]]
-            g = potential[column, tree.at[run] : tree.at[run + 1]]
+            q1 = _part(charges[column], tree.node_start, one)
+            q2 = _part(charges[column], tree.node_start, two)
+            g1 = _part(potential[column], tree.node_start, one)
+            g2 = _part(potential[column], tree.node_start, two)
+            g = _part(potential[column], tree.node_start, run)
             a = work[:n]
             _apply(by_potential[:split], g, a)
             for i in range(n):
@@ -472,4 +479,4 @@ def downward_pass(tree: Tree, factor: TreeFactor, charge: Array, outside: Array)
             for i in range(m):
                 g2[i] -= b[i]
     charge[:] = charges.T
-    return np.ascontiguousarray(potential[:, : tree.at[gaps]].T)
+    return np.ascontiguousarray(potential[:, : tree.node_start[gaps]].T)

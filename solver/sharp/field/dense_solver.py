@@ -133,9 +133,9 @@ class GapField:
     @cached_property
     def opening_by_prescribed(self) -> Array:
         """∂C/∂d at fixed edges, shape (L, 2)."""
-        of = self.solution
-        unit = np.ascontiguousarray(-self.pressure_by_prescribed * of.solved[:, 1:2])
-        out: Array = edge_openings(unit, of.nodes, GAUSS_RULES)
+        state = self.solution
+        unit = np.ascontiguousarray(-self.pressure_by_prescribed * state.solved[:, 1:2])
+        out: Array = edge_openings(unit, state.nodes, GAUSS_RULES)
         return out[:, 0].reshape(-1, 2)
 
     @cached_property

@@ -21,26 +21,26 @@ from adhesis.solver.sharp.gap.quadrature import GaussRules
 
 
 @compiled_for_both
-def derivatives(of: Solution, rules: GaussRules) -> tuple[Array, Array]:
+def derivatives(state: Solution, rules: GaussRules) -> tuple[Array, Array]:
     """Compute ∂C_e/∂θ_f, shape (2L, 2L), and ∂Y/∂θ_f, shape (2L,), of a solution with S and S'.
 
     Y is p, under a load q0 s.
     """
-    edges = of.opening.shape[0]
-    load, area = singular_loads(of, np.arange(edges), padded(edges), rules)
-    if of.exterior.present:
-        load[:, :edges] += of.exterior.load
-        area += of.exterior.area
-    solve_factored(of.factor, load)
-    by_edge, conjugate = openings_by_edges(of, np.arange(edges), load, area, rules)
-    together = openings_by_translation(of, rules)
+    edges = state.opening.shape[0]
+    load, area = singular_loads(state, np.arange(edges), padded(edges), rules)
+    if state.exterior.present:
+        load[:, :edges] += state.exterior.load
+        area += state.exterior.area
+    solve_factored(state.factor, load)
+    by_edge, conjugate = openings_by_edges(state, np.arange(edges), load, area, rules)
+    together = openings_by_translation(state, rules)
     for e in range(edges):
         total = 0.0
         for f in range(edges):
             if f != e:
                 total += by_edge[e, f]
         by_edge[e, e] = together[e] - total
-    if of.exterior.present:
+    if state.exterior.present:
         # the ends of the exterior stay
         typical = 0.0
         for e in range(edges - 2):

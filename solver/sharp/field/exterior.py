@@ -79,7 +79,7 @@ class ExteriorCoupling(NamedTuple):
 
 @compiled
 def is_present(exterior: Exterior) -> bool:
-    """Whether the gaps are a window with an exterior."""
+    """Return whether the gaps are a window with an exterior."""
     present: bool = exterior.theta.shape[0] > 0
     return present
 
@@ -116,7 +116,7 @@ def add_exterior(nodes: Nodes, equations: Equations, exterior: Exterior) -> Exte
 def translation_terms(
     coupling: ExteriorCoupling, exterior: Exterior, f: Array, pressure: float
 ) -> tuple[Array, float]:
-    """Load and mean opening that the exterior adds when all edges of the window move together."""
+    """Compute load and mean opening by the exterior when all edges of the window move together."""
     kernel, slope = coupling.kernel, coupling.slope
     potential = np.zeros(kernel.shape[1])
     changed = np.zeros(kernel.shape[1])

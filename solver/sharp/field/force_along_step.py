@@ -45,41 +45,41 @@ def first_zero(departing: float, departing_rate: float, arriving: float, rate: f
 
 @compiled
 def force_derivatives(
-    of: Solution, wanted: Integers, rules: GaussRules, rows: Array, known: Integers
+    state: Solution, wanted: Integers, rules: GaussRules, rows: Array, known: Integers
 ) -> None:
     """Compute C_e ∂C_e/∂n_f of the edges ``wanted``, n outwards, into their ``rows``.
 
     There is a row for each edge e. Those that are ``known``, which is not zero, are left. The
     solution must be one with S and S'.
     """
-    edges = of.opening.shape[0]
+    edges = state.opening.shape[0]
     missing = 0
     for e in wanted:
         missing += 1 if known[e] == 0 else 0
     if missing == 0:
         return
-    if of.exterior.present:  # its terms are those of the whole tangent
-        tangent, _ = derivatives(of, rules)
+    if state.exterior.present:  # its terms are those of the whole tangent
+        tangent, _ = derivatives(state, rules)
         for e in range(edges):
             for f in range(edges):
-                rows[e, f] = of.opening[e] * tangent[e, f] * (1 - 2 * (f % 2))
+                rows[e, f] = state.opening[e] * tangent[e, f] * (1 - 2 * (f % 2))
         known[:] = 1
         return
-    together = openings_by_translation(of, rules)
+    together = openings_by_translation(state, rules)
     edge = np.empty(1, dtype=np.int64)
     for e in wanted:
         if known[e] != 0:
             continue
         outwards = 1 - 2 * (e % 2)
         edge[0] = e
-        load, area = singular_loads(of, edge, 1, rules)
-        solve_factored(of.factor, load)
-        by_edge, _ = openings_by_edges(of, edge, load, area, rules)
-        diagonal = of.opening[e] * together[e] * outwards
+        load, area = singular_loads(state, edge, 1, rules)
+        solve_factored(state.factor, load)
+        by_edge, _ = openings_by_edges(state, edge, load, area, rules)
+        diagonal = state.opening[e] * together[e] * outwards
         for f in range(edges):
             if f != e:
                 # C_e ∂C_e/∂n_f = C_f ∂C_f/∂n_e, both n outwards
-                by = of.opening[f] * by_edge[f, 0] * outwards
+                by = state.opening[f] * by_edge[f, 0] * outwards
                 rows[e, f] = by
                 diagonal -= by * outwards * (1 - 2 * (f % 2))
         rows[e, e] = diagonal

@@ -176,17 +176,17 @@ def solve_loads(
 
 
 @compiled
-def gap_potentials(of: Solution, weights: Array) -> Array:
+def gap_potentials(state: Solution, weights: Array) -> Array:
     """Compute the potential of the other gaps at every node, from the balance of its own gap."""
-    offset, load, blocks = of.nodes.offset, of.equations.load, of.equations.matrix
-    out = np.empty(of.scaled_opening.shape[0])
+    offset, load, blocks = state.nodes.offset, state.equations.load, state.equations.matrix
+    out = np.empty(state.scaled_opening.shape[0])
     for k in range(offset.shape[0] - 1):
         base = offset[k]
         m = offset[k + 1] - base
         for i in range(base, base + m):
             # A f + w g + S~ + p X = 0
-            total = load[i, 0] + of.pressure * load[i, 1]
+            total = load[i, 0] + state.pressure * load[i, 1]
             for j in range(m):
-                total += blocks[i, j] * of.scaled_opening[base + j]
+                total += blocks[i, j] * state.scaled_opening[base + j]
             out[i] = -total / weights[i]
     return out

@@ -137,17 +137,17 @@ def _work_of_high_modes(nodes: Nodes, rules: GaussRules, top: int, panels: Panel
 
 
 def work_of_gaps(field: GapField) -> float:
-    """Integrate S_full T over the gaps, dθ."""
-    of, source = field.solution, field.source
-    high = _work_of_high_modes(of.nodes, GAUSS_RULES, source.top, source.panels)
-    return float(of.equations.load[:, 0] @ of.scaled_opening) - high
+    """Integrate S_full T dθ over the gaps."""
+    state, source = field.solution, field.source
+    high = _work_of_high_modes(state.nodes, GAUSS_RULES, source.top, source.panels)
+    return float(state.equations.load[:, 0] @ state.scaled_opening) - high
 
 
 @compiled
 def open_gap(
     nodes: Nodes, k: int, f: Array, circle: Circle, rules: GaussRules, panels: Panels
 ) -> tuple[Array, Array, Array, Array]:
-    """θ, falling, dθ/dt and T of gap k at the fine nodes of a circle, and its b_n, from all f."""
+    """Evaluate θ, falling, dθ/dt and T of gap k at the nodes of a circle, and b_n, from all f."""
     gap, order = nodes.table[k], nodes.orders[k]
     count = circle.cosine.shape[0] // 2 - 1
     theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
@@ -169,10 +169,10 @@ def open_gap(
 
 def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> GapOpening:
     """Evaluate the opening T of gap k at fine nodes."""
-    of = field.solution
-    count = count_sine_nodes(of.nodes.table[k], field.source.top, per_wave)
+    state = field.solution
+    count = count_sine_nodes(state.nodes.table[k], field.source.top, per_wave)
     theta, span, opening, modes = open_gap(
-        of.nodes, k, of.scaled_opening, tabulate_circle(count + 1), GAUSS_RULES,
+        state.nodes, k, state.scaled_opening, tabulate_circle(count + 1), GAUSS_RULES,
         field.source.panels,
     )  # fmt: skip
     weight = span * np.pi / (count + 1)

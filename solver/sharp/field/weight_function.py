@@ -45,7 +45,7 @@ def end_singularity(nodes: Nodes, e: int, rules: GaussRules) -> tuple[Array, flo
 def own_singular_load(
     nodes: Nodes, e: int, block: Array, density: Array, strength: float, rules: GaussRules
 ) -> Array:
-    """Load the own gap of edge e, whose diagonal block is ``block``, by the singular opening."""
+    """Load the gap of edge e, whose diagonal block is ``block``, by the edge's singular opening."""
     k, side = e // 2, e % 2
     order = nodes.orders[k]
     base, m = nodes.offset[k], density.shape[0]
@@ -68,14 +68,14 @@ def own_singular_load(
 
 @compiled
 def singular_loads(
-    of: Solution, edges: Integers, columns: int, rules: GaussRules
+    state: Solution, edges: Integers, columns: int, rules: GaussRules
 ) -> tuple[Array, Array]:
-    """Load all nodes by the singular openings of some edges, one a column; and their areas.
+    """Load all nodes by the singular openings of some edges, one a column; with their areas.
 
     There may be more ``columns`` than edges, for ``cholesky``; those are zero, as are those of the
     exterior of a window, a gap without nodes.
     """
-    nodes, matrix = of.nodes, of.equations.matrix
+    nodes, matrix = state.nodes, state.equations.matrix
     n = nodes.theta.shape[0]
     load = np.zeros((n, columns))
     area = np.zeros(edges.shape[0])
@@ -110,7 +110,7 @@ def _load_by_edge(
     weight: Array,
     out: Array,
 ) -> None:
-    """Into ``out``: load on other gaps of a density of a gap's ``rows`` and a weight at an edge."""
+    """Load other gaps, into ``out``, by a density of a gap's ``rows`` and a weight at an edge."""
     scale = strength / (4 * np.pi)
     edge_sine = np.sin(0.5 * edge)
     edge_cosine = np.cos(0.5 * edge)
@@ -126,7 +126,7 @@ def _load_by_edge(
 
 @compiled
 def openings_by_edges(
-    of: Solution, edges: Integers, regular: Array, area: Array, rules: GaussRules
+    state: Solution, edges: Integers, regular: Array, area: Array, rules: GaussRules
 ) -> tuple[Array, Array]:
     """Compute ∂C_e/∂θ_f, e ≠ f, shape (2L, edges), and ∂Y/∂θ_f for some edges f.
 
@@ -134,24 +134,24 @@ def openings_by_edges(
     the singular openings. Y is p, under a load q0 s.
     """
     count = edges.shape[0]
-    load, slope = of.equations.load, of.nodes.slope
+    load, slope = state.equations.load, state.nodes.slope
     conjugate = area.copy()
     for i in range(regular.shape[0]):
         for c in range(count):
             conjugate[c] += load[i, 1] * regular[i, c]
-    if of.mean.separation_weight == 0:
+    if state.mean.separation_weight == 0:
         conjugate /= 2 * np.pi  # of the separation; the pressure stays
     else:
-        conjugate /= of.mean.resistance
+        conjugate /= state.mean.resistance
         for i in range(regular.shape[0]):
             for c in range(count):
-                regular[i, c] -= of.solved[i, 1] * conjugate[c]
-    by_edge = edge_openings(regular, of.nodes, rules)[:, :count].copy()
+                regular[i, c] -= state.solved[i, 1] * conjugate[c]
+    by_edge = edge_openings(regular, state.nodes, rules)[:, :count].copy()
     for c in range(count):
         f = edges[c]
         k, side = f // 2, f % 2
         by_edge[f ^ 1, c] += 0.5 * np.sqrt(2 * slope[k, 1 - side])  # the singular opening's far end
-        strength = (2 * side - 1) * of.opening[f] * np.sqrt(slope[k, side] / 8)
+        strength = (2 * side - 1) * state.opening[f] * np.sqrt(slope[k, side] / 8)
         conjugate[c] *= strength
         for e in range(by_edge.shape[0]):
             by_edge[e, c] *= strength
@@ -159,19 +159,19 @@ def openings_by_edges(
 
 
 @compiled
-def openings_by_translation(of: Solution, rules: GaussRules) -> Array:
+def openings_by_translation(state: Solution, rules: GaussRules) -> Array:
     """Compute the derivatives of all openings when all edges move together against the profile."""
-    n = of.solved.shape[0]
+    n = state.solved.shape[0]
     drift = 0.0
     for i in range(n):
-        drift -= of.equations.load[i, 1] * of.solved[i, 2]
-    drift += of.exterior.shift
-    drift = of.mean.separation_weight * drift / of.mean.resistance
+        drift -= state.equations.load[i, 1] * state.solved[i, 2]
+    drift += state.exterior.shift
+    drift = state.mean.separation_weight * drift / state.mean.resistance
     moving = np.empty((n, 1))
     for i in range(n):
-        moving[i, 0] = -of.solved[i, 2] - drift * of.solved[i, 1]
-    opening = edge_openings(moving, of.nodes, rules)[:, 0].copy()
-    subtract_end_terms(opening, of.nodes.slope, of.equations.end_terms, 1)
+        moving[i, 0] = -state.solved[i, 2] - drift * state.solved[i, 1]
+    opening = edge_openings(moving, state.nodes, rules)[:, 0].copy()
+    subtract_end_terms(opening, state.nodes.slope, state.equations.end_terms, 1)
     return opening
 
 

@@ -53,7 +53,7 @@ def _widened(nodes: Array, count: int, more: int) -> Array:
 
 @compiled
 def _artanh_over(y: float) -> float:
-    """The quotient artanh z/z, y = z², where |z| is hardly above 1/3."""
+    """Compute artanh z/z, y = z², where |z| is hardly above 1/3."""
     series = 1 / 15 + y * (1 / 17 + y * (1 / 19 + y * (1 / 21 + y / 23)))
     series = 1 / 7 + y * (1 / 9 + y * (1 / 11 + y * (1 / 13 + y * series)))
     return 1 + y * (1 / 3 + y * (1 / 5 + y * series))

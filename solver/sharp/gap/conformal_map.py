@@ -46,7 +46,7 @@ def map_gaps(gaps: Array) -> Array:
 
 @compiled
 def in_order(table: Array) -> bool:
-    """Whether every gap and patch has a length; not so where an edge is no number."""
+    """Return whether every gap and patch has a length; not so where an edge is no number."""
     for k in range(table.shape[0]):
         # not written as <= : a length that is no number is a failure, too
         length = table[k, RIGHT] - table[k, LEFT]
@@ -57,7 +57,7 @@ def in_order(table: Array) -> bool:
 
 @compiled
 def pole_distances(gap: Array, side: int) -> tuple[float, float]:
-    """Distances of an end from both poles of the map: beside it, and beyond the other end."""
+    """Return the distances of an end from both poles of the map: beside it, and at the far side."""
     if side == 0:
         return gap[LEFT_PATCH], gap[RIGHT] - gap[LEFT] + gap[RIGHT_PATCH]
     return gap[RIGHT_PATCH], gap[RIGHT] - gap[LEFT] + gap[LEFT_PATCH]
@@ -65,14 +65,14 @@ def pole_distances(gap: Array, side: int) -> tuple[float, float]:
 
 @compiled
 def log_ratio(r: float, near: float, far: float) -> float:
-    """Logarithm of the map at the distance r from an end, with its :func:`pole_distances`."""
+    """Take the logarithm of the map at the distance r from an end; see :func:`pole_distances`."""
     value: float = np.log1p(r * (1 / near + 1 / far) / (1 - r / far))
     return value
 
 
 @compiled
 def one_minus_plus(gap: Array, r: float, side: int) -> tuple[float, float]:
-    """(1 - η, 1 + η) at the distance r from the left (side 0) or right end, relatively exact."""
+    """Compute (1 - η, 1 + η) at the distance r from the left (side 0) or right end, to rounding."""
     near, far = pole_distances(gap, side)
     distance = log_ratio(r, near, far) / (2 * gap[ALPHA])
     if side == 0:
@@ -82,13 +82,13 @@ def one_minus_plus(gap: Array, r: float, side: int) -> tuple[float, float]:
 
 @compiled
 def eta_from(minus: float, plus: float) -> float:
-    """η from 1 - η and 1 + η, by the smaller of them."""
+    """Compute η from 1 - η and 1 + η, by the smaller of them."""
     return plus - 1 if plus < minus else 1 - minus
 
 
 @compiled
 def eta_at(gap: Array, theta: float) -> tuple[float, float, float]:
-    """η, 1 - η² and dη/dθ at θ, measured from the nearer end."""
+    """Compute η, 1 - η² and dη/dθ at θ, measured from the nearer end."""
     side = 0 if theta - gap[LEFT] < gap[RIGHT] - theta else 1
     r = theta - gap[LEFT] if side == 0 else gap[RIGHT] - theta
     minus, plus = one_minus_plus(gap, r, side)
@@ -99,7 +99,7 @@ def eta_at(gap: Array, theta: float) -> tuple[float, float, float]:
 
 @compiled
 def theta_at(gap: Array, eta: float) -> tuple[float, float]:
-    """θ and dθ/dη at η."""
+    """Compute θ and dθ/dη at η, measured from the nearer end."""
     side = 0 if eta < 0 else 1
     near, far = pole_distances(gap, side)
     grown = np.expm1(2 * gap[ALPHA] * (1 + eta if side == 0 else 1 - eta))
@@ -110,6 +110,6 @@ def theta_at(gap: Array, eta: float) -> tuple[float, float]:
 
 @compiled
 def convergence_rate(gap: Array) -> float:
-    """Rate ln ρ of a gap: the error of M modes falls as ρ^-M."""
+    """Return the rate ln ρ of a gap: the error of M modes falls as ρ^-M."""
     rate: float = np.arcsinh(np.pi / (2 * gap[ALPHA]))
     return rate

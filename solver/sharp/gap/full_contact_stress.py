@@ -259,7 +259,7 @@ def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, 
 def _measure_between(
     left: Array, right: Array, before: Array, tilt: Array, nodes: Array, w: Array
 ) -> float:
-    """As :meth:`StressSource.measure_between`; ``before`` is the measure before each panel."""
+    """Sum as :meth:`StressSource.measure_between`; ``before`` is the measure before each panel."""
     count = tilt.shape[0]
     width = 2 * np.pi / count
     panel = np.empty(2, dtype=np.int64)
