@@ -27,12 +27,13 @@ def derivatives(state: Solution, rules: GaussRules) -> tuple[Array, Array]:
     Y is p, under a load q0 s.
     """
     edges = state.opening.shape[0]
-    load, area = singular_loads(state, np.arange(edges), padded(edges), rules)
+    every = np.arange(edges)
+    load, area = singular_loads(state, every, padded(edges), rules)
     if state.exterior.present:
         load[:, :edges] += state.exterior.load
         area += state.exterior.area
     solve_factored(state.factor, load)
-    by_edge, conjugate = openings_by_edges(state, np.arange(edges), load, area, rules)
+    by_edge, conjugate = openings_by_edges(state, every, load, area, rules)
     together = openings_by_translation(state, rules)
     for e in range(edges):
         total = 0.0

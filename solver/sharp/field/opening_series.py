@@ -85,11 +85,14 @@ def _fine_nodes(gap: Array, circle: Circle, theta: Array, span: Array) -> None:
     As :func:`theta_at`, many at a time, with exp(y) - 1 from a table.
     """
     alpha = 2 * gap[ALPHA]
+    left_near, left_far = pole_distances(gap, 0)
+    right_near, right_far = pole_distances(gap, 1)
     for i in range(theta.shape[0]):
         c = circle.cosine[i + 1]
-        side = 0 if c < 0 else 1
-        near, far = pole_distances(gap, side)
-        y = alpha * (1 + c if side == 0 else 1 - c)
+        from_left = c < 0
+        near = left_near if from_left else right_near
+        far = left_far if from_left else right_far
+        y = alpha * (1 + c if from_left else 1 - c)
         place = int(y * _PER_UNIT)
         if place < _EXPM1.shape[0]:
             x = y - place / _PER_UNIT
@@ -100,7 +103,7 @@ def _fine_nodes(gap: Array, circle: Circle, theta: Array, span: Array) -> None:
             grown = np.expm1(y)
         r = grown * near * far / (far + (1 + grown) * near)
         span[i] = alpha * (near + r) * (far - r) / (near + far) * circle.sine[i + 1]
-        theta[i] = gap[LEFT] + r if side == 0 else gap[RIGHT] - r
+        theta[i] = gap[LEFT] + r if from_left else gap[RIGHT] - r
 
 
 @compiled
