@@ -1,4 +1,4 @@
-"""What a field of many gaps costs: on the tree of gaps, and by the dense factor.
+"""Cost of a field of many gaps: on the tree of gaps, and by the dense factor.
 
     python benchmarks/many_gaps.py --gaps 30 100 300 1000 3000
 
@@ -18,14 +18,19 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.runtime.malloc import keep_freed
-from adhesis.solver.sharp.equilibrium.edge_elimination import newton_many
-from adhesis.solver.sharp.field.dense_solver import solve_plain
+from adhesis.solver.sharp.equilibrium.edge_elimination import (
+    NewtonStep,
+    eliminate_edges,
+    newton_step,
+)
+from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.solution import FIXED, Solution
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
+from adhesis.solver.sharp.field.hierarchical_solver import HierarchicalSystem, solve_many
+from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 
 _FEW = 100  # gaps up to which dense matrices are timed as often as the tree
 
@@ -48,8 +53,13 @@ def _best(work: Callable[[], Any], repetitions: int) -> tuple[float, Any]:
     return min(times), result
 
 
+def _step(of: Solution, system: HierarchicalSystem, still: Array) -> NewtonStep:
+    edges = eliminate_edges(of, system, still, still, GAUSS_RULES)
+    return newton_step(of, system, edges, FIXED_SEPARATION)
+
+
 def _dense_step(of: Solution) -> Array:
-    by_edge, by_mean = derivatives(of, RULES)
+    by_edge, by_mean = derivatives(of, GAUSS_RULES)
     return np.linalg.solve(by_edge, by_mean)
 
 
@@ -66,6 +76,7 @@ def main() -> None:
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=100, h_rms=1e-6, seed=1)
     source = StressSource(profile, given.tolerance)
     separation, digits = 0.5 * profile.h_max * profile.q0, -np.log(given.tolerance)
+    model = FieldModel(FIXED_SEPARATION, float(digits), GAUSS_RULES, source.panels)
     print(f"contact {given.contact}, tolerance {given.tolerance}; times in ms")
     print(
         "  gaps  unknowns    field   per gap (µs)  exponent     step    dense     step  difference"
@@ -73,32 +84,30 @@ def main() -> None:
     before = (0, 0.0)
     for count in given.gaps:
         gaps = random_gaps(count, given.contact)
-        kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
-        arguments = (gaps, separation, FIXED, kinds, digits, 2, RULES, source.panels)
+        orders = choose_orders(map_gaps(gaps), digits, GAUSS_RULES.counts)
+        arguments = (gaps, separation, orders, 2, model)
         solve_many(*arguments)
-        time, (of, parts) = _best(lambda a=arguments: solve_many(*a), given.repetitions)
+        time, (of, system) = _best(lambda a=arguments: solve_many(*a), given.repetitions)
         still = np.zeros(2 * count)
-        newton_many(of, parts, still, still, FIXED, RULES)
-        step, _ = _best(
-            lambda o=of, p=parts, z=still: newton_many(o, p, z, z, FIXED, RULES), given.repetitions
-        )
+        _step(of, system, still)
+        step, _ = _best(lambda o=of, s=system, z=still: _step(o, s, z), given.repetitions)
         exponent = ""
         if before[0]:
             exponent = f"{np.log(time / before[1]) / np.log(count / before[0]):.2f}"
         before = (count, time)
         dense = dense_step = difference = "-"
         if count <= given.dense:
-            plain = (gaps, separation, FIXED, kinds, 2, RULES, source.panels)
+            few = (gaps, separation, orders, 2, model, NO_EXTERIOR)
             repetitions = given.repetitions if count <= _FEW else 2
-            solution = Solution(*solve_plain(*plain))
+            solution = solve(*few)
             _dense_step(solution)
-            dense_time, _ = _best(lambda a=plain: solve_plain(*a), repetitions)
+            dense_time, _ = _best(lambda a=few: solve(*a), repetitions)
             step_time, _ = _best(lambda s=solution: _dense_step(s), repetitions)
             dense, dense_step = f"{1e3 * dense_time:.2f}", f"{1e3 * step_time:.2f}"
             opening = solution.opening
             difference = f"{np.abs(of.opening - opening).max() / np.abs(opening).max():.0e}"
         print(
-            f"{count:6d} {len(of.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
+            f"{count:6d} {len(of.nodes.theta):9d} {1e3 * time:8.2f} {1e6 * time / count:14.1f} "
             f"{exponent:>9s} {1e3 * step:8.2f} {dense:>8s} {dense_step:>8s} {difference:>11s}"
         )
 

@@ -9,17 +9,16 @@ from adhesis.solver.sharp.descent.gradient_flow import AT_REST, NO_FIELD, REJOIN
 from adhesis.solver.sharp.descent.local_descent import KnownState
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import imbalance, narrowest
-from adhesis.solver.sharp.equilibrium.linear_exterior import About, known_about
+from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
+from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation, linearise_equilibrium
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.solution import FIXED, Hold
+from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, LoadingDevice
 from adhesis.solver.sharp.gap.ends import outward, widths, without_small
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import RULES
 from adhesis.solver.sharp.system.dense import DenseSystem
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
-from adhesis.solver.sharp.system.edge_system import EdgeSystem, Kinds
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
 from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
 from adhesis.solver.sharp.tolerances import (
     DESCENT_LIMIT,
@@ -42,8 +41,8 @@ class EdgeMechanics(EdgeProblem):
         4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
     tolerance : float
         Relative accuracy of the field.
-    hold : Hold
-        Prescribed quantity.
+    device : LoadingDevice
+        What prescribes the quantity d.
 
     Attributes
     ----------
@@ -52,9 +51,13 @@ class EdgeMechanics(EdgeProblem):
     """
 
     def __init__(
-        self, source: StressSource, critical: float, tolerance: float, hold: Hold = FIXED
+        self,
+        source: StressSource,
+        critical: float,
+        tolerance: float,
+        device: LoadingDevice = FIXED_SEPARATION,
     ) -> None:
-        super().__init__(source, critical, tolerance, hold)
+        super().__init__(source, critical, tolerance, device)
         self.many = HIERARCHICAL_FROM
         self._dense, self._hierarchical = DenseSystem(self), HierarchicalSystem(self)
 
@@ -71,10 +74,10 @@ class EdgeMechanics(EdgeProblem):
         self.count.fields += 1
         solution = self.system(gaps).solution(gaps, prescribed, share)
         return GapField(
-            self.source, gaps, prescribed, share * self.tolerance, self.law.hold, solution
+            self.source, gaps, prescribed, share * self.tolerance, self.model.device, solution
         )
 
-    def stiffness(self, point: Point, edges: Kinds) -> Array:
+    def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
 
         The diagonal is not given for many gaps.
@@ -87,24 +90,24 @@ class EdgeMechanics(EdgeProblem):
         gaps: Array,
         prescribed: float,
         reach: float,
-        kinds: Kinds = _ANY,
+        orders: Integers = _ANY,
         *,
         patient: bool = True,
     ) -> Point | None:
         """Return the stable equilibrium near these gaps, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
-        equilibrium is not stable. ``kinds`` are the least kinds of the gaps. If not ``patient``,
+        equilibrium is not stable. ``orders`` are the least orders of the gaps. If not ``patient``,
         gaps that are nearly in equilibrium are taken as they are.
         """
-        return self.correct(gaps, prescribed, reach, kinds, patient=patient)[0]
+        return self.correct(gaps, prescribed, reach, orders, patient=patient)[0]
 
     def correct(
         self,
         gaps: Array,
         prescribed: float,
         reach: float,
-        kinds: Kinds = _ANY,
+        orders: Integers = _ANY,
         *,
         patient: bool = True,
     ) -> tuple[Point | None, int]:
@@ -112,31 +115,33 @@ class EdgeMechanics(EdgeProblem):
 
         That is -1 where one is found, or where no single edge is known.
         """
-        if not narrowest(gaps) > 0:
+        if not shortest_length(gaps) > 0:
             return None, -1
         system = self.system(gaps)
         try:
             result = system.equilibrium(
-                gaps, prescribed, max(reach, self.settled), kinds, patient=patient
+                gaps, prescribed, max(reach, self.settled), orders, patient=patient
             )
         except np.linalg.LinAlgError:
             return None, -1
         if not result.found:
             return None, result.lost_edge
         field = GapField(
-            self.source, result.gaps, prescribed, self.tolerance, self.law.hold, result.solution
+            self.source, result.gaps, prescribed, self.tolerance, self.model.device, result.solution
         )
-        about = result.linearisation
-        return Point(prescribed, field, result.rate, result.slope, about=about), -1
+        point = Point(
+            prescribed, field, result.rate, result.slope, linearisation=result.linearisation
+        )
+        return point, -1
 
-    def about(self, point: Point) -> About:
+    def linearisation(self, point: Point) -> Linearisation:
         """Linearise a point of many gaps, for the windows that are set up on it."""
-        if point.about is not None:
-            return point.about
+        if point.linearisation is not None:
+            return point.linearisation
         self.count.fields += 1
         self.count.derivatives += 1
-        known: About = known_about(
-            point.gaps, point.at, point.field.solution.kinds, self.law, RULES, self.source.panels
+        known: Linearisation = linearise_equilibrium(
+            point.gaps, point.at, point.field.solution.nodes.orders, self.law, self.model
         )
         return known
 
@@ -145,7 +150,7 @@ class EdgeMechanics(EdgeProblem):
         if point is None or not self.uses_windows(point.gaps):
             return None
         leads = int(np.argmax(np.abs(point.rate))) // 2
-        return KnownState(point.gaps, self.about(point), leads)
+        return KnownState(point.gaps, self.linearisation(point), leads)
 
     def relax(
         self,
@@ -200,7 +205,7 @@ class EdgeMechanics(EdgeProblem):
         """Descend in a window on a known state; return gaps to go on from if that is no end."""
         track.is_complete = False
         rest = start.descend(
-            gaps, prescribed, self.law, self.source.panels, self.count, self.smallest,
+            gaps, prescribed, self.law, self.model, self.count, self.smallest,
             equal_speeds=equal_speeds,
         )  # fmt: skip
         if rest is None:
@@ -222,15 +227,15 @@ class EdgeMechanics(EdgeProblem):
     ) -> Point | Array:  # fmt: skip
         """Descend with all gaps."""
         system = self.system(gaps)
-        law = self.law._replace(longest=shortened * self.law.longest)
+        law = self.law._replace(longest_step=shortened * self.law.longest_step)
         compare = equal_speeds or shortened < 1
-        left, kinds, rests = DESCENT_LIMIT, _ANY, 0
+        left, orders, rests = DESCENT_LIMIT, _ANY, 0
         while left > 0 and rests <= 2 * RESTS:
             end = system.descend(
-                gaps, prescribed, left, kinds, law, track, equal_speeds=equal_speeds,
+                gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds,
                 compare=compare,
             )  # fmt: skip
-            gaps, kinds = end.gaps, end.kinds
+            gaps, orders = end.gaps, end.orders
             left -= end.fields
             if end.event == REJOINED:
                 track.rejoined = True
@@ -247,7 +252,7 @@ class EdgeMechanics(EdgeProblem):
                 # is taken for it, the next step in s decides.
                 rests += 1
                 patient = rests <= RESTS
-                point = self.equilibrium(gaps, prescribed, reach, kinds, patient=patient)
+                point = self.equilibrium(gaps, prescribed, reach, orders, patient=patient)
                 if point is not None:
                     return point
                 if not patient and rests <= 2 * RESTS:
@@ -267,7 +272,7 @@ class EdgeMechanics(EdgeProblem):
         if len(gaps) > 1:
             return smallest
         length, _ = widths(gaps)
-        if length[0] < self.smallest and self.law.hold.give > 0:
+        if length[0] < self.smallest and self.model.device.compliance > 0:
             raise FullContact
         return min(smallest, LAST_GAP * float(length[0]))
 
@@ -282,6 +287,6 @@ class EdgeMechanics(EdgeProblem):
         length, patch = widths(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
-        step[e] = min(0.5 * times * self.law.longest, 0.25 * length[e // 2], 0.25 * beside)
+        step[e] = min(0.5 * times * self.law.longest_step, 0.25 * length[e // 2], 0.25 * beside)
         onwards: Array = gaps - (np.sign(residual[e]) * outward(gaps) * step).reshape(-1, 2)
         return onwards

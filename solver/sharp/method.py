@@ -251,7 +251,7 @@ class SharpMethod(Method):
             if point is None:
                 point = self.edges.equilibrium(gaps, at, CORRECTED * self.edges.wave)
                 if point is not None:
-                    point = point.cleared(state.internal.clearance)
+                    point = point.with_clearance(state.internal.clearance)
             else:
                 at = point.at  # but for rounding the place of the state
             if point is None:

@@ -20,7 +20,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.opening_series import Opening, fine_opening
+from adhesis.solver.sharp.field.opening_series import GapOpening, fine_opening
 
 _PER_WAVE = 8  # nodes per shortest wave, at least
 _COARSE = 4.0  # sine nodes per shortest wave of the openings at nodes; the verification has more
@@ -35,7 +35,7 @@ class _Refined:
     ``theta`` in the units of the field, tension in units of E*/2.
     """
 
-    def __init__(self, field: GapField, openings: list[Opening]) -> None:
+    def __init__(self, field: GapField, openings: list[GapOpening]) -> None:
         self._source, self._pressure = field.source, field.pressure
         theta = np.concatenate([opening.theta for opening in openings])
         self._sine, self._cosine = np.sin(0.5 * theta), np.cos(0.5 * theta)

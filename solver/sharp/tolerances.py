@@ -15,6 +15,42 @@ HIERARCHICAL_FROM = 30
 Measured: a loop of 20 gaps is 8 to 45 % slower with the tree (benchmarks/windows.py).
 """
 
+SHORT_GAP_PANELS = 4
+"""Finest panels (at most λ_min/2 each). A shorter gap is integrated by one Gauss rule: its end
+pieces, one to two panels each, would meet."""
+
+PANEL_PHASE = 3.0
+"""Radians of the highest Chebyshev mode over one panel: 8 to 14 Gauss nodes resolve half a wave."""
+
+CHARGE_MARGIN = 1.0
+"""Natural digits of a run's charges beyond those of the field: errors of several levels add up."""
+
+FEWEST_CHARGES = 4
+"""Charges of a run, at least."""
+
+MOST_CHARGES = 160
+"""Charges of a run, at most: enough for patches of 3e-7 of their run at an accuracy of 1e-14, and
+of 1e-17 at 1e-5."""
+
+FORCE_SAMPLES = 16
+"""Places along a step of a running edge at which its force, a cubic, is looked at for a zero."""
+
+CUBIC_ERROR = 1 / 24
+"""Error of that cubic in units of its twist (h³/6 of its third derivative): that of a wave over
+almost half its length."""
+
+FORCE_MARGIN = 0.02
+"""Share of a force's range along a step below which it may be zero."""
+
+ENERGY_NODES = 3.0
+"""Sine nodes per λ_min for the energy: two resolve the shortest wave, the rest is margin."""
+
+SHAPE_NODES = 6.0
+"""Sine nodes per λ_min that bracket every local minimum of an opening."""
+
+FEWEST_SINE_NODES = 64
+"""Sine nodes of a gap beyond those by its length, for its ends."""
+
 # ---------------------------------------------------------------- equilibrium of the edges
 
 SETTLED = 1e-7
@@ -36,6 +72,38 @@ FAINT_FORCE = 10.0
 """C_c² per relative error of the field: forces this small are that error."""
 LEAST_FAINT_FORCE = 1e-12
 """C_c². Forces this small are rounding."""
+
+MOST_CORRECTIONS = 8
+"""Corrections by Newton's iteration before an equilibrium counts as lost."""
+
+NEWTON_SHARE = 0.01
+"""Share of ``EdgeLaw.field_error`` (a length in θ) below which a correction ends the iteration: it
+is small against the motion that the error of the field makes anyway."""
+
+STALLED_SHARE = 0.3
+"""Share of the last correction. One that is no smaller, and below ``EdgeLaw.field_error``, goes to
+and fro across a step of the field, where panels or modes change: the iteration ends."""
+
+NEWTON_GROWTH = 2.0
+"""Share of the last correction that the next one may have, at most; else the iteration diverges."""
+
+HIERARCHICAL_NEWTON_GROWTH = 0.7
+"""The same for many gaps, where an iteration that hardly shrinks is given up early: of some 1,300
+that came to a minimum one in a hundred had a correction half as large as the one before."""
+
+KNOWN_TANGENT = 1e-3
+"""Relative change of the tangent by a last correction below which it serves for the branch after
+it."""
+
+CLOSING_SHARE = 0.25
+"""Share of a gap or patch by which one step of one edge may shorten it."""
+
+SHORT_SPAN = 0.3
+"""Share of the distance in d to an earlier point of a branch. A point nearer than that gives the
+edges' earlier rates with too large an error."""
+
+CHANGED_RATE = 0.3
+"""Relative change of an edge's rate in a jump above which its earlier rate no longer counts."""
 
 # ---------------------------------------------------------------- windows of few gaps among many
 
@@ -84,61 +152,101 @@ OTHER_MINIMUM = 0.01
 
 # Lengths are in longest steps of a running edge, 0.05 λ_min: unchecked steps above 0.1 λ_min
 # leap over pinned minima. How often a length decides a loss: benchmarks/descent_steps.py.
-UNCHECKED_ALONE = 2.0  # longest steps (0.1 λ_min); up to here a step of one edge that runs alone
-# is not checked for a minimum, up to 1 that of several. The check is a cubic of the force.
-LONGEST_STRIDE = 3.0  # longest steps (0.15 λ_min); checked steps of several edges
-LONGEST_STRIDE_ALONE = 6.0  # longest steps (0.3 λ_min); checked steps of one edge. 0.45 λ_min leapt
-# over a minimum in 3 of 12 loops of benchmarks/few_gaps.py; 0.3 missed less than unchecked 0.1.
-RUNNING_LENGTH = 0.5  # longest steps; an edge that moves further runs
-RUNNING_SHARE = 0.25  # of the longest motion; an edge that moves less does not run beside it
-STANDING_SHARE = 0.01  # of its limit; while others run an edge that would move less stands, so that
-# nodes, moments and kernels of its gap are kept
-REUSES = 2  # steps; further ones of several edges with one tangent, which decides their direction
-REUSES_ALONE = 8  # steps; of one edge, where the tangent decides the length of a step only
-TURNING_SHARE = 0.2  # of the reach; an edge that would turn by so much asks for a new tangent
-ENERGY_ROUNDING = 1e-3  # of the work done either way; a smaller rise of the energy is rounding
-LEAST_STEP_SHARE = 0.02  # of the longest step; steps are not shortened below
-TURNS = 8  # turns of one edge over a minimum that no check shows, after which steps become shorter
-TURNS_FACTOR = 0.8  # by which they do at each further turn
+UNCHECKED_ALONE = 2.0
+"""Longest steps (0.1 λ_min); up to here a step of one edge that runs alone is not checked for a
+minimum, up to 1 that of several. The check is a cubic of the force."""
+LONGEST_STRIDE = 3.0
+"""Longest steps (0.15 λ_min); checked steps of several edges."""
+LONGEST_STRIDE_ALONE = 6.0
+"""Longest steps (0.3 λ_min); checked steps of one edge. 0.45 λ_min leapt over a minimum in 3 of 12
+loops of benchmarks/few_gaps.py; 0.3 missed less than unchecked 0.1."""
+RUNNING_LENGTH = 0.5
+"""Longest steps; an edge that moves further runs."""
+RUNNING_SHARE = 0.25
+"""Of the longest motion; an edge that moves less does not run beside it."""
+STANDING_SHARE = 0.01
+"""Of its limit; while others run an edge that would move less stands, so that nodes, moments and
+kernels of its gap are kept."""
+REUSES = 2
+"""Steps; further ones of several edges with one tangent, which decides their direction."""
+REUSES_ALONE = 8
+"""Steps; of one edge, where the tangent decides the length of a step only."""
+TURNING_SHARE = 0.2
+"""Of the reach; an edge that would turn by so much asks for a new tangent."""
+ENERGY_ROUNDING = 1e-3
+"""Of the work done either way; a smaller rise of the energy is rounding."""
+LEAST_STEP_SHARE = 0.02
+"""Of the longest step; steps are not shortened below."""
+TURNS = 8
+"""Turns of one edge over a minimum that no check shows, after which steps become shorter."""
+TURNS_FACTOR = 0.8
+"""By which they do at each further turn."""
 
 # Step of the linear flow, in shares of an edge's limit.
-FLOW_REACHED = 0.97  # a step that takes an edge so far is long enough
-FLOW_AIM = 0.99  # the share that is aimed at
-FLOW_TRIES = 60  # times τ at most; then the edge passes its limit within rounding of τ
-FLOW_DECAYED = 36.0  # exponent; exp(-36) is rounding, the mode has come to rest
-UNSTABLE_FORCE = 1e-3  # of the force; an unstable mode that is pulled by less is not followed: the
-# pull is that of rounding or of the field's error, and would break a symmetry
+FLOW_REACHED = 0.97
+"""A step that takes an edge so far is long enough."""
+FLOW_AIM = 0.99
+"""The share that is aimed at."""
+FLOW_TRIES = 60
+"""Times τ at most; then the edge passes its limit within rounding of τ."""
+FLOW_DECAYED = 36.0
+"""Exponent; exp(-36) is rounding, the mode has come to rest."""
+UNSTABLE_FORCE = 1e-3
+"""Of the force; an unstable mode that is pulled by less is not followed: the pull is that of
+rounding or of the field's error, and would break a symmetry."""
 
 # Step with equal speeds.
-LEAST_PIVOT = 1e-9  # of the largest diagonal element; the matrix of free edges is singular below
-SYMMETRIC_FORCE = 1e-6  # of the force; a softest mode that is pulled by less keeps its symmetry
-LEADING_FORCE = 0.5  # of the largest force; an edge with more goes where its own force points
-BOUND_SWEEPS = 200  # sweeps over the edges; where the active set returns to what it was
-BOUND_SWEEPS_CHANGE = 1e-12  # of the limits; sweeps that change less are the last
+LEAST_PIVOT = 1e-9
+"""Of the largest diagonal element; the matrix of free edges is singular below."""
+SYMMETRIC_FORCE = 1e-6
+"""Of the force; a softest mode that is pulled by less keeps its symmetry."""
+LEADING_FORCE = 0.5
+"""Of the largest force; an edge with more goes where its own force points."""
+BOUND_SWEEPS = 200
+"""Sweeps over the edges; where the active set returns to what it was."""
+BOUND_SWEEPS_CHANGE = 1e-12
+"""Of the limits; sweeps that change less are the last."""
 
 # The way off a saddle.
-EQUAL_MODES = 1e-3  # of the largest stiffness; modes that differ by less are equally soft
-EQUAL_AMPLITUDES = 0.99  # of the largest; edges that move so far are equal, the first one leads
-EQUAL_GAINS = 1e-3  # of the gain; two ways off that differ by less are equal
+EQUAL_MODES = 1e-3
+"""Of the largest stiffness; modes that differ by less are equally soft."""
+EQUAL_AMPLITUDES = 0.99
+"""Of the largest; edges that move so far are equal, the first one leads."""
+EQUAL_GAINS = 1e-3
+"""Of the gain; two ways off that differ by less are equal."""
 
 # Comparison with the trajectory of another descent.
-ON_TRAJECTORY = 0.4  # longest steps (0.02 λ_min); edges this close are on it. Where paths race they
-# part by far more: contact 0.32 and 0.60 in tests/solver/test_kinetics.py
-COMPARISONS = 3  # in a row, after which a descent has rejoined the trajectory
-FIELDS_PER_COMPARISON = 2  # fields from one comparison to the next
-SEGMENT_MARGIN = 1.2  # of the longest stride; a longer segment lies between two descents
-SEGMENT_SHARE = 0.25  # of an edge's distance from a point, in segments: further away is far
+ON_TRAJECTORY = 0.4
+"""Longest steps (0.02 λ_min); edges this close are on it. Where paths race they part by far more:
+contact 0.32 and 0.60 in tests/solver/test_kinetics.py."""
+COMPARISONS = 3
+"""In a row, after which a descent has rejoined the trajectory."""
+FIELDS_PER_COMPARISON = 2
+"""Fields from one comparison to the next."""
+SEGMENT_MARGIN = 1.2
+"""Of the longest stride; a longer segment lies between two descents."""
+SEGMENT_SHARE = 0.25
+"""Of an edge's distance from a point, in segments: further away is far."""
 
 # Windows of many gaps.
-WINDOW_HALF_WIDTH = 4  # gaps on each side of the edge that leads
-WINDOW_WIDEST = 48  # gaps on each side, to which windows double while nothing moves in them
-WINDOW_FIELDS = 60  # fields in a window before all gaps are solved again
-FAR_FROM_BALANCE = 0.02  # C_c; above, the edge furthest from balance leads, below, Newton's step
-FOLLOWING_SHARE = 0.2  # longest steps; an edge outside that its tangent moves further is held
-NEWTON_STEPS_IN_A_ROW = 12  # of all edges, after which a window is opened though they are stable
-LOCAL_WINDOW_MARGIN = 4  # gaps on each side of what changed, where a descent begins in a window
-LOCAL_WINDOW_WIDEST = 24  # gaps; changes further apart are not those of one window
-LOCAL_WINDOW_FIELDS = 300  # fields in it before all gaps are solved again
+WINDOW_HALF_WIDTH = 4
+"""Gaps on each side of the edge that leads."""
+WINDOW_WIDEST = 48
+"""Gaps on each side, to which windows double while nothing moves in them."""
+WINDOW_FIELDS = 60
+"""Fields in a window before all gaps are solved again."""
+FAR_FROM_BALANCE = 0.02
+"""C_c; above, the edge furthest from balance leads, below, Newton's step."""
+FOLLOWING_SHARE = 0.2
+"""Longest steps; an edge outside that its tangent moves further is held."""
+NEWTON_STEPS_IN_A_ROW = 12
+"""Of all edges, after which a window is opened though they are stable."""
+LOCAL_WINDOW_MARGIN = 4
+"""Gaps on each side of what changed, where a descent begins in a window."""
+LOCAL_WINDOW_WIDEST = 24
+"""Gaps; changes further apart are not those of one window."""
+LOCAL_WINDOW_FIELDS = 300
+"""Fields in it before all gaps are solved again."""
 
 # ---------------------------------------------------------------- nucleation
 

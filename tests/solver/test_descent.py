@@ -36,7 +36,7 @@ from adhesis.solver.sharp.descent.step_size import (
     turns_back,
 )
 from adhesis.solver.sharp.descent.trajectory import Comparison, compared, distance_to
-from adhesis.solver.sharp.gap.quadrature import RULES
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.tolerances import (
     COMPARISONS,
@@ -240,7 +240,7 @@ def run(
 ) -> Descent:  # fmt: skip
     """Descend on a single wave of amplitude 1 µm, at a separation in amplitudes."""
     gaps = np.array(gaps, dtype=float)
-    system = FlowProblem(method.edges.law, RULES, method.edges.source.panels)
+    system = FlowProblem(method.edges.law, method.edges.model, NO_EXTERIOR)
     track = np.empty((0, gaps.size)) if track is None else track
     comparison = Comparison(track, has_left, 0)
     prescribed = separation * 2 * np.pi * 1e-3
@@ -257,7 +257,7 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     assert found.event == AT_REST
     point = wave.edges.equilibrium(found.gaps, 0.5 * 2 * np.pi * 1e-3, 0.05 * wave.edges.wave)
     assert point is not None
-    np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.near)
+    np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
     assert len(found.forces) == len(found.trajectory) - 1
     np.testing.assert_array_equal(found.trajectory[0], np.ravel(NARROW))
     np.testing.assert_array_equal(found.trajectory[-1], found.gaps.ravel())

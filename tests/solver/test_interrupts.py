@@ -29,7 +29,7 @@ from adhesis.solver.registry import make_method
 from adhesis.solver.runtime import jit as compiled
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 from adhesis.solver.sharp.descent.track import Stage
-from adhesis.solver.sharp.field.solution import Hold
+from adhesis.solver.sharp.field.solution import LoadingDevice
 from tools.interrupted import Interrupt, interrupted
 
 KERNELS = 20  # at least so many are called from Python
@@ -92,7 +92,7 @@ def array():
 
 def named_tuple():
     NOW(ALARM)
-    return Hold(1.0, 2.0)
+    return LoadingDevice(1.0, 2.0)
 
 
 def nested():
@@ -114,9 +114,9 @@ def test_results_are_what_numba_makes_of_them():
     """The same classes and values, and named tuples that compiled code takes as such."""
     handed = njit(lambda stage, hold: (stage, hold, stage.way[1:] + 1))
     stage = Stage(np.arange(3.0), np.ones((3, 3)))
-    back, hold, part = handed(stage, Hold(1.0, 2.0))
-    assert (type(back), type(hold), type(part)) == (Stage, Hold, np.ndarray)
-    assert (hold.share, hold.give, part.tolist()) == (1.0, 2.0, [2.0, 3.0])
+    back, hold, part = handed(stage, LoadingDevice(1.0, 2.0))
+    assert (type(back), type(hold), type(part)) == (Stage, LoadingDevice, np.ndarray)
+    assert (hold.separation_weight, hold.compliance, part.tolist()) == (1.0, 2.0, [2.0, 3.0])
     assert np.array_equal(back.way, stage.way)
     assert np.array_equal(back.taken, stage.taken)
     handed(back, hold)

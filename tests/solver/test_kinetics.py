@@ -9,10 +9,11 @@ from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
 from adhesis.solver.sharp.descent.saddle import leaving_step
-from adhesis.solver.sharp.equilibrium.griffith import imbalance, moved_gaps, tangent_of
+from adhesis.solver.sharp.equilibrium.griffith import edge_tangent, imbalance, move_edges
 from adhesis.solver.sharp.field.dense_solver import solve
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.method import SharpMethod
 
 SOLID = HalfSpace(1e6, 0.5)
@@ -108,24 +109,23 @@ def test_the_hessian_is_the_derivative_of_the_forces(h_rms, gamma):
     method = SharpMethod(Problem(profile, SOLID, gamma), accuracy=1e-6)
     edges, panels = method.edges, method.edges.source.panels
     gaps = np.array([[0.3, 1.7], [2.1, 4.4], [5.0, 6.4]])
-    kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
+    orders = choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
 
     def forces(at: np.ndarray, fields: int):
-        of = solve(
-            at, 0.5 * profile.h_max * profile.q0, edges.law.hold, kinds, fields, RULES, panels
-        )
+        separation = 0.5 * profile.h_max * profile.q0
+        of = solve(at, separation, orders, fields, edges.model, NO_EXTERIOR)
         residual, drift = imbalance(of, edges.law, panels)
         return of, residual, drift, residual * (2 * of.opening - residual)
 
     of, residual, drift, _ = forces(gaps, 2)
-    tangent, _ = tangent_of(of, drift, RULES)
+    tangent, _ = edge_tangent(of, drift, GAUSS_RULES)
     matrix = hessian(of.opening, residual, drift, tangent)
     np.testing.assert_array_equal(matrix, matrix.T)
     h = 1e-5
     for e in range(6):
         way = np.zeros(6)
         way[e] = h
-        slope = (forces(moved_gaps(gaps, way), 1)[3] - forces(moved_gaps(gaps, -way), 1)[3]) / h / 2
+        slope = (forces(move_edges(gaps, way), 1)[3] - forces(move_edges(gaps, -way), 1)[3]) / h / 2
         np.testing.assert_allclose(matrix[:, e], slope, atol=2e-4 * np.abs(matrix).max())
     # On the steep one the slope of what must be paid counts; its sign would be noticed.
     share = np.abs(2 * residual * drift).max() / np.abs(matrix).max()
@@ -142,7 +142,7 @@ def test_a_race_ends_where_gradient_flow_does(share):
     It gave a loss of 5.178224 with jumps located to 5e-5 h_max. The loss is that at accuracy 1e-6.
     """
     method = SharpMethod(race())
-    method.edges.law = method.edges.law._replace(longest=share * method.edges.law.longest)
+    method.edges.law = method.edges.law._replace(longest_step=share * method.edges.law.longest_step)
     result = run_loop(method, max_penetration=0.8, load_steps=20)
     assert result.jumps[0].contact_after == pytest.approx(0.3202, abs=1e-4)
     assert result.loss_dimensionless == pytest.approx(5.178119, rel=1e-5)
@@ -173,7 +173,7 @@ def test_a_jump_whose_end_the_length_of_the_steps_decides_is_flagged(
     def follow(share: float):
         method = SharpMethod(Problem(profile, SOLID, gamma))
         law = method.edges.law
-        method.edges.law = law._replace(longest=share * law.longest)
+        method.edges.law = law._replace(longest_step=share * law.longest_step)
         return run_loop(method, max_penetration=0.9, load_steps=20)
 
     usual, short = follow(1.0), follow(0.25)
@@ -193,7 +193,7 @@ def test_nothing_races_where_the_rules_agree():
 def test_equal_speeds_end_elsewhere():
     """The comparison rule reaches contact 0.6011 from the same first touch."""
     method = SharpMethod(race())
-    method.edges.law = method.edges.law._replace(longest=0.2 * method.edges.law.longest)
+    method.edges.law = method.edges.law._replace(longest_step=0.2 * method.edges.law.longest_step)
     start, touches = method.nucleation.first_touch()
     gaps = method.nucleation.seeded(np.empty((0, 2)), touches)
     found = method.edges.relax(gaps, start, 0.05 * method.edges.wave, equal_speeds=True)

@@ -9,13 +9,14 @@ from adhesis import Problem, self_affine_profile, single_wave
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.field.dense_solver import GapField, solve, solve_again
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
-from adhesis.solver.sharp.field.force_along_step import forces_on
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
+from adhesis.solver.sharp.field.force_along_step import force_derivatives
 from adhesis.solver.sharp.field.opening_series import fine_opening, sum_modes, work_of_gaps
-from adhesis.solver.sharp.field.solution import FIXED, Hold
+from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
 from adhesis.solver.sharp.gap.chebyshev_moments import gap_moments
 from adhesis.solver.sharp.gap.conformal_map import map_gaps, theta_at
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.scenes import HALF_SPACE
 
@@ -90,7 +91,7 @@ def test_openings_equal_the_explicit_solution():
     assert np.all(np.diff(theta, axis=1) > 0)
     for k in range(len(gaps)):
         modes = fine_opening(field, k).modes
-        inside = sum_modes(field.solution.table[k], theta[k, 1:-1], modes)
+        inside = sum_modes(field.solution.nodes.table[k], theta[k, 1:-1], modes)
         assert np.abs(inside - opening[k, 1:-1]).max() < 1e-10 * np.abs(opening).max()
 
 
@@ -126,37 +127,41 @@ def test_energy_by_edge_is_the_energy_release_rate(source, separation):
         assert abs(slope - (-release if side else release)) < 2e-5 * scale
 
 
-HOLDS = {"separation": FIXED, "stiffness": Hold(1.0, 0.7), "load": Hold(0.0, 1.0)}
+DEVICES = {
+    "separation": FIXED_SEPARATION,
+    "stiffness": LoadingDevice(1.0, 0.7),
+    "load": LoadingDevice(0.0, 1.0),
+}
 
 
-def held(source, gaps, separation, hold):
+def held(source, gaps, separation, device):
     """Field of the gaps, held so that it is the one that they have at the separation."""
     fixed = GapField(source, gaps, separation, 1e-13)
-    prescribed = hold.share * separation - hold.give * fixed.pressure
-    return GapField(source, gaps, prescribed, 1e-13, hold)
+    prescribed = device.separation_weight * separation - device.compliance * fixed.pressure
+    return GapField(source, gaps, prescribed, 1e-13, device)
 
 
-@pytest.mark.parametrize("name", HOLDS)
+@pytest.mark.parametrize("name", DEVICES)
 def test_the_field_does_not_know_what_holds_it(source, separation, name):
     fixed = GapField(source, GAPS, separation, 1e-13)
-    field = held(source, GAPS, separation, HOLDS[name])
+    field = held(source, GAPS, separation, DEVICES[name])
     assert field.separation == pytest.approx(separation, rel=1e-9)
     assert field.pressure == pytest.approx(fixed.pressure, rel=1e-11)
     assert np.allclose(field.opening, fixed.opening, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", HOLDS)
+@pytest.mark.parametrize("name", DEVICES)
 def test_derivatives_against_differences(source, separation, name):
-    hold = HOLDS[name]
-    field = held(source, GAPS, separation, hold)
+    device = DEVICES[name]
+    field = held(source, GAPS, separation, device)
     by_edge, conjugate_by_edge = field.derivatives
     step = 1e-6
     for f in range(10):
         up, down = GAPS.ravel().copy(), GAPS.ravel().copy()
         up[f] += step
         down[f] -= step
-        high = GapField(source, up.reshape(-1, 2), field.prescribed, 1e-13, hold)
-        low = GapField(source, down.reshape(-1, 2), field.prescribed, 1e-13, hold)
+        high = GapField(source, up.reshape(-1, 2), field.prescribed, 1e-13, device)
+        low = GapField(source, down.reshape(-1, 2), field.prescribed, 1e-13, device)
         difference = (high.opening - low.opening).ravel() / (2 * step)
         assert np.abs(difference - by_edge[:, f]).max() < 2e-6 * np.abs(difference).max()
         slope = (high.pressure - low.pressure) / (2 * step)
@@ -174,11 +179,11 @@ def test_hessian_is_symmetric(source, separation):
     assert np.abs(off - off.T).max() < 1e-9 * np.abs(off).max()
 
 
-@pytest.mark.parametrize("name", HOLDS)
+@pytest.mark.parametrize("name", DEVICES)
 def test_derivatives_by_what_is_prescribed(source, separation, name):
-    field = held(source, GAPS, separation, HOLDS[name])
+    field = held(source, GAPS, separation, DEVICES[name])
     way = 0.5 * separation
-    other = GapField(source, GAPS, field.prescribed + way, 1e-13, HOLDS[name])
+    other = GapField(source, GAPS, field.prescribed + way, 1e-13, DEVICES[name])
     assert np.allclose(other.opening - field.opening, way * field.opening_by_prescribed, rtol=1e-8)
     assert abs(other.pressure - field.pressure - way * field.pressure_by_prescribed) < (
         1e-8 * abs(field.pressure)
@@ -265,24 +270,26 @@ def test_hundreds_of_patches_in_one_period():
 
 def test_gaps_that_stay_may_be_taken_over_from_another_field(source, separation):
     """One edge has moved: its gap, and those beside its patches, are solved anew."""
-    kinds = choose_kinds(map_gaps(GAPS), 25.0, RULES.counts)
-    before = solve(GAPS, separation, FIXED, kinds, 2, RULES, source.panels)
+    model = FieldModel(FIXED_SEPARATION, 25.0, GAUSS_RULES, source.panels)
+    orders = choose_orders(map_gaps(GAPS), model.digits, GAUSS_RULES.counts)
+    before = solve(GAPS, separation, orders, 2, model, NO_EXTERIOR)
     moved = GAPS.copy()
     moved[2, 1] += 0.01
-    whole = solve(moved, separation, FIXED, kinds, 2, RULES, source.panels)
-    again = solve_again(moved, separation, FIXED, kinds, RULES, source.panels, before)
-    np.testing.assert_allclose(again.matrix, whole.matrix, rtol=1e-13)
+    whole = solve(moved, separation, orders, 2, model, NO_EXTERIOR)
+    again = solve_again(moved, separation, orders, model, NO_EXTERIOR, before)
+    np.testing.assert_allclose(again.equations.matrix, whole.equations.matrix, rtol=1e-13)
     np.testing.assert_allclose(again.opening, whole.opening, rtol=1e-11)
     assert np.abs(again.opening / before.opening - 1).min() > 1e-9  # all feel it
 
 
 def test_forces_on_single_edges_are_rows_of_the_tangent(source, separation):
-    kinds = choose_kinds(map_gaps(GAPS), 25.0, RULES.counts)
-    of = solve(GAPS, separation, FIXED, kinds, 2, RULES, source.panels)
-    tangent = derivatives(of, RULES)[0] * of.opening[:, None] * np.tile([1, -1], 5)
+    model = FieldModel(FIXED_SEPARATION, 25.0, GAUSS_RULES, source.panels)
+    orders = choose_orders(map_gaps(GAPS), model.digits, GAUSS_RULES.counts)
+    of = solve(GAPS, separation, orders, 2, model, NO_EXTERIOR)
+    tangent = derivatives(of, GAUSS_RULES)[0] * of.opening[:, None] * np.tile([1, -1], 5)
     rows, known = np.full((10, 10), np.nan), np.zeros(10, dtype=np.int64)
     known[4] = 1
-    forces_on(of, np.array([1, 4, 6]), RULES, rows, known)
+    force_derivatives(of, np.array([1, 4, 6]), GAUSS_RULES, rows, known)
     np.testing.assert_array_equal(np.flatnonzero(known), [1, 4, 6])
     np.testing.assert_allclose(rows[[1, 6]], tangent[[1, 6]], atol=1e-9 * np.abs(tangent).max())
     assert np.isnan(rows[4]).all()  # was known

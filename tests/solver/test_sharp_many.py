@@ -10,25 +10,27 @@ import pytest
 from adhesis import HalfSpace, Problem, self_affine_profile
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.edge_elimination import (
-    newton_many,
-    newton_step,
-    yielding_gaps,
+from adhesis.solver.sharp.equilibrium.edge_elimination import eliminate_edges, newton_step
+from adhesis.solver.sharp.equilibrium.griffith import (
+    edge_tangent,
+    imbalance,
+    move_edges,
+    symmetrise,
 )
-from adhesis.solver.sharp.equilibrium.griffith import imbalance, moved_gaps, symmetric, tangent_of
-from adhesis.solver.sharp.equilibrium.last_correction import landed
-from adhesis.solver.sharp.equilibrium.linear_exterior import known_about, open_window
+from adhesis.solver.sharp.equilibrium.last_correction import correct_gaps
+from adhesis.solver.sharp.equilibrium.linear_exterior import linearise_equilibrium, open_window
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.cholesky import is_definite
-from adhesis.solver.sharp.field.cluster_tree import plant
-from adhesis.solver.sharp.field.dense_solver import solve_plain
+from adhesis.solver.sharp.field.cluster_tree import build_tree
+from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
-from adhesis.solver.sharp.field.solution import FIXED, Solution
+from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.tolerances import CORRECTED
@@ -49,9 +51,9 @@ def random_gaps(count, contact, spread, seed=0):
 
 
 def solved(source, gaps, separation, tolerance):
-    digits = -np.log(tolerance)
-    kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
-    return solve_many(gaps, separation, FIXED, kinds, digits, 2, RULES, source.panels)[0], kinds
+    model = FieldModel(FIXED_SEPARATION, -np.log(tolerance), GAUSS_RULES, source.panels)
+    orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+    return solve_many(gaps, separation, orders, 2, model)[0], orders, model
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
@@ -61,12 +63,12 @@ def test_field_equals_the_dense_one(profile, gaps, tolerance):
     source = StressSource(profile, tolerance)
     separation = 0.5 * profile.h_max * profile.q0
     ends = random_gaps(*gaps)
-    tree, kinds = solved(source, ends, separation, tolerance)
-    dense = Solution(*solve_plain(ends, separation, FIXED, kinds, 2, RULES, source.panels))
+    tree, orders, model = solved(source, ends, separation, tolerance)
+    dense = solve(ends, separation, orders, 2, model, NO_EXTERIOR)
     scale = np.abs(dense.opening).max()
     assert np.abs(tree.opening - dense.opening).max() < 2 * tolerance * scale
     assert tree.pressure == pytest.approx(dense.pressure, rel=2 * tolerance)
-    assert tree.unit_mean == pytest.approx(dense.unit_mean, rel=2 * tolerance)
+    assert tree.mean.unit_mean == pytest.approx(dense.mean.unit_mean, rel=2 * tolerance)
 
 
 def test_same_bits(profile):
@@ -83,7 +85,7 @@ def test_work_grows_as_the_number_of_gaps():
     for count in (100, 3200):
         table = map_gaps(random_gaps(count, 0.3, 0.7))
         places = np.linspace(table[:, 0], table[:, 1], 10)[1:-1].T.ravel()
-        tree = plant(
+        tree = build_tree(
             table, 8 * np.arange(count + 1), places, np.ones(8 * count), -np.log(1e-5), True
         )
         share.append([len(tree.theta) / count, (tree.rank.astype(float) ** 3).sum() / count])
@@ -101,11 +103,10 @@ def mechanics(profile, toughness, tolerance=1e-6):
 
 def opened(gaps, edges, separation):
     """Solution with S and S' by the dense solver, imbalance, drift and tangent."""
-    kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
-    panels = edges.source.panels
-    of = Solution(*solve_plain(gaps, separation, FIXED, kinds, 2, RULES, panels))
-    residual, drift = imbalance(of, edges.law, panels)
-    return of, kinds, residual, drift, tangent_of(of, drift, RULES)[0]
+    orders = choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
+    of = solve(gaps, separation, orders, 2, edges.model, NO_EXTERIOR)
+    residual, drift = imbalance(of, edges.law, edges.model.panels)
+    return of, orders, residual, drift, edge_tangent(of, drift, GAUSS_RULES)[0]
 
 
 def test_newton_step_and_stability_equal_the_dense_ones(profile):
@@ -115,16 +116,15 @@ def test_newton_step_and_stability_equal_the_dense_ones(profile):
     verdicts = set()
     for seed in range(12):
         gaps = random_gaps(6, 0.1 + 0.06 * seed, 0.1, seed)
-        of, kinds, residual, drift, tangent = opened(gaps, edges, separation)
+        of, orders, residual, drift, tangent = opened(gaps, edges, separation)
         assert of.opening.min() > 0
         step = np.linalg.solve(tangent, -residual)
-        stable = is_definite(symmetric(of, tangent, edges.law.overlapping)[1])
-        tree, parts = solve_many(
-            gaps, separation, FIXED, kinds, edges.law.digits, 2, RULES, edges.source.panels
-        )
-        found, _, _, verdict = newton_many(tree, parts, residual, drift, FIXED, RULES)
-        assert np.abs(found - step).max() < 1e-3 * np.abs(step).max()
-        assert verdict == stable
+        stable = is_definite(symmetrise(of, tangent, edges.law.overlap_limit)[1])
+        tree, system = solve_many(gaps, separation, orders, 2, edges.model)
+        eliminated = eliminate_edges(tree, system, residual, drift, GAUSS_RULES)
+        found = newton_step(tree, system, eliminated, FIXED_SEPARATION)
+        assert np.abs(found.step - step).max() < 1e-3 * np.abs(step).max()
+        assert found.stable == stable
         verdicts.add(stable)
     assert False in verdicts
 
@@ -143,31 +143,30 @@ def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded
     """Openings and pressure after Newton's step against those of all gaps solved anew."""
     method, state = loaded
     edges = method.edges
-    law, panels = edges.law, edges.source.panels
-    kinds = choose_kinds(map_gaps(state.internal.gaps), law.digits, RULES.counts)
+    law, model = edges.law, edges.model
+    orders = choose_orders(map_gaps(state.internal.gaps), model.digits, GAUSS_RULES.counts)
     wrong, moved = [], []
     for way in (4e-3, 2e-3):
         at = state.separation * method.q0 * (1 - way)
-        given = at, law.hold, kinds, law.digits, 2, RULES, panels
-        of, parts = solve_many(state.internal.gaps, *given)
-        residual, drift = imbalance(of, law, panels)
-        yielding = yielding_gaps(of, parts, residual, drift, RULES)
-        step, _, _, stable, change = newton_step(of, parts, yielding, law.hold)
-        assert stable
-        ends = moved_gaps(state.internal.gaps, step)
-        after, _ = landed(ends, at, law.hold, of, parts, change, RULES, panels)
-        anew, _ = solve_many(ends, *given)
+        of, system = solve_many(state.internal.gaps, at, orders, 2, model)
+        residual, drift = imbalance(of, law, model.panels)
+        eliminated = eliminate_edges(of, system, residual, drift, GAUSS_RULES)
+        newton = newton_step(of, system, eliminated, model.device)
+        assert newton.stable
+        ends = move_edges(state.internal.gaps, newton.step)
+        after, _ = correct_gaps(ends, at, of, system, newton.change, model)
+        anew, _ = solve_many(ends, at, orders, 2, model)
         scale = np.abs(anew.opening).max()
         wrong.append(np.abs(after.opening - anew.opening).max() / scale)
         moved.append(np.abs(of.opening - anew.opening).max() / scale)
-        assert after.weight @ after.f == pytest.approx(2 * np.pi * at, rel=1e-12)
+        assert after.nodes.weight @ after.scaled_opening == pytest.approx(2 * np.pi * at, rel=1e-12)
         assert after.pressure == pytest.approx(anew.pressure, rel=1e-2 * moved[-1])
     assert wrong[0] < 1e-2 * moved[0]
     assert wrong[1] < 0.3 * wrong[0]
 
 
 @pytest.mark.parametrize("follow", [False, True])
-def test_a_window_feels_all_other_gaps(loaded, follow):
+def test_a_window_responds_to_all_other_gaps(loaded, follow):
     """Openings and derivatives in a window are those of all gaps.
 
     With edges that follow outside, its tangent is the Schur complement of all edges'.
@@ -177,44 +176,41 @@ def test_a_window_feels_all_other_gaps(loaded, follow):
     gaps = state.internal.gaps.copy()
     count = len(gaps)
     assert count >= 7
-    kinds = choose_kinds(map_gaps(gaps), edges.law.digits, RULES.counts)
+    orders = choose_orders(map_gaps(gaps), edges.model.digits, GAUSS_RULES.counts)
     first = count - 2
     inside = (first + np.arange(4)) % count  # across the end of the period
-    panels = edges.source.panels
-    about = known_about(gaps, separation, kinds, edges.law, RULES, panels)
-    window, outside, _ = open_window(
-        about, first, 4, np.inf if follow else 0.0, edges.law, RULES, panels
+    model, panels = edges.model, edges.model.panels
+    linear = linearise_equilibrium(gaps, separation, orders, edges.law, model)
+    window, exterior, _ = open_window(
+        linear, first, 4, np.inf if follow else 0.0, edges.law, model
     )
-    tree, parts = solve_many(gaps, separation, FIXED, kinds, edges.law.digits, 2, RULES, panels)
-    found, _, _, stable = newton_many(
-        tree, parts, *imbalance(tree, edges.law, panels), FIXED, RULES
-    )
-    assert stable
-    assert np.abs(found).max() < 1e-3 * edges.wave  # it is an equilibrium for the tree, too
-    panels = panels._replace(outside=outside)
+    tree, system = solve_many(gaps, separation, orders, 2, model)
+    balance = imbalance(tree, edges.law, panels)
+    eliminated = eliminate_edges(tree, system, *balance, GAUSS_RULES)
+    newton = newton_step(tree, system, eliminated, model.device)
+    assert newton.stable
+    assert np.abs(newton.step).max() < 1e-3 * edges.wave  # an equilibrium for the tree, too
     if not follow:
         # exact for whatever the window's edges do
         motion = 0.02 * edges.wave * np.random.default_rng(0).standard_normal((4, 2))
         window[:-1] += motion
         gaps[inside] += motion
     of, _, _, _, tangent = opened(gaps, edges, separation)
-    local = Solution(
-        *solve_plain(window, separation, FIXED, np.append(kinds[inside], 0), 2, RULES, panels)
-    )
+    local = solve(window, separation, np.append(orders[inside], 0), 2, model, exterior)
     own = (2 * inside[:, None] + [0, 1]).ravel()
     scale = np.abs(of.opening).max()
     assert np.abs(local.opening[:-2] - of.opening[own]).max() < 1e-5 * scale
     assert local.pressure == pytest.approx(of.pressure, rel=1e-4)
     if follow:
         residual, drift = imbalance(local, edges.law, panels)
-        assert not residual[-2:].any()  # the ends of the outside stay
-        found = tangent_of(local, drift, RULES)[0][:-2, :-2]
+        assert not residual[-2:].any()  # the ends of the exterior stay
+        found = edge_tangent(local, drift, GAUSS_RULES)[0][:-2, :-2]
         rest = np.setdiff1d(np.arange(2 * count), own)
         others = np.linalg.solve(tangent[np.ix_(rest, rest)], tangent[np.ix_(rest, own)])
         exact = tangent[np.ix_(own, own)] - tangent[np.ix_(own, rest)] @ others
     else:
-        found = derivatives(local, RULES)[0][:-2, :-2]
-        exact = derivatives(of, RULES)[0][np.ix_(own, own)]
+        found = derivatives(local, GAUSS_RULES)[0][:-2, :-2]
+        exact = derivatives(of, GAUSS_RULES)[0][np.ix_(own, own)]
     assert np.abs(found - exact).max() < 1e-5 * np.abs(exact).max()
 
 
@@ -341,14 +337,16 @@ def test_outside_a_window_gaps_follow_to_second_order(in_windows):
     edges, point = in_windows
     lead = int(np.argmax(np.abs(point.rate))) // 2
     count = len(point.gaps)
-    window = Window(point.gaps, point.about, lead - 2, count - 3, edges.law, edges.source.panels)
+    window = Window(
+        point.gaps, point.linearisation, lead - 2, count - 3, edges.law, edges.model
+    )
     errors = []
     for share in (0.0, 1.0, 0.5):
         at = point.at - share * 0.02 * edges.wave / np.abs(point.rate).max()
-        full = edges.equilibrium(point.predicted(at), at, edges.wave)
+        full = edges.equilibrium(point.extrapolate(at), at, edges.wave)
         local = window.gaps.copy()
         local[:-1] += (full.gaps - point.gaps)[(lead - 2 + np.arange(count - 3)) % count]
-        expected = window.everywhere(local, window.kinds, at)
+        expected = window.extend(local, window.orders, at)
         errors.append(np.abs(expected - full.gaps).max() / edges.wave)
     assert errors[0] < 1e-6
     assert 3 < errors[1] / errors[2] < 5

@@ -19,7 +19,7 @@ from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
-from adhesis.solver.sharp.equilibrium.branch_point import Before, Point
+from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
@@ -159,8 +159,8 @@ class Branch:
             return None
         if is_output or may_touch:
             reached = confirmed(reached)
-        previous = Before(self.point.at, self.point.rate, self.point.gaps)
-        return Accepted(reached.behind(previous), is_output, may_touch, remaining), closed
+        previous = PreviousPoint(self.point.at, self.point.rate, self.point.gaps)
+        return Accepted(reached.with_previous(previous), is_output, may_touch, remaining), closed
 
     def _accept(
         self, event: Accepted, closed: float, step: float, window: LocalBranch | None

@@ -22,7 +22,7 @@ def correct(edges: EdgeMechanics, predictor: Predictor, at: float) -> Point | No
     reached = edges.equilibrium(predictor.gaps(at), at, CORRECTED * edges.wave)
     if reached is None or not edges.uses_windows(reached.gaps):
         return reached
-    return reached.after(confirmed(predictor.point))
+    return reached.with_earlier(confirmed(predictor.point))
 
 
 def correct_in_window(

@@ -86,7 +86,7 @@ class Follower:
     def _remember(self, history: History, branch: Branch) -> None:
         """Let the last state remember its point."""
         # What has not closed since the last search need not be searched again.
-        point = branch.point.cleared(max(branch.trail.clearance - branch.trail.closed, 0.0))
+        point = branch.point.with_clearance(max(branch.trail.clearance - branch.trail.closed, 0.0))
         branch.point = point
         memory = Memory(
             point.field.gaps,
@@ -98,7 +98,7 @@ class Follower:
         if self.edges.uses_windows(point.field.gaps):
             self._last = None
         else:
-            self._last = memory, point.behind(None)
+            self._last = memory, point.with_previous(None)
         history.states[-1] = replace(history.states[-1], internal=memory)
 
     def _at_point(

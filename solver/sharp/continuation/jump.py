@@ -77,7 +77,7 @@ class Jumps:
                     other = self._after(before, rival, at)
         jump = self.states.jump(before, after, branch, other)
         if known is not None and point is not None and self.edges.uses_windows(point.gaps):
-            point = point.heir(known, CORRECTED * self.edges.wave)
+            point = point.carry_rates(known, CORRECTED * self.edges.wave)
         return ComputedJump(at, (after,), jump, point)
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
@@ -123,7 +123,7 @@ class Jumps:
                 continue
             least, minima = self.nucleation.least(point.field)
             if least > 0:
-                return point.cleared(least)
+                return point.with_clearance(least)
             grown = descend(point.field.gaps, self.nucleation.ready(minima), point)
             if grown is not None and self._same(grown.field.gaps, point.field.gaps):
                 if adhesive and least < -self.nucleation.overlap:

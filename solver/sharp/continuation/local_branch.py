@@ -20,9 +20,7 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.gap.quadrature import RULES
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
     BRANCH_WINDOW_HALF_WIDTH,
@@ -78,9 +76,9 @@ class LocalBranch:
         """Distance in d of the fold that the earlier rate of each edge predicts; inf for none."""
         start = self.start
         out = np.full(start.rate.shape, np.inf)
-        if start.past is not None:
-            ratio = start.past.rate / start.rate
-            way = np.abs(start.at - start.past.at)
+        if start.earlier is not None:
+            ratio = start.earlier.rate / start.rate
+            way = np.abs(start.at - start.earlier.at)
             rising = (ratio > 0) & (ratio < 1) & (way > 0)
             share = ratio[rising] ** 2
             out[rising] = way[rising] * share / (1 - share)
@@ -94,11 +92,11 @@ class LocalBranch:
         """
         start = self.start
         out = np.zeros(start.rate.shape)
-        if start.past is not None:
-            way = start.at - start.past.at
+        if start.earlier is not None:
+            way = start.at - start.earlier.at
             on = at - start.at
             known = way * on > 0
-            change = (start.rate - start.past.rate)[known]
+            change = (start.rate - start.earlier.rate)[known]
             bend = change * on * on / (2 * way[known])
             fold, way = self._fold_distances[known], np.abs(way[known])
             near = fold < FOLD_BELIEVED * way
@@ -112,7 +110,7 @@ class LocalBranch:
 
     def expected(self, local: Array, at: float) -> Array:
         """Return all gaps at d = ``at`` where those of the window are ``local``."""
-        gaps = self.window.everywhere(local, self.window.kinds, at)
+        gaps = self.window.extend(local, self.window.orders, at)
         gaps[self._outside] += self._curvature(at)[self._outside]
         return gaps
 
@@ -121,7 +119,7 @@ class LocalBranch:
         rates = np.abs(point.rate).reshape(-1, 2).max(axis=1)
         linear = EXTERIOR_MOTION * self.edges.wave / float(rates[self._outside].max())
         self.span = min(self.span, linear)
-        return point.after(self.start)
+        return point.with_earlier(self.start)
 
     def begins_at(self, point: Point) -> bool:
         """Whether it begins at this point."""
@@ -136,8 +134,8 @@ class LocalBranch:
         """Return the window; it is set up when it is first used."""
         edges, start = self.edges, self.start
         return Window(
-            start.gaps, edges.about(start), self._first, len(self.inside), edges.law,
-            edges.source.panels,
+            start.gaps, edges.linearisation(start), self._first, len(self.inside), edges.law,
+            edges.model,
         )  # fmt: skip
 
     def equilibrium(self, gaps: Array, at: float, reach: float) -> LocalPoint | None:
@@ -151,9 +149,9 @@ class LocalBranch:
             return None
         edges = self.edges
         try:
-            found, local, solution, rate, slope, steps = equilibrium(
-                local, at, max(reach, edges.settled), window.kinds, True, edges.law, RULES,
-                window.panels,
+            found, local, of, rate, slope, steps = equilibrium(
+                local, at, max(reach, edges.settled), window.orders, True, edges.law, edges.model,
+                window.exterior,
             )  # fmt: skip
         except np.linalg.LinAlgError:
             return None
@@ -163,11 +161,10 @@ class LocalBranch:
         if not found:
             return None
         # the exterior along its first tangent
-        gaps = self.start.predicted(at)
+        gaps = self.start.extrapolate(at)
         gaps[self.inside] = local[:-1] - np.round(turn / (2 * np.pi)) * 2 * np.pi
         rates = self.start.rate.copy().reshape(-1, 2)
         rates[self.inside] = rate[:-2].reshape(-1, 2)
-        of = Solution(*solution)
         return LocalPoint(self, at, gaps, local, rates.ravel(), slope, of.pressure, of.separation)
 
 

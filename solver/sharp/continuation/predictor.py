@@ -50,7 +50,7 @@ class Predictor:
         rate = point.rate
         self._lead = lead = int(np.argmax(np.abs(rate)))
         self.fastest = abs(float(rate[lead]))
-        earlier = point.before
+        earlier = point.previous
         if earlier is None or earlier.rate.shape != rate.shape or earlier.at == point.at:
             return
         self.way = way = point.at - earlier.at

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.cholesky import factor_rows, solve_column
-from adhesis.solver.sharp.gap.quadrature import Kinds
+from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
     BOUND_SWEEPS,
     BOUND_SWEEPS_CHANGE,
@@ -66,7 +66,7 @@ def bound_constrained_step(matrix: Array, scale: Array, force: Array, limit: Arr
 
 @compiled
 def _reduced_system(
-    matrix: Array, load: Array, active: Flags, y: Array, free: Kinds
+    matrix: Array, load: Array, active: Flags, y: Array, free: Integers
 ) -> tuple[Array, Array]:
     """Reduce matrix and load to the free edges, the active ones standing at their bounds."""
     count = free.shape[0]
@@ -84,7 +84,7 @@ def _reduced_system(
 
 @compiled
 def _free_step(
-    block: Array, right: Array, load: Array, scale: Array, free: Kinds
+    block: Array, right: Array, load: Array, scale: Array, free: Integers
 ) -> tuple[Array, int, float]:
     """Find Newton's step of the free edges, or the edge that becomes active, and its direction.
 
@@ -114,7 +114,7 @@ def _free_step(
 
 
 @compiled
-def _put_free(newton: Array, bound: Array, active: Flags, y: Array, free: Kinds) -> bool:
+def _put_free(newton: Array, bound: Array, active: Flags, y: Array, free: Integers) -> bool:
     """Move the free edges; False where some became active, and the others begin again."""
     inside = True
     for i in range(free.shape[0]):

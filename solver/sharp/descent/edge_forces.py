@@ -12,11 +12,11 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.equilibrium.griffith import Law, imbalance
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, imbalance
 from adhesis.solver.sharp.field.dense_solver import solve, solve_again
-from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.field.exterior import Exterior
+from adhesis.solver.sharp.field.solution import FieldModel, Solution
+from adhesis.solver.sharp.gap.quadrature import Integers
 
 
 class FlowProblem(NamedTuple):
@@ -24,16 +24,16 @@ class FlowProblem(NamedTuple):
 
     Attributes
     ----------
-    law : Law
-        Griffith's condition, what is prescribed, and lengths.
-    rules : Rules
-    panels : Panels
-        Source of the field, with the exterior of a window if there is one.
+    law : EdgeLaw
+        Griffith's condition, and lengths.
+    model : FieldModel
+    exterior : Exterior
+        Of a window; NO_EXTERIOR where all gaps descend.
     """
 
-    law: Law
-    rules: Rules
-    panels: Panels
+    law: EdgeLaw
+    model: FieldModel
+    exterior: Exterior
 
 
 class Forces(NamedTuple):
@@ -67,19 +67,19 @@ class ForceRows(NamedTuple):
     """
 
     values: Array
-    known: Kinds
+    known: Integers
 
 
 @compiled
 def forces_at(
-    gaps: Array, prescribed: float, kinds: Kinds, before: Solution, system: FlowProblem
+    gaps: Array, prescribed: float, orders: Integers, before: Solution, system: FlowProblem
 ) -> Forces:
     """Solve the field of these gaps, and evaluate the forces.
 
     Nodes, moments and kernels of gaps that are as they were in the solution ``before`` are kept.
     """
-    law, panels = system.law, system.panels
-    solution = solve_again(gaps, prescribed, law.hold, kinds, system.rules, panels, before)
+    law, panels = system.law, system.model.panels
+    solution = solve_again(gaps, prescribed, orders, system.model, system.exterior, before)
     edges = 2 * gaps.shape[0]
     slope = np.full(edges, np.nan)
     if not np.isfinite(solution.pressure):
@@ -109,12 +109,11 @@ def energy_change(before: Array, after: Array, step: Array) -> tuple[float, floa
 
 @compiled
 def slope_along(
-    gaps: Array, step: Array, prescribed: float, kinds: Kinds, system: FlowProblem
+    gaps: Array, step: Array, prescribed: float, orders: Integers, system: FlowProblem
 ) -> float:
     """Evaluate the force along ``step`` at these gaps: positive where the energy falls."""
-    law, rules, panels = system.law, system.rules, system.panels
-    of = solve(gaps, prescribed, law.hold, kinds, 1, rules, panels)
-    residual, _ = imbalance(of, law, panels)
+    of = solve(gaps, prescribed, orders, 1, system.model, system.exterior)
+    residual, _ = imbalance(of, system.law, system.model.panels)
     force = 0.0
     for e in range(step.shape[0]):
         force -= residual[e] * (2 * of.opening[e] - residual[e]) * step[e]
@@ -122,10 +121,10 @@ def slope_along(
 
 
 @compiled
-def force_rates(now: Forces, way: Array, edges: Kinds, rows: Array) -> Array:
+def force_rates(now: Forces, way: Array, edges: Integers, rows: Array) -> Array:
     """Differentiate the force on each of ``edges``, along its own way, by the way of all edges.
 
-    ``rows`` are those of ``force_along_step.forces_on``.
+    ``rows`` are those of ``force_along_step.force_derivatives``.
     """
     of = now.solution
     rates = np.empty(edges.shape[0])

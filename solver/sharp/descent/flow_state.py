@@ -30,9 +30,9 @@ from adhesis.solver.sharp.descent.step_size import (
     running_edges,
     with_running,
 )
-from adhesis.solver.sharp.equilibrium.griffith import moved_gaps
-from adhesis.solver.sharp.field.force_along_step import first_fall, forces_on
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.equilibrium.griffith import move_edges
+from adhesis.solver.sharp.field.force_along_step import first_zero, force_derivatives
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 from adhesis.solver.sharp.tolerances import ENERGY_ROUNDING, LEAST_STEP_SHARE, STANDING_SHARE
 
 
@@ -47,7 +47,7 @@ class LongStep(NamedTuple):
         Derivatives of the forces on them along the step, at its start.
     """
 
-    edges: Kinds
+    edges: Integers
     rates: Array
 
 
@@ -59,7 +59,7 @@ class State(NamedTuple):
     gaps : array, shape (L, 2)
         After the step.
     start : array, shape (L, 2)
-        Before it.
+        PreviousPoint it.
     step : array, shape (2L,)
         Outward motion of the contact at every edge; zero where there was no step.
     slope : array, shape (2L,)
@@ -93,18 +93,18 @@ def initial_state(gaps: Array) -> State:
 
 
 @compiled
-def share_to_minimum(state: State, now: Forces, rows: ForceRows, rules: Rules) -> float:
+def share_to_minimum(state: State, now: Forces, rows: ForceRows, rules: GaussRules) -> float:
     """Find the share of a long step after which the force on a running edge vanishes, or 1."""
     edges = state.long.edges
     if edges.shape[0] == 0:
         return 1.0
-    forces_on(now.solution, edges, rules, rows.values, rows.known)
+    force_derivatives(now.solution, edges, rules, rows.values, rows.known)
     rates = force_rates(now, state.step, edges, rows.values)
     share = 1.0
     for i in range(edges.shape[0]):
         e = edges[i]
         onwards = -np.sign(state.step[e])
-        fallen = first_fall(
+        fallen = first_zero(
             onwards * state.slope[e], state.long.rates[i], onwards * now.slope[e], rates[i]
         )
         share = min(share, fallen)
@@ -129,7 +129,7 @@ def accepted_share(state: State, slope: Array, to_minimum: float) -> float:
 def taken_back(state: State, share: float) -> State:
     """Put the edges where they were after a ``share`` of the last step: 0 rejects the step."""
     if share > 0:
-        gaps, size = moved_gaps(state.start, share * state.step), after_cut(state.size)
+        gaps, size = move_edges(state.start, share * state.step), after_cut(state.size)
     else:
         gaps, size = state.start, after_rejection(state.size)
     stand = np.zeros(state.step.shape[0])
@@ -171,7 +171,7 @@ def moved(
     lengths: StepLengths,
     limit: Array,
     rows: ForceRows,
-    rules: Rules,
+    rules: GaussRules,
 ) -> State:
     """Take a step from a state that was accepted; ``step`` is changed in place.
 
@@ -190,8 +190,8 @@ def moved(
             if np.any(now.slope[running] * step[running] >= 0):
                 step *= lengths.unchecked / size
             else:
-                forces_on(now.solution, running, rules, rows.values, rows.known)
+                force_derivatives(now.solution, running, rules, rows.values, rows.known)
                 long = LongStep(running, force_rates(now, step, running, rows.values))
     size_control = with_running(state.size, running.shape[0])
-    gaps = moved_gaps(state.gaps, step)
+    gaps = move_edges(state.gaps, step)
     return State(gaps, state.gaps, step, now.slope, long, size_control)

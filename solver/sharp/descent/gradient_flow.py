@@ -45,16 +45,16 @@ from adhesis.solver.sharp.descent.trajectory import (
     without_last,
 )
 from adhesis.solver.sharp.equilibrium.griffith import (
-    Law,
-    at_least,
-    narrowest,
+    EdgeLaw,
+    edge_tangent,
+    raise_orders,
+    shortest_length,
     step_limits,
-    symmetric,
-    tangent_of,
+    symmetrise,
 )
-from adhesis.solver.sharp.field.solution import without_field
+from adhesis.solver.sharp.field.solution import FieldModel, no_solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import Kinds, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
 from adhesis.solver.sharp.tolerances import COMPARISONS, FIELDS_PER_COMPARISON
 
 # Events that end a descent.
@@ -74,8 +74,8 @@ class Descent(NamedTuple):
         Where it ended.
     event : int
         Why: one of the events of this module.
-    kinds : int array, shape (L,)
-        Kinds of the gaps.
+    orders : int array, shape (L,)
+        Integers of the gaps.
     fields, tangents : int
         Fields and tangents that were computed.
     trajectory : array, shape (n, 2L)
@@ -90,7 +90,7 @@ class Descent(NamedTuple):
 
     gaps: Array
     event: int
-    kinds: Kinds
+    orders: Integers
     fields: int
     tangents: int
     trajectory: Array
@@ -104,7 +104,7 @@ def descend(
     gaps: Array,
     prescribed: float,
     most_fields: int,
-    least: Kinds,
+    least: Integers,
     equal_speeds: bool,
     system: FlowProblem,
     comparison: Comparison,
@@ -113,22 +113,22 @@ def descend(
 
     No edge moves in a step by more than the longest step, or a quarter of the gap or patch that it
     may close. Forces are always fresh; a tangent serves several steps while edges run, unless one
-    turns. ``least`` are the least kinds of the gaps, empty for any.
+    turns. ``least`` are the least orders of the gaps, empty for any.
     """
-    law, rules = system.law, system.rules
+    law, rules = system.law, system.model.rules
     state = initial_state(gaps)
     trajectory = begun(gaps)
-    kinds = least
+    orders = least
     edges = 2 * gaps.shape[0]
-    solution = without_field(map_gaps(gaps), np.empty(0, dtype=np.int64), law.hold)
+    solution = no_solution(map_gaps(gaps), np.empty(0, dtype=np.int64), system.model.device)
     rows = ForceRows(np.zeros((edges, edges)), np.zeros(edges, dtype=np.int64))
     interaction = np.zeros((edges, edges))
     values, matrix = np.zeros(edges), np.zeros((edges, edges))
     fields, tangents, event = 0, 0, STEP_LIMIT
     while fields < most_fields:
         fields += 1
-        kinds = at_least(choose_kinds(map_gaps(state.gaps), law.digits, rules.counts), kinds)
-        now = forces_at(state.gaps, prescribed, kinds, solution, system)
+        orders = raise_orders(least_orders(state.gaps, system.model), orders)
+        now = forces_at(state.gaps, prescribed, orders, solution, system)
         solution = now.solution
         if not np.isfinite(solution.pressure):
             event = NO_FIELD
@@ -142,7 +142,7 @@ def descend(
         state = accepted(state, now.slope)
         note_force(trajectory, now.slope)
         if fields % FIELDS_PER_COMPARISON == 0:
-            comparison = compared(comparison, state.gaps, law.longest)
+            comparison = compared(comparison, state.gaps, law.longest_step)
             if comparison.matches == COMPARISONS:
                 event = REJOINED
                 break
@@ -150,16 +150,16 @@ def descend(
         if not keeps:
             tangents += 1
             values, matrix = linearise(now, rows, equal_speeds, system)
-        state, lengths = bounded(state, law.longest)
-        model = QuadraticModel(values, matrix, step_limits(solution.table, lengths.reach))
-        step = kinetic_step(model, now, equal_speeds, law.faint)
+        state, lengths = bounded(state, law.longest_step)
+        model = QuadraticModel(values, matrix, step_limits(solution.nodes.table, lengths.reach))
+        step = kinetic_step(model, now, equal_speeds, law.force_error)
         if keeps and turns_back(step, state.step, lengths.reach):
             state = turned(state)
             continue
-        close_overlaps(step, solution.opening, model.limit, law.overlapping)
-        if not keeps and np.abs(step).max() <= law.coarse:
+        close_overlaps(step, solution.opening, model.limit, law.overlap_limit)
+        if not keeps and np.abs(step).max() <= law.field_error:
             step, tried = step_off_saddle(
-                step, model, state.gaps, prescribed, kinds, equal_speeds, system
+                step, model, state.gaps, prescribed, orders, equal_speeds, system
             )
             fields += tried
         length = np.abs(step).max()
@@ -176,8 +176,15 @@ def descend(
     points = trajectory.points[: trajectory.length]
     forces = trajectory.forces[: trajectory.length - 1]
     return Descent(
-        state.gaps, event, kinds, fields, tangents, points, forces, comparison.has_left, interaction
-    )
+        state.gaps, event, orders, fields, tangents, points, forces, comparison.has_left,
+        interaction,
+    )  # fmt: skip
+
+
+@compiled
+def least_orders(gaps: Array, model: FieldModel) -> Integers:
+    """Choose the order of each gap's rule by the accuracy of the field."""
+    return choose_orders(map_gaps(gaps), model.digits, model.rules.counts)
 
 
 @compiled
@@ -195,11 +202,11 @@ def backed_up(
 
 
 @compiled
-def event_after(gaps: Array, length: float, law: Law) -> int:
+def event_after(gaps: Array, length: float, law: EdgeLaw) -> int:
     """Detect an event after a step of this length; STEP_LIMIT if there is none."""
-    if narrowest(gaps) < law.smallest:
+    if shortest_length(gaps) < law.smallest:
         return VANISHED
-    return AT_REST if length < law.near else STEP_LIMIT
+    return AT_REST if length < law.rest_step else STEP_LIMIT
 
 
 @compiled
@@ -208,7 +215,7 @@ def linearise(
 ) -> tuple[Array, Array]:
     """Linearise the forces about the present edges: values and matrix of the quadratic model."""
     law, of = system.law, now.solution
-    tangent, _ = tangent_of(of, now.drift, system.rules)
+    tangent, _ = edge_tangent(of, now.drift, system.model.rules)
     edges = tangent.shape[0]
     for e in range(edges):
         for f in range(edges):
@@ -216,7 +223,7 @@ def linearise(
         rows.values[e, e] += of.opening[e] * now.drift[e] * (1 - 2 * (e % 2))
     rows.known[:] = 1
     if equal_speeds:
-        values, matrix = symmetric(of, tangent, law.overlapping)
+        values, matrix = symmetrise(of, tangent, law.overlap_limit)
     else:
         opening = np.maximum(of.opening, 0.0)
         values, matrix = np.linalg.eigh(hessian(opening, now.residual, now.drift, tangent))

@@ -17,12 +17,12 @@ from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.descent.edge_forces import FlowProblem
 from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD, VANISHED, Descent, descend
 from adhesis.solver.sharp.descent.trajectory import Comparison
-from adhesis.solver.sharp.equilibrium.griffith import Law
-from adhesis.solver.sharp.equilibrium.linear_exterior import About
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation
 from adhesis.solver.sharp.equilibrium.window import Window
+from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.ends import without_small
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import RULES, Kinds
+from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
     LOCAL_WINDOW_FIELDS,
     LOCAL_WINDOW_MARGIN,
@@ -46,16 +46,16 @@ class KnownState:
     ----------
     gaps : array, shape (L, 2)
         Gaps of the equilibrium.
-    about : About
+    about : Linearisation
     leading_gap : int
         Middle of the window where no gap differs.
     """
 
-    def __init__(self, gaps: Array, about: About, leading_gap: int) -> None:
+    def __init__(self, gaps: Array, about: Linearisation, leading_gap: int) -> None:
         self._gaps, self._about, self._leading_gap = gaps, about, leading_gap
         self._windows: dict[tuple[int, int], Window] = {}  # two descents begin in one
 
-    def window(self, gaps: Array, law: Law, panels: Panels) -> Window | None:
+    def window(self, gaps: Array, law: EdgeLaw, model: FieldModel) -> Window | None:
         """Open a window around the gaps that differ; None if they lie in many places."""
         known = self._gaps
         count = len(known)
@@ -72,15 +72,15 @@ class KnownState:
             return None
         span = (begin - LOCAL_WINDOW_MARGIN) % count, width
         if span not in self._windows:
-            self._windows[span] = Window(known, self._about, *span, law, panels)
+            self._windows[span] = Window(known, self._about, *span, law, model)
         return self._windows[span]
 
     def descend(
         self,
         gaps: Array,
         prescribed: float,
-        law: Law,
-        panels: Panels,
+        law: EdgeLaw,
+        model: FieldModel,
         count: Counters,
         smallest: float,
         *,
@@ -90,14 +90,14 @@ class KnownState:
 
         Gaps and patches shorter than ``smallest`` are left out on the way; the work is counted.
         """
-        window = self.window(gaps, law, panels)
-        if window is None or not window.sound:
+        window = self.window(gaps, law, model)
+        if window is None or not window.exterior_is_stable:
             return None
-        system = FlowProblem(law, RULES, window.panels)
-        inside, kinds = window.rows(gaps), window.kinds
+        system = FlowProblem(law, model, window.exterior)
+        inside, orders = window.restrict(gaps), window.orders
         while True:
-            found = _descend_inside(inside, prescribed, kinds, equal_speeds, system)
-            inside, kinds = found.gaps, found.kinds
+            found = _descend_inside(inside, prescribed, orders, equal_speeds, system)
+            inside, orders = found.gaps, found.orders
             count.fields += found.fields
             count.descent_steps += found.fields
             count.derivatives += found.tangents
@@ -107,17 +107,17 @@ class KnownState:
             inside = left
         if found.event == NO_FIELD:
             return None
-        everywhere = window.everywhere(inside, kinds, prescribed)
+        everywhere = window.extend(inside, orders, prescribed)
         if not np.isfinite(everywhere).all():
             return None
         return LocalDescent(everywhere, inside, found.event)
 
 
 def _descend_inside(
-    inside: Array, prescribed: float, kinds: Kinds, equal_speeds: bool, system: FlowProblem
+    inside: Array, prescribed: float, orders: Integers, equal_speeds: bool, system: FlowProblem
 ) -> Descent:
-    """Descend in a window, from kinds that its gaps may have had before some went."""
-    if len(inside) != len(kinds):
-        kinds = np.zeros(len(inside), dtype=np.int64)
+    """Descend in a window, from orders that its gaps may have had before some went."""
+    if len(inside) != len(orders):
+        orders = np.zeros(len(inside), dtype=np.int64)
     alone = Comparison(np.empty((0, inside.size)), False, 0)
-    return descend(inside, prescribed, LOCAL_WINDOW_FIELDS, kinds, equal_speeds, system, alone)
+    return descend(inside, prescribed, LOCAL_WINDOW_FIELDS, orders, equal_speeds, system, alone)

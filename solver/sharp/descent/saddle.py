@@ -9,10 +9,10 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.edge_forces import FlowProblem, slope_along
-from adhesis.solver.sharp.equilibrium.griffith import moved_gaps
+from adhesis.solver.sharp.equilibrium.griffith import move_edges
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.gap.conformal_map import LEFT, map_gaps
-from adhesis.solver.sharp.gap.quadrature import Kinds
+from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import EQUAL_AMPLITUDES, EQUAL_GAINS, EQUAL_MODES
 
 
@@ -40,7 +40,7 @@ def step_off_saddle(
     model: QuadraticModel,
     gaps: Array,
     prescribed: float,
-    kinds: Kinds,
+    orders: Integers,
     equal_speeds: bool,
     system: FlowProblem,
 ) -> tuple[Array, int]:
@@ -57,8 +57,8 @@ def step_off_saddle(
         return step, 0
     order = positions(map_gaps(gaps), system.law.origin)
     way = leaving_step(model.values, model.matrix, model.limit, order)
-    onwards = slope_along(moved_gaps(gaps, way), way, prescribed, kinds, system)
-    backwards = slope_along(moved_gaps(gaps, -way), -way, prescribed, kinds, system)
+    onwards = slope_along(move_edges(gaps, way), way, prescribed, orders, system)
+    backwards = slope_along(move_edges(gaps, -way), -way, prescribed, orders, system)
     if not max(onwards, backwards) > 0:
         return step, 2
     return (way if onwards >= backwards * (1 - EQUAL_GAINS) else -way), 2

@@ -1,6 +1,6 @@
 """Control of the step size in a descent, compiled.
 
-A step is bounded by the longest step of a running edge (``Law.longest``) times three factors:
+A step is bounded by the longest step of a running edge (``EdgeLaw.longest``) times three factors:
 
 - ``share``, halved when a step raised the energy, doubled after each that lowered it;
 - a reduction for a single edge that turns to and fro over a minimum;
@@ -16,7 +16,7 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.gap.quadrature import Kinds
+from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
     LEAST_STEP_SHARE,
     LONGEST_STRIDE,
@@ -136,7 +136,7 @@ def turns_back(step: Array, last: Array, reach: float) -> bool:
 
 
 @compiled
-def running_edges(step: Array, longest: float) -> Kinds:
+def running_edges(step: Array, longest: float) -> Integers:
     """List the edges that run in a step: none if the step is short."""
     size = np.abs(step).max()
     if size > RUNNING_LENGTH * longest:

@@ -25,21 +25,24 @@ from adhesis.solver.sharp.descent.gradient_flow import (
     descend,
 )
 from adhesis.solver.sharp.descent.trajectory import Comparison
-from adhesis.solver.sharp.equilibrium.edge_elimination import newton_step, yielding_gaps
+from adhesis.solver.sharp.equilibrium.edge_elimination import eliminate_edges, newton_step
 from adhesis.solver.sharp.equilibrium.griffith import (
-    Law,
-    at_least,
+    EdgeLaw,
     imbalance,
-    moved_gaps,
-    narrowest,
+    move_edges,
+    raise_orders,
+    shortest_length,
     step_limits,
 )
-from adhesis.solver.sharp.equilibrium.linear_exterior import About, following, open_window
-from adhesis.solver.sharp.field.hierarchical_solver import Gaps, solve_many
+from adhesis.solver.sharp.equilibrium.linear_exterior import (
+    Linearisation,
+    exterior_motion,
+    open_window,
+)
+from adhesis.solver.sharp.field.hierarchical_solver import HierarchicalSystem, solve_many
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import with_outside
-from adhesis.solver.sharp.gap.quadrature import Kinds, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
 from adhesis.solver.sharp.tolerances import (
     FAR_FROM_BALANCE,
     FOLLOWING_SHARE,
@@ -55,7 +58,7 @@ class Linearised(NamedTuple):
 
     Attributes
     ----------
-    about : About
+    about : Linearisation
     residual : array, shape (2L,)
         C - C_c.
     step : array, shape (2L,)
@@ -64,7 +67,7 @@ class Linearised(NamedTuple):
         Whether the energy is stable in all edges.
     """
 
-    about: About
+    about: Linearisation
     residual: Array
     step: Array
     stable: bool
@@ -100,7 +103,7 @@ def descend_many(
     gaps: Array,
     prescribed: float,
     most_fields: int,
-    least: Kinds,
+    least: Integers,
     equal_speeds: bool,
     system: FlowProblem,
 ) -> Descent:
@@ -113,28 +116,27 @@ def descend_many(
     count = gaps.shape[0]
     half = WINDOW_HALF_WIDTH
     newton_steps = 0
-    kinds = least
+    orders = least
     while fields < most_fields:
         table = map_gaps(gaps)
-        kinds = at_least(choose_kinds(table, law.digits, system.rules.counts), kinds)
-        of, parts = solve_many(
-            gaps, prescribed, law.hold, kinds, law.digits, 2, system.rules, system.panels
-        )
+        model = system.model
+        orders = raise_orders(choose_orders(table, model.digits, model.rules.counts), orders)
+        of, parts = solve_many(gaps, prescribed, orders, 2, model)
         fields += 1
         tangents += 1
         if not np.isfinite(of.pressure):
             event = NO_FIELD
             break
         now = linearised(of, parts, system)
-        if now.stable and np.abs(now.step).max() < law.near:
-            gaps = moved_gaps(gaps, now.step)
+        if now.stable and np.abs(now.step).max() < law.rest_step:
+            gaps = move_edges(gaps, now.step)
             event = AT_REST
             break
-        limit = step_limits(table, law.longest)
+        limit = step_limits(table, law.longest_step)
         inside = np.all(np.abs(now.step) <= limit)
         if now.stable and newton_steps < NEWTON_STEPS_IN_A_ROW and inside:
             newton_steps += 1
-            gaps = moved_gaps(gaps, now.step)
+            gaps = move_edges(gaps, now.step)
             continue
         newton_steps = 0
         width = min(2 * half + 1, count - 2)
@@ -151,11 +153,11 @@ def descend_many(
         gaps = all_gaps(gaps, span, found)
         for i in range(width):
             k = (span.first + i) % count
-            kinds[k] = max(kinds[k], found.inside.kinds[i])
-        if found.inside.event == VANISHED or narrowest(gaps) < law.smallest:
+            orders[k] = max(orders[k], found.inside.orders[i])
+        if found.inside.event == VANISHED or shortest_length(gaps) < law.smallest:
             event = VANISHED
             break
-        if found.progress > law.near:
+        if found.progress > law.rest_step:
             half = WINDOW_HALF_WIDTH
         elif 2 * half + 1 >= count - 2 or half >= WINDOW_WIDEST:
             event = AT_REST
@@ -163,21 +165,21 @@ def descend_many(
         else:
             half = min(2 * half, WINDOW_WIDEST)
     none = np.empty((0, 0))
-    return Descent(gaps, event, kinds, fields, tangents, none, np.empty(0), False, none)
+    return Descent(gaps, event, orders, fields, tangents, none, np.empty(0), False, none)
 
 
 @compiled
-def linearised(of: Solution, parts: Gaps, system: FlowProblem) -> Linearised:
+def linearised(of: Solution, parts: HierarchicalSystem, system: FlowProblem) -> Linearised:
     """Linearise the solved field of all gaps about their edges."""
-    residual, drift = imbalance(of, system.law, system.panels)
-    edges = yielding_gaps(of, parts, residual, drift, system.rules)
-    about = About(of, parts.w, parts.blocks, parts.inverse, edges)
-    step, _, _, stable, _ = newton_step(of, parts, edges, system.law.hold)
+    residual, drift = imbalance(of, system.law, system.model.panels)
+    edges = eliminate_edges(of, parts, residual, drift, system.model.rules)
+    about = Linearisation(of, parts.inverse, parts.weights, edges)
+    step, _, _, stable, _ = newton_step(of, parts, edges, system.model.device)
     return Linearised(about, residual, step, stable)
 
 
 @compiled
-def leading_gap(residual: Array, step: Array, law: Law) -> int:
+def leading_gap(residual: Array, step: Array, law: EdgeLaw) -> int:
     """Choose the gap in the middle of a window: of the edge furthest from balance or from rest."""
     if np.abs(residual).max() > FAR_FROM_BALANCE * law.critical:
         return int(np.argmax(np.abs(residual))) // 2
@@ -186,7 +188,7 @@ def leading_gap(residual: Array, step: Array, law: Law) -> int:
 
 @compiled
 def descend_in_window(
-    about: About,
+    about: Linearisation,
     span: Span,
     prescribed: float,
     most_fields: int,
@@ -195,24 +197,23 @@ def descend_in_window(
     system: FlowProblem,
 ) -> WindowDescent:
     """Descend in a window; with all edges outside held if there is no field where they follow."""
-    law, rules, panels = system.law, system.rules, system.panels
-    count = about.of.kinds.shape[0]
-    kinds = np.zeros(span.width + 1, dtype=np.int64)
+    law, model = system.law, system.model
+    known = about.solution.nodes.orders
+    count = known.shape[0]
+    orders = np.zeros(span.width + 1, dtype=np.int64)
     for i in range(span.width):
-        kinds[i] = about.of.kinds[(span.first + i) % count]
-    follow = FOLLOWING_SHARE * law.longest
-    window, outside, outer = open_window(about, span.first, span.width, follow, law, rules, panels)
-    held = outer.response.negative != 0
+        orders[i] = known[(span.first + i) % count]
+    follow = FOLLOWING_SHARE * law.longest_step
+    window, exterior, outside = open_window(about, span.first, span.width, follow, law, model)
+    held = outside.factor.negative != 0
     fields, tangents = 0, 0
     while True:
         if held:
-            window, outside, outer = open_window(
-                about, span.first, span.width, 0.0, law, rules, panels
-            )
-        inside_system = FlowProblem(law, rules, with_outside(panels, outside))
+            window, exterior, outside = open_window(about, span.first, span.width, 0.0, law, model)
+        inside_system = FlowProblem(law, model, exterior)
         alone = Comparison(np.empty((0, window.size)), False, 0)
         inside = descend(
-            window, prescribed, min(WINDOW_FIELDS, most_fields - fields), kinds, equal_speeds,
+            window, prescribed, min(WINDOW_FIELDS, most_fields - fields), orders, equal_speeds,
             inside_system, alone,
         )  # fmt: skip
         fields += inside.fields
@@ -220,10 +221,9 @@ def descend_in_window(
         event = inside.event
         motion = np.empty(0)
         if event != NO_FIELD:
-            motion = following(
-                inside.gaps, prescribed, inside.kinds, outer, about, limit, law, rules,
-                inside_system.panels,
-            )  # fmt: skip
+            motion = exterior_motion(
+                inside.gaps, prescribed, inside.orders, exterior, outside, about, limit, model
+            )
             if not np.all(np.isfinite(motion)):  # the window came to edges without a field
                 event = NO_FIELD
         if event != NO_FIELD or held:
@@ -232,7 +232,7 @@ def descend_in_window(
     progress = np.abs(inside.gaps[: span.width] - window[: span.width]).max()
     return WindowDescent(
         Descent(
-            inside.gaps, event, inside.kinds, fields, tangents, inside.trajectory, inside.forces,
+            inside.gaps, event, inside.orders, fields, tangents, inside.trajectory, inside.forces,
             False, inside.interaction,
         ),
         motion,

@@ -1,4 +1,4 @@
-"""Points of a branch: stable equilibria of the edges, how they move there, and did before."""
+"""Points of a branch: stable equilibria of the edges, with their rates there and before."""
 
 from __future__ import annotations
 
@@ -8,23 +8,21 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.linear_exterior import About
+from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.ends import outward
-
-_SHORT = 0.3  # share of the way to an earlier point below which a nearer one tells less of a branch
-_CHANGED = 0.3  # share by which the rate of an edge may change in a jump that does not concern it
+from adhesis.solver.sharp.tolerances import CHANGED_RATE, SHORT_SPAN
 
 
-class Past(NamedTuple):
-    """Of every edge of a branch, d at an earlier place and its rate there; NaN if not known."""
+class EarlierRates(NamedTuple):
+    """Earlier rate of every edge of a branch, and d there; NaN if not known."""
 
     at: Array
     rate: Array
 
 
-class Before(NamedTuple):
-    """d, and rate and place of every edge, at an earlier point of a branch; see :class:`Point`."""
+class PreviousPoint(NamedTuple):
+    """d, and rate and place of every edge, at the point before one; see :class:`Point`."""
 
     at: float
     rate: Array
@@ -46,12 +44,12 @@ class Point:
         dY/dd along the branch: Y is p, under a load q0 s.
     clearance : float
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
-    before : Before, optional
+    previous : PreviousPoint, optional
         The point before it on its branch.
-    about : About, optional
-        Of many gaps: what windows on it are opened with.
-    past : Past, optional
-        Likewise: how its edges moved earlier.
+    linearisation : Linearisation, optional
+        Of many gaps: for windows on it.
+    earlier : EarlierRates, optional
+        Of many gaps: rates of its edges at an earlier point.
     """
 
     at: float
@@ -59,9 +57,9 @@ class Point:
     rate: Array
     slope: float
     clearance: float = 0.0
-    before: Before | None = None
-    about: About | None = None
-    past: Past | None = None
+    previous: PreviousPoint | None = None
+    linearisation: Linearisation | None = None
+    earlier: EarlierRates | None = None
 
     @property
     def gaps(self) -> Array:
@@ -78,13 +76,13 @@ class Point:
         """Separation q0 s."""
         return self.field.separation
 
-    def cleared(self, clearance: float) -> Self:
-        """Return this point with its clearance known."""
+    def with_clearance(self, clearance: float) -> Self:
+        """Return this point with its clearance."""
         return self._with("clearance", clearance)
 
-    def behind(self, before: Before | None) -> Self:
-        """Return this point with the one before it known."""
-        return self._with("before", before)
+    def with_previous(self, previous: PreviousPoint | None) -> Self:
+        """Return this point with the one before it."""
+        return self._with("previous", previous)
 
     def _with(self, name: str, value: object) -> Self:
         point = object.__new__(type(self))  # copy() and replace() take ten times as long
@@ -93,7 +91,7 @@ class Point:
         return point
 
     def fold_displacement(self, change: Array) -> float:
-        """Change in d of the fold next to this point when the openings C of given edges change.
+        """Estimate how far in d the next fold moves when the openings C of given edges change.
 
         At a fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
         vector. Scaled by sqrt(C_e/C_f) it is symmetric, so its left null vector is
@@ -108,44 +106,44 @@ class Point:
         by_prescribed = self.field.opening_by_prescribed.ravel()
         return -float(left @ change.ravel() / (left @ by_prescribed))
 
-    def after(self, earlier: Point) -> Point:
-        """Return this point with what ``earlier``, one of the same gaps, tells of its past."""
-        at, rate = np.full(earlier.rate.shape, earlier.at), earlier.rate
-        if earlier.past is not None:
-            # rates of too near a point tell little
-            near = np.abs(self.at - at) < _SHORT * np.abs(self.at - earlier.past.at)
-            at = np.where(near, earlier.past.at, at)
-            rate = np.where(near, earlier.past.rate, rate)
-        return self._with("past", Past(at, rate))
+    def with_earlier(self, point: Point) -> Point:
+        """Return this point with the rates of its edges at ``point``, earlier on its branch."""
+        at, rate = np.full(point.rate.shape, point.at), point.rate
+        if point.earlier is not None:
+            # rates of too near a point have too large an error
+            near = np.abs(self.at - at) < SHORT_SPAN * np.abs(self.at - point.earlier.at)
+            at = np.where(near, point.earlier.at, at)
+            rate = np.where(near, point.earlier.rate, rate)
+        return self._with("earlier", EarlierRates(at, rate))
 
-    def heir(self, earlier: Point, near: float) -> Point:
-        """Return this point, which a jump led to from ``earlier``, with the past of its edges.
+    def carry_rates(self, point: Point, reach: float) -> Point:
+        """Carry the earlier rates of edges across a jump from ``point`` to this one.
 
-        Those that moved by less than ``near``, and whose rate is still much the same.
+        They count for edges that moved by less than ``reach``, and whose rate is much the same.
         """
-        past = Past(np.full(self.rate.shape, np.nan), np.full(self.rate.shape, np.nan))
-        if earlier.past is not None:
-            place = np.searchsorted(earlier.gaps[:, 0], self.gaps[:, 0] - near)
-            place = np.minimum(place, len(earlier.gaps) - 1)
+        earlier = EarlierRates(np.full(self.rate.shape, np.nan), np.full(self.rate.shape, np.nan))
+        if point.earlier is not None:
+            place = np.searchsorted(point.gaps[:, 0], self.gaps[:, 0] - reach)
+            place = np.minimum(place, len(point.gaps) - 1)
             edge = (2 * place[:, None] + [0, 1]).ravel()
-            moved = np.abs(earlier.gaps[place] - self.gaps).ravel()
-            other = np.abs(earlier.rate[edge] - self.rate) > _CHANGED * np.abs(self.rate)
-            same = (moved < near) & ~other
-            past.at[same] = earlier.past.at[edge[same]]
-            past.rate[same] = earlier.past.rate[edge[same]]
-        return self._with("past", past)
+            moved = np.abs(point.gaps[place] - self.gaps).ravel()
+            other = np.abs(point.rate[edge] - self.rate) > CHANGED_RATE * np.abs(self.rate)
+            same = (moved < reach) & ~other
+            earlier.at[same] = point.earlier.at[edge[same]]
+            earlier.rate[same] = point.earlier.rate[edge[same]]
+        return self._with("earlier", earlier)
 
-    def towards(self, other: Point, at: float) -> Array:
-        """Gaps at d = ``at`` between this point and another of the same branch, by a cubic."""
-        way = other.at - self.at
-        t = (at - self.at) / way
+    def interpolate(self, other: Point, at: float) -> Array:
+        """Interpolate the gaps at d = ``at`` between two points of one branch, by a cubic."""
+        span = other.at - self.at
+        t = (at - self.at) / span
         sign = outward(self.gaps)
-        begin, end = ((sign * p.rate * way).reshape(-1, 2) * (t * (1 - t)) for p in (self, other))
+        begin, end = ((sign * p.rate * span).reshape(-1, 2) * (t * (1 - t)) for p in (self, other))
         straight = self.gaps + (other.gaps - self.gaps) * (t * t * (3 - 2 * t))
         cubic: Array = straight + begin * (1 - t) - end * t
         return cubic
 
-    def predicted(self, at: float) -> Array:
-        """Gaps at d = ``at``, along the tangent."""
+    def extrapolate(self, at: float) -> Array:
+        """Extrapolate the gaps to d = ``at``, along the tangent."""
         motion = outward(self.gaps) * self.rate * (at - self.at)
         return self.gaps + motion.reshape(-1, 2)

@@ -2,11 +2,10 @@
 
 An edge follows its own opening: C_e = C_c at each. So a gap whose edges may move responds to the
 potentials of the others like one with held edges, only more compliantly; with the motions n of its
-two edges eliminated, its charges are again q = q° - R g, and the tree
-(``cluster_tree``) solves for all gaps and all edges together. The
-singular opening that a moving edge leaves is that of
-``dense_solver``: regular part, charges and, from translation
-invariance, the edge's own term.
+two edges eliminated (static condensation), its charges are again q = q° - R g, and the tree
+(``cluster_tree``) solves for all gaps and all edges together. The singular opening that a moving
+edge leaves (``weight_function``) has a regular part, charges and, from translation invariance, the
+edge's own term.
 """
 
 from __future__ import annotations
@@ -17,41 +16,54 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.field.assembly import mapped, periodic
-from adhesis.solver.sharp.field.cluster_tree import collect, distribute, respond
-from adhesis.solver.sharp.field.hierarchical_solver import Gaps, by_gaps, solve_many, spread
-from adhesis.solver.sharp.field.solution import Hold, Solution, edge_openings
-from adhesis.solver.sharp.gap.conformal_map import ALPHA, LEFT
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.field.cluster_tree import downward_pass, factor_tree, upward_pass
+from adhesis.solver.sharp.field.hierarchical_solver import (
+    HierarchicalSystem,
+    apply_inverse,
+    solve_loads,
+    solve_many,
+)
+from adhesis.solver.sharp.field.solution import (
+    FieldModel,
+    LoadingDevice,
+    Solution,
+    edge_openings,
+    subtract_end_terms,
+)
+from adhesis.solver.sharp.field.weight_function import (
+    end_singularity,
+    openings_by_edges,
+    own_singular_load,
+)
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 
-class Yielding(NamedTuple):
+class EliminatedEdges(NamedTuple):
     """Gaps whose edges keep their balance.
 
     Attributes
     ----------
-    own : array
+    response : array
         Response of every gap, flat.
     negative : int array, shape (L,)
         Negative eigenvalues of each.
-    alone : array, shape (N, 2)
+    charge : array, shape (N, 2)
         Charges of each gap by itself, by the imbalance of its edges and by a unit of p.
     motion : array, shape (2L, 2)
         The motions of its edges then.
-    follows : array, shape (N, 2)
+    motion_by_potential : array, shape (N, 2)
         Motion of both edges of a gap by the potential at each of its nodes.
     """
 
-    own: Array
-    negative: Kinds
-    alone: Array
+    response: Array
+    negative: Integers
+    charge: Array
     motion: Array
-    follows: Array
+    motion_by_potential: Array
 
 
-class Change(NamedTuple):
-    """What a step of all edges changes for every gap, to first order.
+class StepChange(NamedTuple):
+    """First-order change of the field of every gap by a step of all edges.
 
     Attributes
     ----------
@@ -64,240 +76,269 @@ class Change(NamedTuple):
     pressure: float
 
 
+class NewtonStep(NamedTuple):
+    """Newton's step of every edge towards C_e = C_c.
+
+    Attributes
+    ----------
+    step, rate : array, shape (2L,)
+        Outward motion n, and dn/dd along the branch.
+    slope : float
+        dY/dd along the branch: Y is p, under a load q0 s.
+    stable : bool
+        Whether the edges are stable.
+    change : StepChange
+    """
+
+    step: Array
+    rate: Array
+    slope: float
+    stable: bool
+    change: StepChange
+
+
+class _MovingEnds(NamedTuple):
+    """Singular openings of both edges of every gap, for motions outwards.
+
+    Attributes
+    ----------
+    strength : array, shape (2L,)
+    load, charge : array, shape (N, 2)
+        Of the openings sqrt((1∓η)/(1±η)): load on their own gap, and charges.
+    together : array, shape (2L,)
+        Derivatives of the openings when all edges move to the right and the profile stays.
+    """
+
+    strength: Array
+    load: Array
+    charge: Array
+    together: Array
+
+
 @compiled
-def singular_gap(of: Solution, gap: int, block: Array, rules: Rules) -> tuple[Array, Array, Array]:
-    """Own load, charges and area of the openings sqrt((1∓η)/(1±η)) at both ends of a gap."""
-    kind = of.kinds[gap]
-    m = rules.counts[kind]
-    start = rules.start[kind]
-    base = of.offset[gap]
-    square = rules.square[kind]
+def _end_charges(
+    state: Solution, e: int, rules: GaussRules
+) -> tuple[Array, Array, float]:
+    """Compute load on the own gap, charges and area of the singular opening of edge e."""
+    nodes = state.nodes
+    k, side = e // 2, e % 2
+    density, strength, area = end_singularity(nodes, e, rules)
+    m = density.shape[0]
+    block = state.equations.matrix[nodes.offset[k] : nodes.offset[k + 1], :m]
+    load = own_singular_load(nodes, e, block, density, strength, rules)
+    start = rules.vector_start[nodes.orders[k]]
     point = np.pi / (m + 1)
-    load = np.zeros((m, 2))
-    charge = np.empty((m, 2))
-    area = np.empty(2)
-    for side in range(2):
-        end = 2 * side - 1
-        edge = of.table[gap, LEFT + side]
-        area[side] = point / of.slope[gap, side]
-        for j in range(m):
-            density = 1 / (1 - end * rules.eta[start + j])
-            charge[j, side] = rules.w[start + j] * density + point * rules.ends[side, start + j]
-            area[side] += of.weight[base + j] * density
-            for i in range(m):
-                load[i, side] -= (block[i, j] - rules.b[square + i * m + j]) * density
-        for i in range(m):
-            near = (
-                rules.w[start + i]
-                * point
-                * mapped(of.table[gap, ALPHA], rules.eta[start + i] - end)
-            )
-            far = of.weight[base + i] * point / of.slope[gap, side]
-            load[i, side] += (near + far * periodic(of.theta[base + i] - edge)) / (4 * np.pi)
+    charge = np.empty(m)
+    for j in range(m):
+        ends = point * rules.end_values[side, start + j]
+        charge[j] = rules.weights[start + j] * density[j] + ends
     return load, charge, area
 
 
 @compiled
-def yielding_gaps(
-    of: Solution, gaps: Gaps, residual: Array, drift: Array, rules: Rules
-) -> Yielding:
-    """Gaps that keep C_e = C_c from a solution with S and S', imbalance ``residual``.
-
-    ``drift`` is the derivative of C_c by θ.
-    """
-    count = of.slope.shape[0]
-    n = of.theta.shape[0]
+def _moving_ends(state: Solution, system: HierarchicalSystem, rules: GaussRules) -> _MovingEnds:
+    """Compute the singular openings of all edges, and the translation of all together."""
+    nodes = state.nodes
+    edges = state.opening.shape[0]
+    n = nodes.theta.shape[0]
     load = np.empty((n, 2))
     charge = np.empty((n, 2))
-    strength = np.empty(2 * count)  # of the singular opening for a motion outwards
+    strength = np.empty(edges)
     together = np.empty((n, 1))  # moving the profile less moving all edges, both to the right
-    together_charge = np.empty((n, 1))
+    together_charge = np.zeros((n, 1))
     area = 0.0
-    for k in range(count):
-        own = slice(of.offset[k], of.offset[k + 1])
-        m = of.offset[k + 1] - of.offset[k]
-        load[own], charge[own], areas = singular_gap(of, k, gaps.blocks[own, :m], rules)
-        for side in range(2):
-            strength[2 * k + side] = -of.opening[2 * k + side] * np.sqrt(of.slope[k, side] / 8)
-        left = strength[2 * k]
-        right = -strength[2 * k + 1]
-        area += areas[0] * left + areas[1] * right
-        for i in range(of.offset[k], of.offset[k + 1]):
-            together[i, 0] = -of.rhs[i, 2] - load[i, 0] * left - load[i, 1] * right
-            together_charge[i, 0] = -charge[i, 0] * left - charge[i, 1] * right
-    regular = spread(gaps, of.kinds, of.offset, rules, together, together_charge)
+    for i in range(n):
+        together[i, 0] = -state.equations.load[i, 2]
+    for e in range(edges):
+        k, side = e // 2, e % 2
+        own = slice(nodes.offset[k], nodes.offset[k + 1])
+        load[own, side], charge[own, side], area_of_end = _end_charges(state, e, rules)
+        strength[e] = -state.opening[e] * np.sqrt(nodes.slope[k, side] / 8)
+        to_right = (1 - 2 * side) * strength[e]
+        area += area_of_end * to_right
+        for i in range(nodes.offset[k], nodes.offset[k + 1]):
+            together[i, 0] -= load[i, side] * to_right
+            together_charge[i, 0] -= charge[i, side] * to_right
+    regular = solve_loads(system, nodes.offset, together, together_charge)
     p = -area
     for i in range(n):
-        p += of.weight[i] * regular[i, 0]
-    p *= of.share / of.resistance
+        p += nodes.weight[i] * regular[i, 0]
+    p *= state.mean.separation_weight / state.mean.resistance
     for i in range(n):
-        regular[i, 0] -= p * of.solved[i, 1]
-    shift = edge_openings(regular, of.slope, of.kinds, of.offset, rules.start, rules.ends)
-
-    bare = by_gaps(of.kinds, of.offset, rules, gaps.inverse, load)
-    by_mean = by_gaps(of.kinds, of.offset, rules, gaps.inverse, of.rhs[:, 1:2])
-    bare_edges = edge_openings(bare, of.slope, of.kinds, of.offset, rules.start, rules.ends)
-    mean_edges = edge_openings(by_mean, of.slope, of.kinds, of.offset, rules.start, rules.ends)
-    own_response = np.empty(gaps.inverse.shape[0])
-    negative = np.zeros(count, dtype=np.int64)
-    alone = np.empty((n, 2))
-    motion = np.empty((2 * count, 2))
-    follows = np.empty((n, 2))
-    at = 0
-    for k in range(count):
-        base = of.offset[k]
-        m = of.offset[k + 1] - base
-        start = rules.start[of.kinds[k]]
-        tangent = np.empty((2, 2))
-        for side in range(2):
-            e = 2 * k + side
-            end = np.sqrt(of.slope[k, side] / 2)
-            for other in range(2):
-                tangent[side, other] = bare_edges[e, other] * strength[2 * k + other]
-            tangent[side, 1 - side] += end * strength[2 * k + 1 - side]
-            sign = 1 - 2 * side
-            # the singular opening of the other end, for a motion of both to the right
-            own_term = shift[e, 0] + sign * end * strength[2 * k + 1 - side]
-            own_term -= np.sqrt(2 * of.slope[k, side]) * of.beyond[k, side, 1]
-            tangent[side, side] += sign * (own_term - drift[e])
-        det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
-        if det < 0:
-            negative[k] = 1
-        elif tangent[0, 0] + tangent[1, 1] < 0:
-            negative[k] = 2
-        inverse = np.empty((2, 2))
-        inverse[0, 0] = tangent[1, 1] / det
-        inverse[1, 1] = tangent[0, 0] / det
-        inverse[0, 1] = -tangent[0, 1] / det
-        inverse[1, 0] = -tangent[1, 0] / det
-        # opening of both ends by the potential at each node
-        reach = np.empty((2, m))
-        for side in range(2):
-            scale = np.sqrt(2 * of.slope[k, side])
-            for j in range(m):
-                total = 0.0
-                for i in range(m):
-                    total += rules.ends[side, start + i] * gaps.inverse[at + i * m + j]
-                reach[side, j] = scale * total * rules.w[start + j]
-        ends = slice(2 * k, 2 * k + 2)
-        drive = np.empty((2, 2))
-        drive[:, 0] = -residual[ends]
-        drive[:, 1] = mean_edges[ends, 0]
-        for side in range(2):
-            a, b = inverse[side, 0], inverse[side, 1]
-            for column in range(2):
-                motion[2 * k + side, column] = a * drive[0, column] + b * drive[1, column]
-            for j in range(m):
-                follows[base + j, side] = a * reach[0, j] + b * reach[1, j]
-        moving = np.empty((m, 2))  # charges by the motion of each end
-        for i in range(m):
-            w = rules.w[start + i]
-            for side in range(2):
-                regular_part = w * bare[base + i, side]
-                moving[i, side] = strength[2 * k + side] * (regular_part + charge[base + i, side])
-            alone[base + i, 0] = 0.0
-            alone[base + i, 1] = -w * by_mean[base + i, 0]
-            for column in range(2):
-                for side in range(2):
-                    alone[base + i, column] += moving[i, side] * motion[2 * k + side, column]
-        for i in range(m):
-            for j in range(m):
-                value = gaps.w[base + i] * gaps.inverse[at + i * m + j] * gaps.w[base + j]
-                for side in range(2):
-                    value -= 0.5 * moving[i, side] * follows[base + j, side]
-                    value -= 0.5 * moving[j, side] * follows[base + i, side]
-                own_response[at + i * m + j] = value
-        at += m * m
-    return Yielding(own_response, negative, alone, motion, follows)
+        regular[i, 0] -= p * state.solved[i, 1]
+    shift = edge_openings(regular, nodes, rules)[:, 0].copy()
+    subtract_end_terms(shift, nodes.slope, state.equations.end_terms, 1)
+    return _MovingEnds(strength, load, charge, shift)
 
 
 @compiled
-def newton_many(
-    of: Solution, gaps: Gaps, residual: Array, drift: Array, hold: Hold, rules: Rules
-) -> tuple[Array, Array, float, bool]:
-    """Newton's step n of every edge towards C_e = C_c, with d prescribed.
+def eliminate_edges(
+    state: Solution, system: HierarchicalSystem, residual: Array, drift: Array, rules: GaussRules
+) -> EliminatedEdges:
+    """Eliminate the edges, which keep C_e = C_c, from a solution with S and S'.
 
-    Returns the step, the rate dn/dd and the slope dY/dd along the branch (Y is p, under a load
-    q0 s), and whether the edges are stable.
+    ``residual`` is the imbalance C_e - C_c, ``drift`` the derivative of C_c by θ.
     """
-    parts = yielding_gaps(of, gaps, residual, drift, rules)
-    step, rate, slope, stable, _ = newton_step(of, gaps, parts, hold)
-    return step, rate, slope, stable
+    nodes = state.nodes
+    count, n = nodes.orders.shape[0], nodes.theta.shape[0]
+    ends = _moving_ends(state, system, rules)
+    regular = apply_inverse(nodes.offset, system.inverse, ends.load)
+    by_mean = apply_inverse(nodes.offset, system.inverse, state.equations.load[:, 1:2])
+    regular_openings = edge_openings(regular, nodes, rules)
+    mean_openings = edge_openings(by_mean, nodes, rules)
+    out = EliminatedEdges(
+        response=np.empty(system.inverse.shape[0]),
+        negative=np.zeros(count, dtype=np.int64),
+        charge=np.empty((n, 2)),
+        motion=np.empty((2 * count, 2)),
+        motion_by_potential=np.empty((n, 2)),
+    )
+    square = 0
+    for k in range(count):
+        own = slice(nodes.offset[k], nodes.offset[k + 1])
+        both = slice(2 * k, 2 * k + 2)
+        m = nodes.offset[k + 1] - nodes.offset[k]
+        start = rules.vector_start[nodes.orders[k]]
+        w = system.weights[own]
+        inverse = system.inverse[square : square + m * m].reshape(m, m)
+        tangent = _own_tangent(
+            ends.strength[both], nodes.slope[k], regular_openings[both], ends.together[both],
+            drift[both],
+        )  # fmt: skip
+        compliance, out.negative[k] = _invert_tangent(tangent)
+        # motion of both ends by the imbalance, by p, and by the potential at each node
+        opening = np.empty((2, m))
+        for side in range(2):
+            scale = np.sqrt(2 * nodes.slope[k, side])
+            for j in range(m):
+                total = 0.0
+                for i in range(m):
+                    total += rules.end_values[side, start + i] * inverse[i, j]
+                opening[side, j] = scale * total * w[j]
+        motion, follows = out.motion[both], out.motion_by_potential[own]
+        for side in range(2):
+            a, b = compliance[side, 0], compliance[side, 1]
+            motion[side, 0] = -(a * residual[2 * k] + b * residual[2 * k + 1])
+            motion[side, 1] = a * mean_openings[2 * k, 0] + b * mean_openings[2 * k + 1, 0]
+            for j in range(m):
+                follows[j, side] = a * opening[0, j] + b * opening[1, j]
+        moving = np.empty((m, 2))  # charges by the motion of each end
+        charge = out.charge[own]
+        for i in range(m):
+            for side in range(2):
+                part = w[i] * regular[nodes.offset[k] + i, side] + ends.charge[own][i, side]
+                moving[i, side] = ends.strength[2 * k + side] * part
+            charge[i, 0] = 0.0
+            charge[i, 1] = -w[i] * by_mean[nodes.offset[k] + i, 0]
+            for column in range(2):
+                for side in range(2):
+                    charge[i, column] += moving[i, side] * motion[side, column]
+        _condense(inverse, w, moving, follows, out.response[square : square + m * m])
+        square += m * m
+    return out
+
+
+@compiled
+def _condense(inverse: Array, w: Array, moving: Array, follows: Array, out: Array) -> None:
+    """Condense the response of a gap, flat: with held edges, less that by their motion."""
+    m = w.shape[0]
+    for i in range(m):
+        for j in range(m):
+            value = w[i] * inverse[i, j] * w[j]
+            for side in range(2):
+                value -= 0.5 * moving[i, side] * follows[j, side]
+                value -= 0.5 * moving[j, side] * follows[i, side]
+            out[i * m + j] = value
+
+
+@compiled
+def _own_tangent(
+    strength: Array, slope: Array, regular: Array, together: Array, drift: Array
+) -> Array:
+    """Compute ∂(C_e - C_c)/∂n_f between both edges of a gap, all other gaps held."""
+    tangent = np.empty((2, 2))
+    for side in range(2):
+        end = np.sqrt(slope[side] / 2)
+        for other in range(2):
+            tangent[side, other] = regular[side, other] * strength[other]
+        tangent[side, 1 - side] += end * strength[1 - side]
+        sign = 1 - 2 * side
+        # the singular opening of the other end, for a motion of both to the right
+        own = together[side] + sign * end * strength[1 - side]
+        tangent[side, side] += sign * (own - drift[side])
+    return tangent
+
+
+@compiled
+def _invert_tangent(tangent: Array) -> tuple[Array, int]:
+    """Invert a 2×2 matrix, and count its negative eigenvalues."""
+    det = tangent[0, 0] * tangent[1, 1] - tangent[0, 1] * tangent[1, 0]
+    negative = 0
+    if det < 0:
+        negative = 1
+    elif tangent[0, 0] + tangent[1, 1] < 0:
+        negative = 2
+    inverse = np.empty((2, 2))
+    inverse[0, 0] = tangent[1, 1] / det
+    inverse[1, 1] = tangent[0, 0] / det
+    inverse[0, 1] = -tangent[0, 1] / det
+    inverse[1, 0] = -tangent[1, 0] / det
+    return inverse, negative
 
 
 @compiled
 def newton_step(
-    of: Solution, gaps: Gaps, parts: Yielding, hold: Hold
-) -> tuple[Array, Array, float, bool, Change]:
-    """As :func:`newton_many`, from the gaps' parts; and what the step changes for every gap."""
-    response = respond(gaps.tree, parts.own, parts.negative)
-    charge = collect(gaps.tree, response, parts.alone)
-    potential = distribute(gaps.tree, response, charge, np.zeros((0, 2)))
-    count = of.slope.shape[0]
-    motion = parts.motion.copy()
+    state: Solution, system: HierarchicalSystem, edges: EliminatedEdges, device: LoadingDevice
+) -> NewtonStep:
+    """Compute Newton's step of every edge, with d prescribed."""
+    factor = factor_tree(system.tree, edges.response, edges.negative)
+    charge = upward_pass(system.tree, factor, edges.charge)
+    potential = downward_pass(system.tree, factor, charge, np.zeros((0, 2)))
+    offset = state.nodes.offset
+    motion = edges.motion.copy()
     mean = np.zeros(2)  # of the opening, times 2π
-    for k in range(count):
-        for i in range(of.offset[k], of.offset[k + 1]):
-            stretch = of.weight[i] / gaps.w[i]
+    for k in range(offset.shape[0] - 1):
+        for i in range(offset[k], offset[k + 1]):
+            stretch = state.nodes.weight[i] / system.weights[i]
             for column in range(2):
                 mean[column] += stretch * charge[i, column]
                 for side in range(2):
-                    motion[2 * k + side, column] += parts.follows[i, side] * potential[i, column]
-    # share·mean - 2π give·p = 2π d
-    yields = hold.share * mean[1] - 2 * np.pi * hold.give
-    rate = 2 * np.pi / yields  # dp/dd
-    stable = (response.negative == 0 and yields < 0) or (response.negative == 1 and yields > 0)
-    pressure = -hold.share * mean[0] / yields
-    step = motion[:, 0] + motion[:, 1] * pressure
-    slope = rate if hold.share != 0 else rate * mean[1] / (2 * np.pi)
-    change = Change(potential[:, 0] + pressure * potential[:, 1], pressure)
-    return step, motion[:, 1] * rate, slope, stable, change
+                    follows = edges.motion_by_potential[i, side]
+                    motion[2 * k + side, column] += follows * potential[i, column]
+    # weight·mean - 2π compliance·p = 2π d
+    weight = device.separation_weight
+    by_pressure = weight * mean[1] - 2 * np.pi * device.compliance
+    rate = 2 * np.pi / by_pressure  # dp/dd
+    negative = factor.negative
+    stable = (negative == 0 and by_pressure < 0) or (negative == 1 and by_pressure > 0)
+    pressure = -weight * mean[0] / by_pressure
+    return NewtonStep(
+        step=motion[:, 0] + motion[:, 1] * pressure,
+        rate=motion[:, 1] * rate,
+        slope=rate if weight != 0 else rate * mean[1] / (2 * np.pi),
+        stable=stable,
+        change=StepChange(potential[:, 0] + pressure * potential[:, 1], pressure),
+    )
 
 
 @compiled
-def between_edges(
-    gaps: Array,
-    prescribed: float,
-    hold: Hold,
-    kinds: Kinds,
-    digits: float,
-    wanted: Kinds,
-    rules: Rules,
-    panels: Panels,
+def openings_between_edges(
+    gaps: Array, prescribed: float, orders: Integers, wanted: Integers, model: FieldModel
 ) -> Array:
-    """∂C_e/∂θ_f between the edges ``wanted`` of many gaps, all others held; 0 for e = f."""
-    of, parts = solve_many(gaps, prescribed, hold, kinds, digits, 1, rules, panels)
-    n = of.theta.shape[0]
+    """Compute ∂C_e/∂θ_f between the edges ``wanted`` of many gaps; 0 for e = f."""
+    state, system = solve_many(gaps, prescribed, orders, 1, model)
+    offset = state.nodes.offset
     count = wanted.shape[0]
-    load = np.zeros((n, count))
-    charge = np.zeros((n, count))
-    p = np.zeros(count)
-    for i in range(count):
-        k = wanted[i] // 2
-        side = wanted[i] % 2
-        own = slice(of.offset[k], of.offset[k + 1])
-        m = of.offset[k + 1] - of.offset[k]
-        loads, charges, areas = singular_gap(of, k, parts.blocks[own, :m], rules)
-        load[own, i] = loads[:, side]
-        charge[own, i] = charges[:, side]
-        p[i] = areas[side]
-    column = spread(parts, of.kinds, of.offset, rules, load, charge)
-    if of.share != 0:
-        for i in range(count):
-            for j in range(n):
-                p[i] += of.weight[j] * column[j, i]
-            for j in range(n):
-                column[j, i] -= of.solved[j, 1] * p[i] / of.resistance
-    opening = edge_openings(column, of.slope, of.kinds, of.offset, rules.start, rules.ends)
-    out = np.zeros((count, count))
-    for i in range(count):
-        f = wanted[i]
-        strength = (2 * (f % 2) - 1) * of.opening[f] * np.sqrt(of.slope[f // 2, f % 2] / 8)
-        for j in range(count):
-            e = wanted[j]
-            if e != f:
-                value = opening[e, i]
-                if e == f ^ 1:  # the singular opening's far end
-                    value += 0.5 * np.sqrt(2 * of.slope[e // 2, e % 2])
-                out[j, i] = strength * value
+    load = np.zeros((state.nodes.theta.shape[0], count))
+    charge = np.zeros((state.nodes.theta.shape[0], count))
+    area = np.zeros(count)
+    for c in range(count):
+        k = wanted[c] // 2
+        own = slice(offset[k], offset[k + 1])
+        load[own, c], charge[own, c], area[c] = _end_charges(state, wanted[c], model.rules)
+    regular = solve_loads(system, offset, load, charge)
+    by_edge, _ = openings_by_edges(state, wanted, regular, area, model.rules)
+    out = by_edge[wanted]
+    for c in range(count):
+        out[c, c] = 0.0
     return out

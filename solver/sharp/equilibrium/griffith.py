@@ -1,4 +1,4 @@
-"""Balance at the edges, compiled: how far each is from Griffith's condition, and its derivative."""
+"""Griffith's condition at the edges, compiled: imbalance, tangent, and motion of the edges."""
 
 from __future__ import annotations
 
@@ -9,57 +9,52 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
-from adhesis.solver.sharp.field.solution import Hold, Solution
+from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT, RIGHT_PATCH, map_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, measure_at
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
+from adhesis.solver.sharp.tolerances import CLOSING_SHARE
 
 
-class Law(NamedTuple):
-    """What moves the edges; lengths in θ.
+class EdgeLaw(NamedTuple):
+    """Law by which the edges move, with the tolerances of one problem; lengths in θ.
 
     Attributes
     ----------
     critical : float
         Critical opening on a flat piece.
-    digits : float
-        -ln of the relative accuracy of the field.
-    settled : float
+    newton_tolerance : float
         A correction this small ends Newton's iteration.
-    coarse : float
-        So far an equilibrium may move with the error of the field; no smaller than ``settled``.
-    near : float
-        Descent steps shorter than this are left to Newton's iteration.
-    longest : float
+    field_error : float
+        The error of the field may move an equilibrium so far; no less than ``newton_tolerance``.
+    rest_step : float
+        A descent whose steps are shorter than this is left to Newton's iteration.
+    longest_step : float
         Longest step of a running edge.
     smallest : float
         Narrower patches and gaps are gone.
-    overlapping : float
+    overlap_limit : float
         An opening this far below zero is an overlap that descent cannot weigh.
-    hold : Hold
-        What is prescribed.
-    faint : float
+    force_error : float
         A force C_c² - C² this small is that of rounding.
     origin : float
         θ of the highest crest.
     """
 
     critical: float
-    digits: float
-    settled: float
-    coarse: float
-    near: float
-    longest: float
+    newton_tolerance: float
+    field_error: float
+    rest_step: float
+    longest_step: float
     smallest: float
-    overlapping: float
-    hold: Hold
-    faint: float
+    overlap_limit: float
+    force_error: float
     origin: float
 
 
 @compiled
-def narrowest(gaps: Array) -> float:
-    """Length of the shortest gap or patch."""
+def shortest_length(gaps: Array) -> float:
+    """Find the length of the shortest gap or patch."""
     table = map_gaps(gaps)
     least = 2 * np.pi
     for k in range(table.shape[0]):
@@ -68,35 +63,41 @@ def narrowest(gaps: Array) -> float:
 
 
 @compiled
-def imbalance(of: Solution, law: Law, panels: Panels) -> tuple[Array, Array]:
-    """C_e - C_c at every edge; positive where contact recedes. And the derivative of C_c by θ."""
-    edges = of.opening.shape[0]
+def critical_opening(theta: float, law: EdgeLaw, panels: Panels) -> tuple[float, float]:
+    """Compute C_c at θ, and its derivative."""
+    measure, slope = measure_at(theta, panels)
+    root = np.sqrt(measure)
+    return law.critical * root, law.critical * slope / (2 * root)
+
+
+@compiled
+def imbalance(state: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Array]:
+    """Compute C_e - C_c at every edge, positive where contact recedes, and dC_c/dθ."""
+    edges = state.opening.shape[0]
     residual = np.empty(edges)
     drift = np.empty(edges)
     for e in range(edges):
-        measure, slope = measure_at(of.table[e // 2, LEFT + e % 2], panels)
-        root = np.sqrt(measure)
-        residual[e] = of.opening[e] - law.critical * root
-        drift[e] = law.critical * slope / (2 * root)
+        critical, drift[e] = critical_opening(state.nodes.table[e // 2, LEFT + e % 2], law, panels)
+        residual[e] = state.opening[e] - critical
     return residual, drift
 
 
 @compiled
-def tangent_of(of: Solution, drift: Array, rules: Rules) -> tuple[Array, Array]:
-    """∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂Y/∂θ_f."""
-    matrix, pressure = derivatives(of, rules)
+def edge_tangent(state: Solution, drift: Array, rules: GaussRules) -> tuple[Array, Array]:
+    """Compute ∂(C_e - C_c)/∂n_f, n the outward motion of the contact, and ∂Y/∂θ_f."""
+    matrix, conjugate = derivatives(state, rules)
     for e in range(matrix.shape[0]):
         matrix[e, e] -= drift[e]
         for f in range(1, matrix.shape[0], 2):
             matrix[e, f] = -matrix[e, f]
-    return matrix, pressure
+    return matrix, conjugate
 
 
 @compiled
-def symmetric(of: Solution, tangent: Array, overlapping: float) -> tuple[Array, Array]:
-    """Scale factors d and the symmetric matrix d_e tangent_ef / d_f."""
+def symmetrise(state: Solution, tangent: Array, overlap_limit: float) -> tuple[Array, Array]:
+    """Scale the tangent: factors d, and the symmetric matrix d_e tangent_ef / d_f."""
     n = tangent.shape[0]
-    d = np.sqrt(np.maximum(of.opening, overlapping))
+    d = np.sqrt(np.maximum(state.opening, overlap_limit))
     matrix = np.empty((n, n))
     for e in range(n):
         for f in range(e + 1):
@@ -107,8 +108,8 @@ def symmetric(of: Solution, tangent: Array, overlapping: float) -> tuple[Array, 
 
 
 @compiled
-def moved_gaps(gaps: Array, step: Array) -> Array:
-    """Gaps after an outward motion ``step`` of the contact at every edge."""
+def move_edges(gaps: Array, step: Array) -> Array:
+    """Move the contact outwards by ``step`` at every edge."""
     out = np.empty_like(gaps)
     for k in range(gaps.shape[0]):
         out[k, 0] = gaps[k, 0] + step[2 * k]
@@ -117,23 +118,41 @@ def moved_gaps(gaps: Array, step: Array) -> Array:
 
 
 @compiled
-def at_least(kinds: Kinds, least: Kinds) -> Kinds:
-    """``kinds``, none below ``least`` (which is empty for no bound).
+def accept_correction(
+    gaps: Array, step: Array, travelled: Array, reach: float, longest: float
+) -> tuple[bool, Array]:
+    """Correct gaps in Newton's iteration; returns whether that is accepted, and the gaps then.
+
+    It is where no edge goes further than ``longest``, nor all corrections together, which are added
+    up in ``travelled``, further than ``reach``, and every gap and patch keeps a length.
+    """
+    travelled += step
+    size = np.abs(step).max()
+    # not written as > : a size that is no number is a failure, too
+    within = size <= reach and size <= longest and np.abs(travelled).max() <= reach
+    moved = move_edges(gaps, step)
+    return within and shortest_length(moved) > 0, moved
+
+
+@compiled
+def raise_orders(orders: Integers, least: Integers) -> Integers:
+    """Raise orders to ``least`` (which is empty for no bound) where they are below.
 
     While edges move towards one state, a gap must not lose modes again, or the field's error would
     drive them to and fro.
     """
-    if least.shape[0] == kinds.shape[0]:
-        return np.maximum(kinds, least)
-    return kinds
+    if least.shape[0] == orders.shape[0]:
+        return np.maximum(orders, least)
+    return orders
 
 
 @compiled
 def step_limits(table: Array, longest: float) -> Array:
-    """Longest step of each edge: ``longest``, or a quarter of the gap or patch it may close."""
+    """Limit the step of each edge: ``longest``, or a share of the gap or patch it may close."""
     limit = np.empty(2 * table.shape[0])
     for k in range(table.shape[0]):
         length = table[k, RIGHT] - table[k, LEFT]
         for side in range(2):
-            limit[2 * k + side] = min(longest, 0.25 * min(length, table[k, LEFT_PATCH + side]))
+            closing = CLOSING_SHARE * min(length, table[k, LEFT_PATCH + side])
+            limit[2 * k + side] = min(longest, closing)
     return limit

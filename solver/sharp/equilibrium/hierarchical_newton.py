@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.equilibrium.edge_elimination import newton_step, yielding_gaps
+from adhesis.solver.sharp.equilibrium.edge_elimination import eliminate_edges, newton_step
 from adhesis.solver.sharp.equilibrium.griffith import (
-    Law,
-    at_least,
+    EdgeLaw,
+    accept_correction,
     imbalance,
-    moved_gaps,
-    narrowest,
+    raise_orders,
 )
-from adhesis.solver.sharp.equilibrium.last_correction import landed
-from adhesis.solver.sharp.equilibrium.linear_exterior import About, at_rest
+from adhesis.solver.sharp.equilibrium.last_correction import correct_gaps
+from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation, linearise
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
+from adhesis.solver.sharp.tolerances import HIERARCHICAL_NEWTON_GROWTH, MOST_CORRECTIONS
 
-_NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
-_SHRINKS = 0.7  # share of the last correction to which the next one has to come down
+
+class EquilibriumOfMany(NamedTuple):
+    """Result of Newton's iteration on many gaps; otherwise as ``newton.Equilibrium``.
+
+    Attributes
+    ----------
+    linearisation : Linearisation
+        For windows on it, with the solution.
+    rate : array, shape (2L,)
+        If no equilibrium was found, the last correction.
+    """
+
+    found: bool
+    gaps: Array
+    linearisation: Linearisation
+    rate: Array
+    slope: float
+    corrections: int
 
 
 @compiled
@@ -30,58 +48,53 @@ def equilibrium_many(
     gaps: Array,
     prescribed: float,
     reach: float,
-    least: Kinds,
-    patient: bool,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
-) -> tuple[bool, Array, About, Array, float, int]:
-    """Find the equilibrium in work that grows as the number of gaps.
+    least: Integers,
+    strict: bool,
+    law: EdgeLaw,
+    model: FieldModel,
+) -> EquilibriumOfMany:
+    """Find the equilibrium in work that grows as the number of gaps, as ``newton.equilibrium``.
 
-    Otherwise as ``newton.equilibrium``.
-
-    With the solution comes what windows are opened with. Where the edges are not stable on the
-    way, or the corrections hardly shrink, the iteration is not gone on with: of some 1,300 that
-    came to a minimum four had not been stable, and one in a hundred had a correction half as large
-    as the one before. Then the last correction takes the place of the rate.
+    Where the edges are not stable on the way, or the corrections hardly shrink, the iteration ends:
+    of some 1,300 that came to a minimum four had not been stable, and one in a hundred had a
+    correction half as large as the one before.
     """
-    at = gaps
-    kinds = at_least(choose_kinds(map_gaps(gaps), law.digits, rules.counts), least)
+    orders = raise_orders(choose_orders(map_gaps(gaps), model.digits, model.rules.counts), least)
     travelled = np.zeros(gaps.size)
     last = np.inf
     found = False
     steps = 0
     while True:
         steps += 1
-        of, parts = solve_many(at, prescribed, law.hold, kinds, law.digits, 2, rules, panels)
-        residual, drift = imbalance(of, law, panels)
-        edges = yielding_gaps(of, parts, residual, drift, rules)
-        step, rate, slope, stable, change = newton_step(of, parts, edges, law.hold)
-        size = np.abs(step).max()
-        if not np.isfinite(of.pressure):
+        state, system = solve_many(gaps, prescribed, orders, 2, model)
+        residual, drift = imbalance(state, law, model.panels)
+        edges = eliminate_edges(state, system, residual, drift, model.rules)
+        newton = newton_step(state, system, edges, model.device)
+        size = np.abs(newton.step).max()
+        if not np.isfinite(state.pressure):
             break
-        if size <= law.coarse:
-            found = stable or not patient
+        if size <= law.field_error:
+            found = newton.stable or not strict
             break
-        if not patient and size <= law.near:
+        if not strict and size <= law.rest_step:
             found = True
             break
-        travelled += step
-        # not written as > : a size that is no number is a failure, too
-        within = size <= reach and size <= _SHRINKS * last and np.abs(travelled).max() <= reach
-        if not within or (patient and not stable) or steps == _NEWTON_LIMIT:
+        largest = HIERARCHICAL_NEWTON_GROWTH * last
+        accepted, moved = accept_correction(gaps, newton.step, travelled, reach, largest)
+        if not accepted or (strict and not newton.stable) or steps == MOST_CORRECTIONS:
             break
-        moved = moved_gaps(at, step)
-        if not narrowest(moved) > 0:
-            break
-        at = moved
+        gaps = moved
         # The iteration converges quadratically. A correction that is expected to be no larger than
-        # what the field's error makes is not asked for: it would cost as much as this one.
-        expected = size * (size / last) ** 2 if last < np.inf else size * size / law.longest
-        if stable and expected <= law.coarse:
+        # the error of the field is left out: it would cost as much as this one.
+        expected = size * size / law.longest_step
+        if last < np.inf:
+            expected = size * (size / last) ** 2
+        if newton.stable and expected <= law.field_error:
             steps += 1
-            of, parts = landed(at, prescribed, law.hold, of, parts, change, rules, panels)
-            found = np.isfinite(of.pressure)
+            state, system = correct_gaps(gaps, prescribed, state, system, newton.change, model)
+            found = np.isfinite(state.pressure)
             break
         last = size
-    return found, at, at_rest(of, parts, edges), rate if found else step, slope, steps
+    rate = newton.rate if found else newton.step
+    linearisation = linearise(state, system, edges)
+    return EquilibriumOfMany(found, gaps, linearisation, rate, newton.slope, steps)

@@ -2,38 +2,65 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.equilibrium.griffith import (
-    Law,
-    at_least,
+    EdgeLaw,
+    accept_correction,
+    edge_tangent,
     imbalance,
-    moved_gaps,
-    narrowest,
-    symmetric,
-    tangent_of,
+    raise_orders,
+    symmetrise,
 )
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.field.dense_solver import solve
-from adhesis.solver.sharp.field.solution import PlainSolution, Solution, edge_openings, plain
+from adhesis.solver.sharp.field.exterior import Exterior
+from adhesis.solver.sharp.field.solution import FieldModel, Solution, edge_openings
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers, choose_orders
+from adhesis.solver.sharp.tolerances import (
+    KNOWN_TANGENT,
+    MOST_CORRECTIONS,
+    NEWTON_GROWTH,
+    NEWTON_SHARE,
+    STALLED_SHARE,
+)
 
-_NEWTON_LIMIT = 8  # corrections before an equilibrium counts as lost
-_SHARE = 0.01  # of what an equilibrium may move with the error of the field: so little is nothing
-_KNOWN = 1e-3  # a tangent that changes by less than this share in a last correction serves after it
+
+class Equilibrium(NamedTuple):
+    """Result of Newton's iteration.
+
+    Attributes
+    ----------
+    found : bool
+        Whether a stable equilibrium was found within reach.
+    gaps : array, shape (L, 2)
+    solution : Solution
+    rate : array, shape (2L,)
+        dn/dd of every edge along the branch, d the prescribed quantity; empty if not found.
+    slope : float
+        dY/dd along it: Y is p, under a load q0 s.
+    corrections : int
+        Their number.
+    """
+
+    found: bool
+    gaps: Array
+    solution: Solution
+    rate: Array
+    slope: float
+    corrections: int
 
 
 @compiled
-def _faint(of: Solution, residual: Array, law: Law) -> bool:
-    """Whether the force on every edge is that of rounding."""
+def _is_balanced(state: Solution, residual: Array, law: EdgeLaw) -> bool:
+    """Return whether the force on every edge is that of rounding."""
     for e in range(residual.shape[0]):
-        if not abs(residual[e] * (2 * of.opening[e] - residual[e])) <= law.faint:
+        if not abs(residual[e] * (2 * state.opening[e] - residual[e])) <= law.force_error:
             return False
     return True
 
@@ -43,81 +70,85 @@ def equilibrium(
     gaps: Array,
     prescribed: float,
     reach: float,
-    least: Kinds,
-    patient: bool,
-    law: Law,
-    rules: Rules,
-    panels: Panels,
-) -> tuple[bool, Array, PlainSolution, Array, float, int]:
-    """Newton's iteration for C_e = C_c from nearby edges.
+    least: Integers,
+    strict: bool,
+    law: EdgeLaw,
+    model: FieldModel,
+    exterior: Exterior,
+) -> Equilibrium:
+    """Find the stable equilibrium C_e = C_c near these gaps, no edge moving further than ``reach``.
 
-    Returns whether a stable equilibrium was found with no edge moving further than ``reach``, its
-    gaps, its solution, the rate dn/dd of every edge along the branch (d is what is prescribed),
-    dY/dd along it (Y is p, under a load q0 s), and the number of corrections. ``least`` are the
-    least kinds of the gaps, or empty. If not ``patient``, edges out of equilibrium by no more than
-    ``law.near``, or by forces that are rounding, are taken as they are.
+    ``least`` are the least orders of the gaps, or empty. If not ``strict``, edges out of
+    equilibrium by no more than ``law.rest_step``, or by forces that are rounding, are taken as they
+    are.
 
     Raises
     ------
     LinAlgError
         If a tangent is singular.
     """
-    at = gaps
-    kinds = at_least(choose_kinds(map_gaps(gaps), law.digits, rules.counts), least)
+    rules = model.rules
+    orders = raise_orders(choose_orders(map_gaps(gaps), model.digits, rules.counts), least)
     travelled = np.zeros(gaps.size)
     last = np.inf
     found = False
     rate: Any = np.empty(0)
     slope = np.nan
     steps = 0
-    settled = max(law.settled, _SHARE * law.coarse)
+    tolerance = max(law.newton_tolerance, NEWTON_SHARE * law.field_error)
     while True:
         steps += 1
-        of = solve(at, prescribed, law.hold, kinds, 2, rules, panels)
-        if not np.isfinite(of.pressure):
+        state = solve(gaps, prescribed, orders, 2, model, exterior)
+        if not np.isfinite(state.pressure):
             break
-        residual, drift = imbalance(of, law, panels)
-        tangent, by_edge = tangent_of(of, drift, rules)
+        residual, drift = imbalance(state, law, model.panels)
+        tangent, by_edge = edge_tangent(state, drift, rules)
         step: Any = np.linalg.solve(tangent, -residual)  # numpy promises some float
         size = np.abs(step).max()
         # The field has steps of the size of its error, where panels or modes change: an iteration
         # to and fro across one of them is at its end.
-        stalled = size <= law.coarse and size > 0.3 * last
-        if size <= settled or stalled:
-            _, matrix = symmetric(of, tangent, law.overlapping)
-            found = is_definite(matrix) or not patient
+        stalled = size <= law.field_error and size > STALLED_SHARE * last
+        if size <= tolerance or stalled:
+            _, matrix = symmetrise(state, tangent, law.overlap_limit)
+            found = is_definite(matrix) or not strict
             break
-        if not patient and (size <= law.near or _faint(of, residual, law)):
+        if not strict and (size <= law.rest_step or _is_balanced(state, residual, law)):
             found = True
             break
-        travelled += step
-        # not written as > : a size that is no number is a failure, too
-        within = size <= reach and size <= 2 * last and np.abs(travelled).max() <= reach
-        if not within or steps == _NEWTON_LIMIT:
+        accepted, moved = accept_correction(gaps, step, travelled, reach, NEWTON_GROWTH * last)
+        if not accepted or steps == MOST_CORRECTIONS:
             break
-        moved = moved_gaps(at, step)
-        if not narrowest(moved) > 0:
-            break
-        at = moved
+        gaps = moved
         # The iteration converges quadratically: the next correction, and by what share the tangent
         # changes until then, are known beforehand.
         share = (size / last) ** 2
-        if last < np.inf and size * share <= settled and share <= _KNOWN:
-            _, matrix = symmetric(of, tangent, law.overlapping)
-            if is_definite(matrix) or not patient:
+        if last < np.inf and size * share <= tolerance and share <= KNOWN_TANGENT:
+            _, matrix = symmetrise(state, tangent, law.overlap_limit)
+            if is_definite(matrix) or not strict:
                 steps += 1
-                of = solve(at, prescribed, law.hold, kinds, 2, rules, panels)
-                found = np.isfinite(of.pressure)
+                state = solve(gaps, prescribed, orders, 2, model, exterior)
+                found = np.isfinite(state.pressure)
                 break
         last = size
     if found:
-        by_prescribed = -2 * np.pi / of.resistance
-        unit = np.empty((of.f.shape[0], 1))
-        for i in range(of.f.shape[0]):
-            unit[i, 0] = -by_prescribed * of.solved[i, 1]
-        opening = edge_openings(unit, of.slope, of.kinds, of.offset, rules.start, rules.ends)
-        rate = np.linalg.solve(tangent, -opening[:, 0])
-        slope = by_prescribed if of.share != 0 else of.unit_mean / (2 * np.pi)
-        for e in range(rate.shape[0]):
-            slope += by_edge[e] * (rate[e] if e % 2 == 0 else -rate[e])
-    return found, at, plain(of), rate, slope, steps
+        rate, slope = _branch_rates(state, tangent, by_edge, rules)
+    return Equilibrium(found, gaps, state, rate, slope, steps)
+
+
+@compiled
+def _branch_rates(
+    state: Solution, tangent: Array, by_edge: Array, rules: GaussRules
+) -> tuple[Any, float]:
+    """Compute dn/dd of every edge and dY/dd along the branch, from ∂Y/∂θ of every edge."""
+    by_prescribed = -2 * np.pi / state.mean.resistance
+    unit = np.empty((state.solved.shape[0], 1))
+    for i in range(state.solved.shape[0]):
+        unit[i, 0] = -by_prescribed * state.solved[i, 1]
+    opening = edge_openings(unit, state.nodes, rules)
+    rate = np.linalg.solve(tangent, -opening[:, 0])
+    slope = by_prescribed
+    if state.mean.separation_weight == 0:
+        slope = state.mean.unit_mean / (2 * np.pi)
+    for e in range(rate.shape[0]):
+        slope += by_edge[e] * (rate[e] if e % 2 == 0 else -rate[e])
+    return rate, slope

@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.griffith import Law, step_limits
-from adhesis.solver.sharp.equilibrium.linear_exterior import About, following, open_window
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import RULES, Kinds
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, step_limits
+from adhesis.solver.sharp.equilibrium.linear_exterior import (
+    Linearisation,
+    exterior_motion,
+    open_window,
+)
+from adhesis.solver.sharp.field.exterior import Exterior
+from adhesis.solver.sharp.field.solution import FieldModel
+from adhesis.solver.sharp.gap.quadrature import Integers
 
 
 class Window:
@@ -18,53 +23,60 @@ class Window:
     ----------
     gaps : array, shape (L, 2)
         All gaps of the state.
-    about : About
-        What is known of it.
+    linearisation : Linearisation
+        Of the state.
     first, width : int
         First gap of the window, and how many.
-    law : Law
-    panels : Panels
+    law : EdgeLaw
+    model : FieldModel
 
     Attributes
     ----------
     gaps : array, shape (width + 1, 2)
         Angles rise beyond the period where the window goes on at its beginning.
-    kinds : int array, shape (width + 1,)
-    panels : Panels
-        With the outside.
-    sound : bool
+    orders : int array, shape (width + 1,)
+    exterior : Exterior
+        Response of the others.
+    exterior_is_stable : bool
         Whether the others are stable by themselves.
     """
 
     def __init__(
-        self, gaps: Array, about: About, first: int, width: int, law: Law, panels: Panels
+        self,
+        gaps: Array,
+        linearisation: Linearisation,
+        first: int,
+        width: int,
+        law: EdgeLaw,
+        model: FieldModel,
     ) -> None:
-        self._all, self._about, self._law = gaps, about, law
-        self.gaps, outside, self._outer = open_window(
-            about, first, width, np.inf, law, RULES, panels
+        self._all, self._linearisation, self._law, self._model = gaps, linearisation, law, model
+        self.gaps: Array
+        self.exterior: Exterior
+        self.gaps, self.exterior, self._outside = open_window(
+            linearisation, first, width, np.inf, law, model
         )
         inside = (first + np.arange(width)) % len(gaps)
-        self.kinds: Kinds = np.append(about.of.kinds[inside], 0)
-        self.panels = panels._replace(outside=outside)
-        self.sound = bool(self._outer.response.negative == 0)
+        self.orders: Integers = np.append(linearisation.solution.nodes.orders[inside], 0)
+        self.exterior_is_stable = bool(self._outside.factor.negative == 0)
         # beyond the middle of the patch in which the period ends
         self._end = 0.5 * (gaps[-1, 1] + gaps[0, 0] + 2 * np.pi)
 
-    def rows(self, gaps: Array) -> Array:
-        """Of other gaps of all, those inside the window, and the outside as the last."""
+    def restrict(self, gaps: Array) -> Array:
+        """Restrict other gaps of all to those inside the window, the exterior being the last."""
         left, right = self.gaps[0, 0], self.gaps[-2, 1]
         both = np.concatenate([gaps, gaps + 2 * np.pi])
         inside = both[(both[:, 0] >= left) & (both[:, 1] <= right)]
         return np.concatenate([inside, self.gaps[-1:]])
 
-    def everywhere(self, local: Array, kinds: Kinds, at: float) -> Array:
-        """All gaps at d = ``at`` for those of the window, the others following."""
-        of, outer = self._about.of, self._outer
-        limit = step_limits(of.table, self._law.longest)
-        motion = following(
-            local, at, kinds, outer, self._about, limit, self._law, RULES, self.panels
-        )
-        outside = self._all[outer.order] + motion.reshape(-1, 2) * [1.0, -1.0]
+    def extend(self, local: Array, orders: Integers, prescribed: float) -> Array:
+        """Extend gaps of the window to all gaps, the others following."""
+        limit = step_limits(self._linearisation.solution.nodes.table, self._law.longest_step)
+        motion = exterior_motion(
+            local, prescribed, orders, self.exterior, self._outside, self._linearisation, limit,
+            self._model,
+        )  # fmt: skip
+        outside = self._all[self._outside.indices] + motion.reshape(-1, 2) * [1.0, -1.0]
         inside = local[:-1].copy()
         inside[inside.mean(axis=1) > self._end] -= 2 * np.pi
         gaps = np.concatenate([inside, outside])

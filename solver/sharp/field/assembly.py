@@ -1,7 +1,7 @@
 """Equation (1) of ``dense_solver``: nodes, matrix and loads of given gaps.
 
-A gap's own part, its diagonal block and its loads, depends on its row of the table of gaps alone
-(:func:`one_gap`); the blocks between gaps are the half-space kernel at their nodes.
+A gap's own part, its diagonal block and its loads, depends on its row of the table of gaps alone;
+the blocks between gaps are the half-space kernel at their nodes.
 """
 
 from __future__ import annotations
@@ -10,182 +10,207 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
-from adhesis.solver.sharp.field.solution import Solution
+from adhesis.solver.sharp.field.exterior import Exterior, is_present
+from adhesis.solver.sharp.field.solution import Equations, FieldModel, Nodes, Solution
 from adhesis.solver.sharp.gap.chebyshev_moments import gap_moments
 from adhesis.solver.sharp.gap.conformal_map import ALPHA, LEFT, RIGHT, theta_at
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 # Below these arguments the own gap's kernels are taken as series.
 _PERIODIC_SERIES = 0.2
 _MAPPED_SERIES = 0.3
 
-Parts = tuple[Array, Array, Array, Array, Array, Array]
-"""θ and X of the nodes, dη/dθ at the ends, matrix, right-hand sides (S~, X, S~') and what the
-higher modes add at the ends: the equations (1)."""
-
 
 @compiled
-def first_nodes(kinds: Kinds, rules: Rules, panels: Panels) -> Kinds:
-    """First node of each gap, and the number of all."""
-    offset = np.zeros(kinds.shape[0] + 1, dtype=np.int64)
-    for k in range(kinds.shape[0]):
-        offset[k + 1] = offset[k] + rules.counts[kinds[k]]
-    if panels.outside.theta.shape[0] > 0:
-        offset[-1] = offset[-2]  # the last gap is the outside
+def node_offsets(orders: Integers, rules: GaussRules, exterior: Exterior) -> Integers:
+    """Number the first node of each gap, and all; the exterior, the last gap, has none."""
+    offset = np.zeros(orders.shape[0] + 1, dtype=np.int64)
+    for k in range(orders.shape[0]):
+        offset[k + 1] = offset[k] + rules.counts[orders[k]]
+    if is_present(exterior):
+        offset[-1] = offset[-2]
     return offset
 
 
 @compiled
-def assemble(
-    table: Array, kinds: Kinds, offset: Kinds, fields: int, rules: Rules, panels: Panels
-) -> Parts:
-    """Matrix and right-hand sides of (1)."""
+def assemble_dense(
+    table: Array, orders: Integers, fields: int, model: FieldModel, exterior: Exterior
+) -> tuple[Nodes, Equations]:
+    """Assemble (1) with the source S (``fields`` 1), or S and S' (2), without the exterior."""
+    offset = node_offsets(orders, model.rules, exterior)
+    nodes, equations = _allocate(table, orders, offset, offset[-1], fields)
     gaps = table.shape[0]
-    n = offset[gaps]
-    theta = np.empty(n)
-    weight = np.empty(n)  # dθ/dη times the weight of the rule
-    slope = np.empty((gaps, 2))  # dη/dθ at the ends
-    rhs = np.empty((n, fields + 1))
-    beyond = np.empty((gaps, 2, fields))
-    matrix = np.empty((n, n))
+    if is_present(exterior):
+        gaps -= 1
+        nodes.slope[gaps] = 1.0
+        equations.end_terms[gaps] = 0.0
+    _fill_gaps(np.arange(gaps), nodes, equations, offset, model)
+    sine, cosine = np.sin(0.5 * nodes.theta), np.cos(0.5 * nodes.theta)
     for k in range(gaps):
-        if offset[k] == offset[k + 1]:  # the outside of a window
-            slope[k] = 1.0
-            beyond[k] = 0.0
-            continue
-        own = slice(offset[k], offset[k + 1])
-        one_gap(
-            table[k], kinds[k], rules, panels, theta[own], weight[own], slope[k], rhs[own],
-            beyond[k], matrix[own, own],
-        )  # fmt: skip
-    _between_gaps(theta, weight, offset, matrix)
-    return theta, weight, slope, matrix, rhs, beyond
+        _fill_rows(k, nodes, sine, cosine, equations.matrix)
+    return nodes, equations
 
 
 @compiled
-def assemble_again(
-    table: Array, kinds: Kinds, offset: Kinds, rules: Rules, panels: Panels, before: Solution
-) -> Parts:
-    """As :func:`assemble`, with what belongs to gaps that are as they were ``before``.
-
-    A gap's own part depends on its row of the table alone.
-    """
-    theta, weight, slope = before.theta.copy(), before.weight.copy(), before.slope.copy()
-    matrix, rhs, beyond = before.matrix.copy(), before.rhs.copy(), before.beyond.copy()
-    changed = np.empty(table.shape[0], dtype=np.int64)
-    count = 0
+def assemble_changed(
+    table: Array, before: Solution, model: FieldModel
+) -> tuple[Nodes, Equations]:
+    """Assemble as :func:`assemble_dense`, taking over the parts of gaps that have not changed."""
+    old, known = before.nodes, before.equations
+    offset = old.offset
+    nodes = Nodes(
+        table, old.orders, offset, old.theta.copy(), old.weight.copy(), old.slope.copy()
+    )
+    equations = Equations(known.matrix.copy(), known.load.copy(), known.end_terms.copy())
+    differs = np.zeros(table.shape[0], dtype=np.bool_)
     for k in range(table.shape[0]):
-        if np.array_equal(table[k], before.table[k]):
-            continue
-        changed[count] = k
-        count += 1
-        own = slice(offset[k], offset[k + 1])
-        one_gap(
-            table[k], kinds[k], rules, panels, theta[own], weight[own], slope[k], rhs[own],
-            beyond[k], matrix[own, own],
-        )  # fmt: skip
-    _between_gaps_again(theta, weight, offset, changed[:count], matrix)
-    return theta, weight, slope, matrix, rhs, beyond
+        differs[k] = not np.array_equal(table[k], old.table[k])
+    changed: Integers = np.flatnonzero(differs)
+    _fill_gaps(changed, nodes, equations, offset, model)
+    sine, cosine = np.sin(0.5 * nodes.theta), np.cos(0.5 * nodes.theta)
+    matrix = equations.matrix
+    for gap in changed:
+        _fill_rows(gap, nodes, sine, cosine, matrix)
+        for i in range(offset[gap], offset[gap + 1]):
+            for j in range(offset[gap]):
+                matrix[j, i] = matrix[i, j]
+            for j in range(offset[gap + 1], matrix.shape[0]):
+                matrix[j, i] = matrix[i, j]
+    return nodes, equations
 
 
 @compiled
-def one_gap(
-    gap: Array,
-    kind: int,
-    rules: Rules,
-    panels: Panels,
-    theta: Array,
-    weight: Array,
-    slope: Array,
-    rhs: Array,
-    beyond: Array,
-    matrix: Array,
+def assemble_blocks(
+    table: Array, orders: Integers, fields: int, model: FieldModel
+) -> tuple[Nodes, Equations]:
+    """Assemble the diagonal blocks of (1) alone, with nodes and loads.
+
+    The block of gap k is ``matrix[offset[k] : offset[k + 1], :m]``, m its number of nodes.
+    """
+    gaps = table.shape[0]
+    offset = np.zeros(gaps + 1, dtype=np.int64)
+    widest = 0
+    for k in range(gaps):
+        m = model.rules.counts[orders[k]]
+        offset[k + 1] = offset[k] + m
+        widest = max(widest, m)
+    nodes, equations = _allocate(table, orders, offset, widest, fields)
+    equations.matrix[:] = 0.0
+    _fill_gaps(np.arange(gaps), nodes, equations, np.zeros(gaps, dtype=np.int64), model)
+    return nodes, equations
+
+
+@compiled
+def _allocate(
+    table: Array, orders: Integers, offset: Integers, columns: int, fields: int
+) -> tuple[Nodes, Equations]:
+    """Allocate nodes and equations."""
+    gaps, n = table.shape[0], offset[-1]
+    nodes = Nodes(table, orders, offset, np.empty(n), np.empty(n), np.empty((gaps, 2)))
+    equations = Equations(
+        matrix=np.empty((n, columns)),
+        load=np.empty((n, fields + 1)),
+        end_terms=np.empty((gaps, 2, fields)),
+    )
+    return nodes, equations
+
+
+@compiled
+def _fill_gaps(
+    gaps: Integers, nodes: Nodes, equations: Equations, column: Integers, model: FieldModel
 ) -> None:
-    """Nodes, loads and diagonal block of one gap, and what its higher modes add at the ends."""
-    fields = beyond.shape[1]
-    m = rules.counts[kind]
-    s = np.empty((m, fields))
-    ends = np.empty((2, fields))
-    gap_moments(gap, panels, s, ends)
-    for field in range(fields):
+    """Fill in the own parts of some gaps; their blocks begin in these columns of the matrix."""
+    rules = model.rules
+    fields = equations.end_terms.shape[2]
+    for k in gaps:
+        m = rules.counts[nodes.orders[k]]
+        s = np.empty((m, fields))
+        ends = np.empty((2, fields))
+        gap_moments(nodes.table[k], model.panels, s, ends)
+        _fill_end_terms(s, ends, equations.end_terms[k])
+        own = slice(nodes.offset[k], nodes.offset[k + 1])
+        _fill_nodes(k, s, nodes, equations.load[own], rules)
+        block = equations.matrix[own, column[k] : column[k] + m]
+        _fill_block(k, nodes, block, rules)
+
+
+@compiled
+def _fill_end_terms(s: Array, ends: Array, end_terms: Array) -> None:
+    """Subtract the first modes of a gap from the loads of its ends."""
+    for field in range(s.shape[1]):
         low = 0.0
         high = 0.0
         sign = 1.0
-        for j in range(m):
+        for j in range(s.shape[0]):
             high += s[j, field]
             low += sign * s[j, field]
             sign = -sign
-        beyond[0, field] = ends[0, field] - low
-        beyond[1, field] = ends[1, field] - high
-    rule = slice(rules.start[kind], rules.start[kind] + m)
-    square = slice(rules.square[kind], rules.square[kind] + m * m)
-    _own_gap(
-        gap, rules.eta[rule], rules.w[rule], rules.b[square].reshape(m, m),
-        rules.modes[square].reshape(m, m), s, theta, weight, slope, rhs, matrix,
-    )  # fmt: skip
+        end_terms[0, field] = ends[0, field] - low
+        end_terms[1, field] = ends[1, field] - high
 
 
 @compiled
-def _own_gap(
-    gap: Array,
-    eta: Array,
-    w: Array,
-    b: Array,
-    modes: Array,
-    s: Array,
-    theta: Array,
-    weight: Array,
-    slope: Array,
-    rhs: Array,
-    matrix: Array,
-) -> None:
-    """Nodes, loads and diagonal block of one gap."""
-    m = eta.shape[0]
-    slope[0] = 1 / theta_at(gap, -1.0)[1]
-    slope[1] = 1 / theta_at(gap, 1.0)[1]
+def _fill_nodes(k: int, s: Array, nodes: Nodes, load: Array, rules: GaussRules) -> None:
+    """Fill in the nodes of gap k, and their load from its moments."""
+    gap, order, m = nodes.table[k], nodes.orders[k], s.shape[0]
+    start, square = rules.vector_start[order], rules.matrix_start[order]
+    modes = rules.modes[square : square + m * m].reshape(m, m)
+    nodes.slope[k, 0] = 1 / theta_at(gap, -1.0)[1]
+    nodes.slope[k, 1] = 1 / theta_at(gap, 1.0)[1]
     for i in range(m):
-        theta[i], stretch = theta_at(gap, eta[i])
-        weight[i] = w[i] * stretch
-        rhs[i, 1] = weight[i]
+        place = nodes.offset[k] + i
+        nodes.theta[place], stretch = theta_at(gap, rules.eta[start + i])
+        nodes.weight[place] = rules.weights[start + i] * stretch
+        load[i, 1] = nodes.weight[place]
         for field in range(s.shape[1]):
             total = 0.0
             for j in range(m):
                 total += modes[i, j] * s[j, field]
-            rhs[i, 2 * field] = w[i] * total
+            load[i, 2 * field] = rules.weights[start + i] * total
+
+
+@compiled
+def _fill_block(k: int, nodes: Nodes, block: Array, rules: GaussRules) -> None:
+    """Fill in the diagonal block of gap k."""
+    gap, order, m = nodes.table[k], nodes.orders[k], block.shape[0]
+    start, square = rules.vector_start[order], rules.matrix_start[order]
+    own = slice(nodes.offset[k], nodes.offset[k + 1])
+    theta, weight = nodes.theta[own], nodes.weight[own]
+    eta, w = rules.eta[start : start + m], rules.weights[start : start + m]
+    crack = rules.crack[square : square + m * m].reshape(m, m)
     # sines of differences from those of the nodes: of small ones the kernels are series
     sine = np.empty(m)
     cosine = np.empty(m)
     power = np.empty(m)
     middle = 0.5 * (gap[LEFT] + gap[RIGHT])
+    alpha = gap[ALPHA]
     for i in range(m):
         sine[i] = np.sin(0.5 * (theta[i] - middle))
         cosine[i] = np.cos(0.5 * (theta[i] - middle))
-        power[i] = np.exp(gap[ALPHA] * eta[i])
-    alpha = gap[ALPHA]
+        power[i] = np.exp(alpha * eta[i])
     for i in range(m):
         for j in range(i + 1):
             x = theta[i] - theta[j]
             if abs(x) < _PERIODIC_SERIES:
-                far = periodic(x)
+                far = periodic_images(x)
             else:
                 half = sine[i] * cosine[j] - cosine[i] * sine[j]
                 far = 1 / (half * half) - 4 / (x * x)
             y = eta[i] - eta[j]
             if abs(alpha * y) < _MAPPED_SERIES:
-                near = mapped(alpha, y)
+                near = mapped_kernel(alpha, y)
             else:
                 ratio = power[i] / power[j]
                 twice = ratio - 1 / ratio  # twice the hyperbolic sine
                 near = 4 * (4 * alpha * alpha / (twice * twice) - 1 / (y * y))
             both = weight[i] * weight[j] * far + w[i] * w[j] * near
-            matrix[i, j] = b[i, j] - both / (4 * np.pi)
-            matrix[j, i] = matrix[i, j]
+            block[i, j] = crack[i, j] - both / (4 * np.pi)
+            block[j, i] = block[i, j]
 
 
 @compiled
-def periodic(x: float) -> float:
-    """1/sin²(x/2) - 4/x², x = Δθ: what the own gap feels of its periodic images."""
+def periodic_images(x: float) -> float:
+    """Compute 1/sin²(x/2) - 4/x², x = Δθ: the kernel of a gap's own periodic images."""
     if abs(x) < _PERIODIC_SERIES:
         y = x * x
         return 1 / 3 + y * (1 / 60 + y * (1 / 1512 + y * (1 / 43200 + y / 1330560)))
@@ -194,8 +219,8 @@ def periodic(x: float) -> float:
 
 
 @compiled
-def mapped(alpha: float, x: float) -> float:
-    """4 [α²/sinh²(αx) - 1/x²], x = Δη: the own gap's kernel beyond a straight crack in η."""
+def mapped_kernel(alpha: float, x: float) -> float:
+    """Compute 4 [α²/sinh²(αx) - 1/x²], x = Δη: the own kernel but for a straight crack in η."""
     y = alpha * x
     if abs(y) < _MAPPED_SERIES:
         y *= y
@@ -206,36 +231,18 @@ def mapped(alpha: float, x: float) -> float:
 
 
 @compiled
-def _between_gaps(theta: Array, weight: Array, offset: Kinds, matrix: Array) -> None:
-    """Blocks of different gaps."""
-    sine = np.sin(0.5 * theta)
-    cosine = np.cos(0.5 * theta)
-    for k in range(offset.shape[0] - 1):
-        for i in range(offset[k], offset[k + 1]):
-            _row_of_others(i, offset[k], offset[k + 1], sine, cosine, weight, matrix[i])
-
-
-@compiled
-def _between_gaps_again(
-    theta: Array, weight: Array, offset: Kinds, changed: Kinds, matrix: Array
-) -> None:
-    """Blocks between the gaps that have ``changed`` and all others."""
-    sine = np.sin(0.5 * theta)
-    cosine = np.cos(0.5 * theta)
-    for k in changed:
-        for i in range(offset[k], offset[k + 1]):
-            _row_of_others(i, offset[k], offset[k + 1], sine, cosine, weight, matrix[i])
-            for j in range(offset[k]):
-                matrix[j, i] = matrix[i, j]
-            for j in range(offset[k + 1], matrix.shape[0]):
-                matrix[j, i] = matrix[i, j]
+def _fill_rows(k: int, nodes: Nodes, sine: Array, cosine: Array, matrix: Array) -> None:
+    """Fill in the rows of gap k outside its diagonal block."""
+    first, behind = nodes.offset[k], nodes.offset[k + 1]
+    for i in range(first, behind):
+        _row_of_others(i, first, behind, sine, cosine, nodes.weight, matrix[i])
 
 
 @compiled_sums
 def _row_of_others(
     i: int, first: int, behind: int, sine: Array, cosine: Array, weight: Array, row: Array
 ) -> None:
-    """Into its ``row``: node i of a gap from node ``first`` to ``behind``, and those of others."""
+    """Fill the ``row`` of node i, of a gap from node ``first`` to ``behind``, for other gaps."""
     scale = -weight[i] / (4 * np.pi)
     si = sine[i]
     ci = cosine[i]

@@ -1,7 +1,7 @@
 """Dense symmetric positive definite systems, compiled, without calls of LAPACK.
 
 A field of a few gaps has some tens of unknowns, seldom hundreds; there the overhead of library
-calls and their copies is what costs. Factors are A = LᵀL with L lower, by rows and from the last
+calls and their copies dominates. Factors are A = LᵀL with L lower, by rows and from the last
 one on: every loop then starts at the beginning of a row, and eight rows are taken away at once, so
 that sums stay in vector registers.
 """
@@ -13,12 +13,12 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
 
-WIDE = 8  # rows that are taken away at once; multiples of it as many columns are the fastest
+BLOCK = 8  # rows that are taken away at once; multiples of it as many columns are the fastest
 
 
 @compiled_sums
 def factor_rows(a: Array, floor: float) -> bool:
-    """Factor L of a = LᵀL in place of the lower triangle, from the last row on.
+    """Factor a = LᵀL in place of the lower triangle, from the last row on.
 
     There may be more columns than rows; those further to the right, and the upper triangle, are
     not read, and not kept. False if a pivot is not positive, or below ``floor`` times the largest
@@ -30,7 +30,7 @@ def factor_rows(a: Array, floor: float) -> bool:
         least = max(least, floor * a[i, i])
     last = n
     while last > 0:
-        r = max(last - WIDE, 0)
+        r = max(last - BLOCK, 0)
         for k in range(last - 1, r - 1, -1):
             for i in range(k + 1, last):
                 c = a[i, k]
@@ -45,7 +45,7 @@ def factor_rows(a: Array, floor: float) -> bool:
         for i in range(r):
             c0, c1, c2, c3 = a[r, i], a[r + 1, i], a[r + 2, i], a[r + 3, i]
             c4, c5, c6, c7 = a[r + 4, i], a[r + 5, i], a[r + 6, i], a[r + 7, i]
-            for j in range(min(i - i % WIDE + WIDE, columns)):
+            for j in range(min(i - i % BLOCK + BLOCK, columns)):
                 a[i, j] -= (
                     c0 * a[r, j]
                     + c1 * a[r + 1, j]
@@ -61,16 +61,16 @@ def factor_rows(a: Array, floor: float) -> bool:
 
 
 @compiled
-def wide(count: int) -> int:
-    """The next multiple of ``WIDE``."""
-    return (count + WIDE - 1) // WIDE * WIDE
+def padded(count: int) -> int:
+    """Round up to a multiple of ``BLOCK``."""
+    return (count + BLOCK - 1) // BLOCK * BLOCK
 
 
 @compiled
 def cholesky(a: Array) -> tuple[Array, bool]:
-    """Factor L of a = LᵀL, in columns of a :func:`wide` array, and whether there is one."""
+    """Factor a = LᵀL into columns of a :func:`padded` array; returns whether that is possible."""
     n = a.shape[0]
-    factor = np.zeros((n, wide(n)))
+    factor = np.zeros((n, padded(n)))
     factor[:, :n] = a
     definite = factor_rows(factor, 0.0)
     return factor, definite
@@ -78,7 +78,7 @@ def cholesky(a: Array) -> tuple[Array, bool]:
 
 @compiled
 def is_definite(a: Array) -> bool:
-    """Whether a symmetric matrix is positive definite to rounding."""
+    """Return whether a symmetric matrix is positive definite to rounding."""
     _, definite = cholesky(a)
     return definite
 
@@ -116,7 +116,7 @@ def solve_column(factor: Array, x: Array) -> None:
 
 @compiled_sums
 def _solve_three(factor: Array, x: Array) -> None:
-    """As :func:`solve_column`, for three columns together."""
+    """Solve as :func:`solve_column` for three columns together."""
     n = factor.shape[0]
     a, b, c = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
@@ -149,7 +149,7 @@ def _solve_backward(f: Array, x: Array) -> None:
     n, columns = x.shape
     last = n
     while last > 0:
-        r = max(last - WIDE, 0)
+        r = max(last - BLOCK, 0)
         for k in range(last - 1, r - 1, -1):
             for i in range(k + 1, last):
                 c = f[i, k]
@@ -179,8 +179,8 @@ def _solve_backward(f: Array, x: Array) -> None:
 def _solve_forward(f: Array, x: Array) -> None:
     """Solve L y = x, in place."""
     n, columns = x.shape
-    for r in range(0, n, WIDE):
-        stop = min(r + WIDE, n)
+    for r in range(0, n, BLOCK):
+        stop = min(r + BLOCK, n)
         for k in range(r, stop):
             for i in range(r, k):
                 c = f[k, i]

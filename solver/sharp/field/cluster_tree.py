@@ -1,14 +1,14 @@
-"""Many gaps: their interaction on a binary tree of neighbours, solved directly.
+"""Interaction of many gaps on a binary tree of neighbours, solved directly.
 
-In its own coordinate η (``conformal_map``) a gap acts on the others
-through charges q_i = w_i f_i at its nodes and feels the potentials g_i = (dθ/dη) g(θ_i) there,
+In its own coordinate η (``conformal_map``) a gap acts on the others through charges q_i = w_i f_i
+at its nodes; the others' potentials g_i = (dθ/dη) g(θ_i) there are
 
     g_i = -Σ_j K_ij q_j,      K_ij = (dθ/dη)_i (dθ/dη)_j / (4π sin²((θ_i - θ_j)/2)).
 
 A run of neighbouring gaps is an interval between two patches, just as a gap is one: in *its*
 coordinate all that lies outside is again on the line Im η = π/(2α), however narrow the patches at
-its ends. So what it does to the outside is that of a few charges at the Chebyshev nodes of η, their
-number growing with the logarithm of run over patch. With R the response of a run, q = q° - R g, a
+its ends. So it acts on the outside like a few charges at the Chebyshev nodes of η, their number
+growing with the logarithm of run over patch. With R the response of a run, q = q° - R g, a
 pair of neighbours 1, 2 obeys
 
     q1 = q1° - R1 (E1 g - K12 q2),      q2 = q2° - R2 (E2 g - K21 q1),
@@ -24,7 +24,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
@@ -34,16 +33,12 @@ from adhesis.solver.sharp.gap.conformal_map import (
     LEFT_PATCH,
     RIGHT,
     RIGHT_PATCH,
-    convergence,
-    one_minus_plus,
+    convergence_rate,
+    eta_at,
     theta_at,
 )
-
-Integers = NDArray[np.int64]
-
-_MARGIN = 1.0  # digits (base e) of a run's charges beyond those of the field
-_FEWEST = 4  # charges of a run, at least
-_MOST = 160
+from adhesis.solver.sharp.gap.quadrature import Integers
+from adhesis.solver.sharp.tolerances import CHARGE_MARGIN, FEWEST_CHARGES, MOST_CHARGES
 
 
 class Tree(NamedTuple):
@@ -55,54 +50,61 @@ class Tree(NamedTuple):
         Both halves of a run; -1 for a gap.
     rank : int array, shape (runs,)
         Number of charges.
-    at, square, inner, mixed, lift : int array, shape (runs,)
-        Offsets: of its charges, of matrices (rank, rank), of (half 1, half 1), of (half 1, half 2)
-        and of (both halves, rank).
+    node_start, response_start, pair_start, kernel_start, interpolation_start : int array
+        Offsets, shape (runs + 1,): of its charges, of matrices (rank, rank), of (half 1, half 1),
+        of (half 1, half 2) and of (both halves, rank).
     theta, stretch : array
         θ and dθ/dη of all charges.
     kernel : array
         K12 of all pairs, flat.
-    lifted : array
+    interpolation : array
         E of all pairs, flat.
     """
 
     children: Integers
     rank: Integers
-    at: Integers
-    square: Integers
-    inner: Integers
-    mixed: Integers
-    lift: Integers
+    node_start: Integers
+    response_start: Integers
+    pair_start: Integers
+    kernel_start: Integers
+    interpolation_start: Integers
     theta: Array
     stretch: Array
     kernel: Array
-    lifted: Array
+    interpolation: Array
 
 
-class Response(NamedTuple):
-    """Responses of all runs of a tree, flat (see :class:`Tree` for the offsets).
+class TreeFactor(NamedTuple):
+    """Factor of a tree, flat (see :class:`Tree` for the offsets).
 
     Attributes
     ----------
-    own : array
+    response : array
         R of every run.
     pair : array
         W = (R1⁻¹ - K12 R2 K21)⁻¹ of every pair.
-    felt : array
+    charge : array
         Charges of both halves of a pair by the potentials at its nodes.
     negative : int
         Number of negative eigenvalues of the whole.
     """
 
-    own: Array
+    response: Array
     pair: Array
-    felt: Array
+    charge: Array
     negative: int
 
 
 @compiled
+def _part(flat: Array, start: Integers, run: int) -> Array:
+    """Return the part of a flat array that belongs to a run."""
+    part: Array = flat[start[run] : start[run + 1]]
+    return part
+
+
+@compiled
 def _interval(table: Array, first: int, last: int) -> Array:
-    """Row of the table of gaps for a run of them."""
+    """Make the row of the table of gaps for a run of them."""
     row: Array = table[first].copy()
     length = table[last, RIGHT] - table[first, LEFT]
     row[RIGHT] = table[last, RIGHT]
@@ -112,23 +114,16 @@ def _interval(table: Array, first: int, last: int) -> Array:
 
 
 @compiled
-def plant(
-    table: Array, offset: Integers, theta: Array, stretch: Array, digits: float, closed: bool
-) -> Tree:
-    """Tree over the gaps of ``table``, whose nodes are ``theta`` with dθ/dη ``stretch``.
-
-    ``closed`` if they are all gaps of the period, so that there is nothing outside; else they must
-    leave room for at least one more.
-    """
-    gaps = table.shape[0]
-    runs = 2 * gaps - 1
+def _pair_runs(
+    table: Array, rank: Integers, digits: float, closed: bool
+) -> tuple[Integers, Array]:
+    """Pair neighbouring runs, level by level: children and row of each; fills in their ``rank``."""
+    gaps, runs = table.shape[0], rank.shape[0]
     children = np.full((runs, 2), -1)
     span = np.empty((runs, 2), dtype=np.int64)
-    rank = np.zeros(runs, dtype=np.int64)
     rows = np.empty((runs, table.shape[1]))
     for k in range(gaps):
         span[k] = k
-        rank[k] = offset[k + 1] - offset[k]
         rows[k] = table[k]
     level = np.arange(gaps)
     made = gaps
@@ -141,13 +136,31 @@ def plant(
             span[made, 1] = span[level[2 * i + 1], 1]
             if made < runs - 1 or not closed:
                 rows[made] = _interval(table, span[made, 0], span[made, 1])
-                wanted = int(np.ceil((digits + _MARGIN) / convergence(rows[made])))
-                rank[made] = min(max(wanted, _FEWEST), _MOST)
+                wanted = int(np.ceil((digits + CHARGE_MARGIN) / convergence_rate(rows[made])))
+                rank[made] = min(max(wanted, FEWEST_CHARGES), MOST_CHARGES)
             above[i] = made
             made += 1
         if level.shape[0] % 2 == 1:
             above[-1] = level[-1]
         level = above
+    return children, rows
+
+
+@compiled
+def build_tree(
+    table: Array, offset: Integers, theta: Array, stretch: Array, digits: float, closed: bool
+) -> Tree:
+    """Build the tree over the gaps of ``table``, whose nodes are ``theta`` with dθ/dη ``stretch``.
+
+    ``closed`` if they are all gaps of the period, so that there is nothing outside; else they must
+    leave space for at least one more.
+    """
+    gaps = table.shape[0]
+    runs = 2 * gaps - 1
+    rank = np.zeros(runs, dtype=np.int64)
+    for k in range(gaps):
+        rank[k] = offset[k + 1] - offset[k]
+    children, rows = _pair_runs(table, rank, digits, closed)
     at = np.zeros(runs + 1, dtype=np.int64)
     square = np.zeros(runs + 1, dtype=np.int64)
     inner = np.zeros(runs + 1, dtype=np.int64)
@@ -170,34 +183,33 @@ def plant(
     places[: theta.shape[0]] = theta
     stretches[: theta.shape[0]] = stretch
     kernel = np.empty(mixed[runs])
-    lifted = np.empty(lift[runs])
+    interpolation = np.empty(lift[runs])
     for run in range(gaps, runs):
-        for i in range(rank[run]):
-            t = np.pi * (rank[run] - i - 0.5) / rank[run]
+        r = rank[run]
+        for i in range(r):
+            t = np.pi * (r - i - 0.5) / r
             places[at[run] + i], stretches[at[run] + i] = theta_at(rows[run], np.cos(t))
-        one = children[run, 0]
-        two = children[run, 1]
+        begin = lift[run]
+        for half in range(2):
+            child = children[run, half]
+            own = slice(at[child], at[child + 1])
+            end = begin + rank[child] * r
+            _interpolate(rows[run], places[own], stretches[own], r, interpolation[begin:end])
+            begin = end
+        own = slice(at[children[run, 0]], at[children[run, 0] + 1])
+        other = slice(at[children[run, 1]], at[children[run, 1] + 1])
         _kernel(
-            places[at[one] : at[one + 1]], stretches[at[one] : at[one + 1]],
-            places[at[two] : at[two + 1]], stretches[at[two] : at[two + 1]],
+            places[own], stretches[own], places[other], stretches[other],
             kernel[mixed[run] : mixed[run + 1]],
         )  # fmt: skip
-        _lift(
-            rows[run], places[at[one] : at[one + 1]], stretches[at[one] : at[one + 1]], rank[run],
-            lifted[lift[run] : lift[run] + rank[one] * rank[run]],
-        )  # fmt: skip
-        _lift(
-            rows[run], places[at[two] : at[two + 1]], stretches[at[two] : at[two + 1]], rank[run],
-            lifted[lift[run] + rank[one] * rank[run] : lift[run + 1]],
-        )  # fmt: skip
     return Tree(
-        children, rank, at, square, inner, mixed, lift, places, stretches, kernel, lifted
-    )  # fmt: skip
+        children, rank, at, square, inner, mixed, lift, places, stretches, kernel, interpolation
+    )
 
 
 @compiled_sums
 def _kernel(theta: Array, stretch: Array, other: Array, other_stretch: Array, out: Array) -> None:
-    """K between two sets of charges, flat."""
+    """Compute K between two sets of charges, flat."""
     columns = other.shape[0]
     sine = np.sin(0.5 * other)
     cosine = np.cos(0.5 * other)
@@ -212,10 +224,8 @@ def _kernel(theta: Array, stretch: Array, other: Array, other_stretch: Array, ou
 
 
 @compiled
-def _lift(row: Array, theta: Array, stretch: Array, rank: int, out: Array) -> None:
-    """Interpolation of potentials from the nodes of an interval to places inside it, flat."""
-    middle = 0.5 * (row[LEFT] + row[RIGHT])
-    length = row[RIGHT] - row[LEFT]
+def _interpolate(row: Array, theta: Array, stretch: Array, rank: int, out: Array) -> None:
+    """Interpolate potentials from the nodes of an interval to places inside it, flat."""
     node = np.empty(rank)
     share = np.empty(rank)
     for a in range(rank):
@@ -223,13 +233,8 @@ def _lift(row: Array, theta: Array, stretch: Array, rank: int, out: Array) -> No
         node[a] = np.cos(t)
         share[a] = np.sin(t) if a % 2 == 0 else -np.sin(t)
     for b in range(theta.shape[0]):
-        side = 0 if theta[b] < middle else 1
-        r = theta[b] - row[LEFT] if side == 0 else row[RIGHT] - theta[b]
-        own = row[LEFT_PATCH] if side == 0 else row[RIGHT_PATCH]
-        far = length + (row[RIGHT_PATCH] if side == 0 else row[LEFT_PATCH])
-        minus, plus = one_minus_plus(row, r, side)
-        x = plus - 1 if plus < minus else 1 - minus
-        scale = stretch[b] * (1 / (own + r) + 1 / (far - r)) / (2 * row[ALPHA])
+        x, _, slope = eta_at(row, theta[b])
+        scale = stretch[b] * slope
         total = 0.0
         hit = -1
         line = out[b * rank : (b + 1) * rank]
@@ -247,8 +252,8 @@ def _lift(row: Array, theta: Array, stretch: Array, rank: int, out: Array) -> No
 
 
 @compiled_sums
-def eliminate(a: Array, x: Array) -> bool:
-    """Solve a y = x for the columns of x, both overwritten; whether det a is negative."""
+def _eliminate(a: Array, x: Array) -> bool:
+    """Solve a y = x for the columns of x, both overwritten; returns whether det a is negative."""
     n = a.shape[0]
     columns = x.shape[1]
     negative = False
@@ -284,73 +289,73 @@ def eliminate(a: Array, x: Array) -> bool:
 
 
 @compiled
-def respond(tree: Tree, gaps_own: Array, gaps_negative: Integers) -> Response:
-    """Responses of all runs from those of the gaps, ``gaps_own`` (flat, one after the other).
+def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> TreeFactor:
+    """Compute the responses of all runs from those of the gaps (flat, one after the other).
 
-    ``gaps_negative`` are the gaps' numbers of negative eigenvalues. A whole has no fewer than each
-    of its halves; a pair's determinant tells whether their number is even. Two that appear
-    together in one pair go unseen: pulls of two places that are equal to rounding.
+    ``gap_negative`` are the gaps' numbers of negative eigenvalues. A whole has no fewer than each
+    of its halves; the sign of a pair's determinant gives whether their number is even. Two that
+    appear together in one pair go unseen: two places whose forces are equal to rounding.
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    own = np.empty(tree.square[runs])
-    own[: tree.square[gaps]] = gaps_own
+    responses = np.empty(tree.response_start[runs])
+    responses[: tree.response_start[gaps]] = gap_response
     negative = np.zeros(runs, dtype=np.int64)
-    negative[:gaps] = gaps_negative
-    pair = np.empty(tree.inner[runs])
-    felt = np.empty(tree.lift[runs])
+    negative[:gaps] = gap_negative
+    pair = np.empty(tree.pair_start[runs])
+    charge = np.empty(tree.interpolation_start[runs])
     for run in range(gaps, runs):
         one = tree.children[run, 0]
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
         r = tree.rank[run]
-        first = own[tree.square[one] : tree.square[one + 1]].reshape(n, n)
-        second = own[tree.square[two] : tree.square[two + 1]].reshape(m, m)
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]].reshape(n, m)
-        w = pair[tree.inner[run] : tree.inner[run + 1]].reshape(n, n)
+        first = _part(responses, tree.response_start, one).reshape(n, n)
+        second = _part(responses, tree.response_start, two).reshape(m, m)
+        kernel = _part(tree.kernel, tree.kernel_start, run).reshape(n, m)
+        w = _part(pair, tree.pair_start, run).reshape(n, n)
         # W = (R1⁻¹ - H)⁻¹ = (1 - R1 H)⁻¹ R1, H = K12 R2 K21
         half = np.dot(kernel, second)
-        felt_back = np.dot(half, kernel.T)
-        matrix = np.dot(first, felt_back)
+        reflected = np.dot(half, kernel.T)
+        matrix = np.dot(first, reflected)
         for i in range(n):
             for j in range(n):
                 w[i, j] = first[i, j]
                 matrix[i, j] = -matrix[i, j]
             matrix[i, i] += 1.0
-        odd = eliminate(matrix, w)
+        odd = _eliminate(matrix, w)
         count = max(negative[one], negative[two])
         if (negative[one] + negative[two] + count + (1 if odd else 0)) % 2 == 1:
             count += 1
         negative[run] = count
         if r == 0:
             continue
-        lifted = tree.lifted[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
-        charges = felt[tree.lift[run] : tree.lift[run + 1]].reshape(n + m, r)
+        interpolation = _part(tree.interpolation, tree.interpolation_start, run).reshape(n + m, r)
+        charges = _part(charge, tree.interpolation_start, run).reshape(n + m, r)
         # q1 = W (E1 + K12 R2 E2), q2 = R2 (E2 + K21 q1)
-        drive = np.dot(half, lifted[n:])
+        drive = np.dot(half, interpolation[n:])
         for i in range(n):
             for j in range(r):
-                drive[i, j] += lifted[i, j]
+                drive[i, j] += interpolation[i, j]
         np.dot(w, drive, charges[:n])
         more = np.dot(kernel.T, charges[:n])
         for i in range(m):
             for j in range(r):
-                more[i, j] += lifted[n + i, j]
+                more[i, j] += interpolation[n + i, j]
         np.dot(second, more, charges[n:])
-        response = own[tree.square[run] : tree.square[run + 1]].reshape(r, r)
-        np.dot(lifted.T, charges, response)
+        response = _part(responses, tree.response_start, run).reshape(r, r)
+        np.dot(interpolation.T, charges, response)
         for i in range(r):
             for j in range(i):
                 mean = 0.5 * (response[i, j] + response[j, i])
                 response[i, j] = mean
                 response[j, i] = mean
-    return Response(own, pair, felt, negative[runs - 1])
+    return TreeFactor(responses, pair, charge, negative[runs - 1])
 
 
 @compiled_sums
 def _apply(a: Array, x: Array, out: Array) -> None:
-    """Into ``out``: a x, a flat."""
+    """Compute a x into ``out``, a flat."""
     n = x.shape[0]
     for i in range(out.shape[0]):
         row = a[i * n : (i + 1) * n]
@@ -362,7 +367,7 @@ def _apply(a: Array, x: Array, out: Array) -> None:
 
 @compiled_sums
 def _add_apply(a: Array, x: Array, out: Array) -> None:
-    """To ``out``: a x, a flat."""
+    """Add a x to ``out``, a flat."""
     n = x.shape[0]
     for i in range(out.shape[0]):
         row = a[i * n : (i + 1) * n]
@@ -374,7 +379,7 @@ def _add_apply(a: Array, x: Array, out: Array) -> None:
 
 @compiled_sums
 def _add_transposed(a: Array, x: Array, out: Array) -> None:
-    """To ``out``: aᵀ x, a flat."""
+    """Add aᵀ x to ``out``, a flat."""
     n = out.shape[0]
     for k in range(x.shape[0]):
         value = x[k]
@@ -384,53 +389,53 @@ def _add_transposed(a: Array, x: Array, out: Array) -> None:
 
 
 @compiled
-def collect(tree: Tree, response: Response, alone: Array) -> Array:
-    """Charges of all runs, without potentials from outside a run's parent, columns as ``alone``.
+def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Array:
+    """Compute the charges of all runs, without potentials from outside a run's parent.
 
-    ``alone``, shape (N, columns), are the charges that each gap would have by itself.
+    ``isolated``, shape (N, columns), are the charges that each gap would have by itself.
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    charge = np.zeros((alone.shape[1], tree.at[runs]))
-    charge[:, : alone.shape[0]] = alone.T
-    room = np.empty((2, tree.rank.max()))
+    charge = np.zeros((isolated.shape[1], tree.node_start[runs]))
+    charge[:, : isolated.shape[0]] = isolated.T
+    work = np.empty((2, tree.rank.max()))
     for run in range(gaps, runs):
         one = tree.children[run, 0]
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
-        first = response.own[tree.square[one] : tree.square[one + 1]]
-        second = response.own[tree.square[two] : tree.square[two + 1]]
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]]
-        w = response.pair[tree.inner[run] : tree.inner[run + 1]]
-        up = tree.lifted[tree.lift[run] : tree.lift[run + 1]]
+        first = _part(factor.response, tree.response_start, one)
+        second = _part(factor.response, tree.response_start, two)
+        kernel = _part(tree.kernel, tree.kernel_start, run)
+        w = _part(factor.pair, tree.pair_start, run)
+        up = _part(tree.interpolation, tree.interpolation_start, run)
         split = n * tree.rank[run]
-        a = room[0, :n]
-        b = room[1, :m]
+        a = work[0, :n]
+        b = work[1, :m]
         for column in range(charge.shape[0]):
-            q1 = charge[column, tree.at[one] : tree.at[one + 1]]
-            q2 = charge[column, tree.at[two] : tree.at[two + 1]]
+            q1 = _part(charge[column], tree.node_start, one)
+            q2 = _part(charge[column], tree.node_start, two)
             # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
             _apply(kernel, q2, a)
             _add_apply(first, a, q1)
             b[:] = 0.0
             _add_transposed(kernel, q1, b)
-            c = room[0, :m]
+            c = work[0, :m]
             _apply(second, b, c)
-            _apply(kernel, c, room[1, :n])
-            _add_apply(w, room[1, :n], q1)
+            _apply(kernel, c, work[1, :n])
+            _add_apply(w, work[1, :n], q1)
             b[:] = 0.0
             _add_transposed(kernel, q1, b)
             _add_apply(second, b, q2)
-            q = charge[column, tree.at[run] : tree.at[run + 1]]
+            q = _part(charge[column], tree.node_start, run)
             _add_transposed(up[:split], q1, q)
             _add_transposed(up[split:], q2, q)
     return np.ascontiguousarray(charge.T)
 
 
 @compiled
-def distribute(tree: Tree, response: Response, charge: Array, outside: Array) -> Array:
-    """Potentials at all gaps, shape (N, columns), from charges of :func:`collect`.
+def downward_pass(tree: Tree, factor: TreeFactor, charge: Array, outside: Array) -> Array:
+    """Compute the potentials at all gaps, shape (N, columns), from charges of :func:`upward_pass`.
 
     ``outside`` are those at the nodes of the whole, shape (its rank, columns). ``charge`` becomes
     that of the whole tree.
@@ -439,29 +444,29 @@ def distribute(tree: Tree, response: Response, charge: Array, outside: Array) ->
     gaps = (runs + 1) // 2
     charges = np.ascontiguousarray(charge.T)
     potential = np.zeros(charges.shape)
-    potential[:, tree.at[runs - 1] : tree.at[runs]] = outside.T
-    room = np.empty(tree.rank.max())
+    potential[:, tree.node_start[runs - 1] : tree.node_start[runs]] = outside.T
+    work = np.empty(tree.rank.max())
     for run in range(runs - 1, gaps - 1, -1):
         one = tree.children[run, 0]
         two = tree.children[run, 1]
         n = tree.rank[one]
         m = tree.rank[two]
-        kernel = tree.kernel[tree.mixed[run] : tree.mixed[run + 1]]
-        up = tree.lifted[tree.lift[run] : tree.lift[run + 1]]
-        felt = response.felt[tree.lift[run] : tree.lift[run + 1]]
+        kernel = _part(tree.kernel, tree.kernel_start, run)
+        up = _part(tree.interpolation, tree.interpolation_start, run)
+        by_potential = _part(factor.charge, tree.interpolation_start, run)
         split = n * tree.rank[run]
         for column in range(charges.shape[0]):
-            q1 = charges[column, tree.at[one] : tree.at[one + 1]]
-            q2 = charges[column, tree.at[two] : tree.at[two + 1]]
-            g1 = potential[column, tree.at[one] : tree.at[one + 1]]
-            g2 = potential[column, tree.at[two] : tree.at[two + 1]]
-            g = potential[column, tree.at[run] : tree.at[run + 1]]
-            a = room[:n]
-            _apply(felt[:split], g, a)
+            q1 = _part(charges[column], tree.node_start, one)
+            q2 = _part(charges[column], tree.node_start, two)
+            g1 = _part(potential[column], tree.node_start, one)
+            g2 = _part(potential[column], tree.node_start, two)
+            g = _part(potential[column], tree.node_start, run)
+            a = work[:n]
+            _apply(by_potential[:split], g, a)
             for i in range(n):
                 q1[i] -= a[i]
-            b = room[:m]
-            _apply(felt[split:], g, b)
+            b = work[:m]
+            _apply(by_potential[split:], g, b)
             for i in range(m):
                 q2[i] -= b[i]
             _apply(kernel, q2, a)
@@ -474,4 +479,4 @@ def distribute(tree: Tree, response: Response, charge: Array, outside: Array) ->
             for i in range(m):
                 g2[i] -= b[i]
     charge[:] = charges.T
-    return np.ascontiguousarray(potential[:, : tree.at[gaps]].T)
+    return np.ascontiguousarray(potential[:, : tree.node_start[gaps]].T)

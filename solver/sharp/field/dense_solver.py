@@ -1,4 +1,4 @@
-"""The elastic field of given contact edges: every gap is a crack in a full contact.
+"""Elastic field of given contact edges: every gap is a crack in a full contact.
 
 Full contact carries the stress σ_full; the gaps relieve it. With θ = q0 x, S = 2σ/E*, T = q0 t (gap
 opening) and |D| the operator with symbol |m|,
@@ -6,10 +6,9 @@ opening) and |D| the operator with symbol |m|,
     S = S_full + p + |D| T,      S = 0 in the gaps,  T = 0 on the contact,  mean(T) = q0 s,
 
 p = 2p̄/E* the mean stress. In the coordinate η of each gap
-(``conformal_map``) T = sqrt(1-η²) f(η) closes at both ends by
-construction, the straight-crack part of |D| is diagonal in the Chebyshev polynomials U_n(η), and
-what remains is smooth. So a few values of f per gap carry it all, at the M second-kind
-Gauss-Chebyshev nodes of each gap:
+(``conformal_map``) T = sqrt(1-η²) f(η) closes at both ends by construction, the straight-crack part
+of |D| is diagonal in the Chebyshev polynomials U_n(η), and the rest is smooth. So a few values of f
+per gap are enough, at its M second-kind Gauss-Chebyshev nodes:
 
     (B + G) f = -(S~ + p X),     Xᵀ f = 2π q0 s,                                     (1)
 
@@ -23,11 +22,11 @@ M and hardly depends on how narrow the patches are.
 
 At an edge T ≈ C sqrt(r), r the distance from the edge in θ, and
 
-    C = sqrt(2 dη/dθ) [f(±1) - (s^± - Σ_{n<M} (±1)^n s_n)],      K = (E*/4) C sqrt(2π/q0) / q0^0,
+    C = sqrt(2 dη/dθ) [f(±1) - (s^± - Σ_{n<M} (±1)^n s_n)],      K = (E*/4) C sqrt(2π/q0),
     G = K²/(2E*) = π E* C² / (16 q0).
 
-(1) is assembled in ``assembly``; its derivatives with respect to the
-edges are in ``edge_derivatives``.
+K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. (1) is assembled in
+``assembly``; its derivatives with respect to the edges are in ``edge_derivatives``.
 """
 
 from __future__ import annotations
@@ -37,25 +36,36 @@ from functools import cached_property
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.field.assembly import Parts, assemble, assemble_again, first_nodes
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.field.assembly import assemble_changed, assemble_dense
 from adhesis.solver.sharp.field.cholesky import cholesky, solve_column, solve_factored
-from adhesis.solver.sharp.field.edge_derivatives import derivatives, felt_from_outside
-from adhesis.solver.sharp.field.exterior import add_outside, moving_load, reach
-from adhesis.solver.sharp.field.solution import (
-    FIXED,
-    Hold,
-    PlainSolution,
-    Solution,
-    balanced,
-    edge_openings,
-    openings_at,
-    plain,
-    without_field,
+from adhesis.solver.sharp.field.edge_derivatives import derivatives
+from adhesis.solver.sharp.field.exterior import (
+    NO_EXTERIOR,
+    Exterior,
+    ExteriorCoupling,
+    add_exterior,
+    is_present,
+    translation_terms,
 )
+from adhesis.solver.sharp.field.solution import (
+    FIXED_SEPARATION,
+    Equations,
+    ExteriorTerms,
+    FieldModel,
+    LoadingDevice,
+    Nodes,
+    Solution,
+    balance_means,
+    combine_openings,
+    edge_openings,
+    no_exterior_terms,
+    no_solution,
+)
+from adhesis.solver.sharp.field.weight_function import exterior_singular_terms
 from adhesis.solver.sharp.gap.conformal_map import in_order, map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import Panels, StressSource
-from adhesis.solver.sharp.gap.quadrature import RULES, Kinds, Rules, choose_kinds
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
 
 
 class GapField:
@@ -68,10 +78,10 @@ class GapField:
         Left and right end of each gap in θ: increasing, the last right end below
         gaps[0, 0] + 2π.
     prescribed : float
-        d of :class:`Hold`: q0 s at fixed separation.
+        d of :class:`LoadingDevice`: q0 s at fixed separation.
     tolerance : float
         Wanted relative accuracy of the interaction between gaps.
-    hold : Hold
+    device : LoadingDevice
     solution : Solution, optional
         The solution for these gaps, if it is known already.
 
@@ -94,15 +104,14 @@ class GapField:
         gaps: Array,
         prescribed: float,
         tolerance: float,
-        hold: Hold = FIXED,
+        device: LoadingDevice = FIXED_SEPARATION,
         solution: Solution | None = None,
     ) -> None:
-        self.source, self.gaps, self.prescribed, self.hold = source, gaps, prescribed, hold
+        self.source, self.gaps, self.prescribed, self.device = source, gaps, prescribed, device
         if solution is None:
-            kinds = choose_kinds(map_gaps(gaps), -np.log(tolerance), RULES.counts)
-            solution = Solution(
-                *solve_plain(gaps, prescribed, hold, kinds, 2, RULES, source.panels)
-            )
+            model = FieldModel(device, float(-np.log(tolerance)), GAUSS_RULES, source.panels)
+            orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+            solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
         if np.isnan(solution.pressure):
             raise FloatingPointError("the matrix of the gaps is not positive definite")
         self.solution = solution
@@ -113,19 +122,20 @@ class GapField:
     @property
     def pressure_by_prescribed(self) -> float:
         """∂p/∂d at fixed edges; negative."""
-        return -2 * np.pi / float(self.solution.resistance)
+        return -2 * np.pi / float(self.solution.mean.resistance)
 
     @property
     def separation_by_prescribed(self) -> float:
         """∂(q0 s)/∂d at fixed edges."""
-        return -float(self.solution.unit_mean) * self.pressure_by_prescribed / (2 * np.pi)
+        unit_mean = float(self.solution.mean.unit_mean)
+        return -unit_mean * self.pressure_by_prescribed / (2 * np.pi)
 
     @cached_property
     def opening_by_prescribed(self) -> Array:
         """∂C/∂d at fixed edges, shape (L, 2)."""
-        of = self.solution
-        unit = np.ascontiguousarray(-self.pressure_by_prescribed * of.solved[:, 1:2])
-        out: Array = edge_openings(unit, of.slope, of.kinds, of.offset, RULES.start, RULES.ends)
+        state = self.solution
+        unit = np.ascontiguousarray(-self.pressure_by_prescribed * state.solved[:, 1:2])
+        out: Array = edge_openings(unit, state.nodes, GAUSS_RULES)
         return out[:, 0].reshape(-1, 2)
 
     @cached_property
@@ -134,126 +144,103 @@ class GapField:
 
         Edges in the order of ``gaps.ravel()``; θ_f grows to the right.
         """
-        by_edge, pressure = derivatives(self.solution, RULES)
-        return by_edge, pressure
+        by_edge, conjugate = derivatives(self.solution, GAUSS_RULES)
+        return by_edge, conjugate
 
 
-@compiled
+@compiled_for_both
 def solve(
     gaps: Array,
     prescribed: float,
-    hold: Hold,
-    kinds: Kinds,
+    orders: Integers,
     fields: int,
-    rules: Rules,
-    panels: Panels,
+    model: FieldModel,
+    exterior: Exterior,
 ) -> Solution:
     """Solve (1) with the source S (``fields`` 1), or S and S' (2) for :func:`derivatives`.
 
-    An iteration must keep the kinds: where they change, the field jumps by its error. The pressure
+    An iteration must keep the orders: where they change, the field jumps by its error. The pressure
     is NaN if the matrix is not positive definite to rounding, or edges are no numbers or cross.
     """
     table = map_gaps(gaps)
     if not in_order(table):
-        return without_field(table, kinds, hold)
-    offset = first_nodes(kinds, rules, panels)
-    parts = assemble(table, kinds, offset, fields, rules, panels)
-    return _solved(table, kinds, offset, parts, prescribed, hold, fields, rules, panels)
+        return no_solution(table, orders, model.device)
+    nodes, equations = assemble_dense(table, orders, fields, model, exterior)
+    return _solve_equations(nodes, equations, prescribed, fields, model, exterior)
 
 
 @compiled
 def solve_again(
     gaps: Array,
     prescribed: float,
-    hold: Hold,
-    kinds: Kinds,
-    rules: Rules,
-    panels: Panels,
+    orders: Integers,
+    model: FieldModel,
+    exterior: Exterior,
     before: Solution,
 ) -> Solution:
-    """Solve (1) with S and S' when some gaps are as they were in such a solution ``before``.
+    """Solve (1) with S and S', taking over the equations of gaps that have not changed.
 
-    What belongs to those gaps is taken over.
+    They are those of such a solution ``before``.
     """
     table = map_gaps(gaps)
     if not in_order(table):
-        return without_field(table, kinds, hold)
-    offset = first_nodes(kinds, rules, panels)
-    if panels.outside.theta.shape[0] > 0 or not np.array_equal(kinds, before.kinds):
-        parts = assemble(table, kinds, offset, 2, rules, panels)
+        return no_solution(table, orders, model.device)
+    if is_present(exterior) or not np.array_equal(orders, before.nodes.orders):
+        nodes, equations = assemble_dense(table, orders, 2, model, exterior)
     else:
-        parts = assemble_again(table, kinds, offset, rules, panels, before)
-    return _solved(table, kinds, offset, parts, prescribed, hold, 2, rules, panels)
+        nodes, equations = assemble_changed(table, before, model)
+    return _solve_equations(nodes, equations, prescribed, 2, model, exterior)
 
 
 @compiled
-def solve_plain(
-    gaps: Array,
+def _solve_equations(
+    nodes: Nodes,
+    equations: Equations,
     prescribed: float,
-    hold: Hold,
-    kinds: Kinds,
     fields: int,
-    rules: Rules,
-    panels: Panels,
-) -> PlainSolution:
-    """As :func:`solve`, for calls from Python."""
-    return plain(solve(gaps, prescribed, hold, kinds, fields, rules, panels))
-
-
-@compiled
-def _solved(
-    table: Array,
-    kinds: Kinds,
-    offset: Kinds,
-    parts: Parts,
-    prescribed: float,
-    hold: Hold,
-    fields: int,
-    rules: Rules,
-    panels: Panels,
+    model: FieldModel,
+    exterior: Exterior,
 ) -> Solution:
-    """Solution of the assembled equations."""
-    theta, weight, slope, matrix, rhs, beyond = parts
-    windowed = panels.outside.theta.shape[0] > 0
-    rows, slopes = reach(theta, weight, panels.outside)
-    drawn = rows
-    if windowed:
-        drawn = add_outside(rows, panels.outside, matrix, rhs)
-    felt_load = np.empty((0, 0))
-    felt_area = np.empty(0)
-    felt_shift = 0.0
-    factor, definite = cholesky(matrix)
-    solved = rhs.copy()
-    opening = np.full(2 * table.shape[0], np.nan)
-    pressure = np.nan
-    unit_mean = np.nan
-    resistance = np.nan
-    separation = np.nan
-    f = np.empty(theta.shape[0])
-    if definite:
-        solve_factored(factor, solved)
-        load_mean = 0.0
-        unit_mean = 0.0
-        for i in range(theta.shape[0]):
-            load_mean += rhs[i, 1] * solved[i, 0]
-            unit_mean += rhs[i, 1] * solved[i, 1]
-        if windowed:
-            load_mean -= panels.outside.mean[0]
-            unit_mean += panels.outside.mean[1]
-        resistance, pressure, separation = balanced(load_mean, unit_mean, prescribed, hold)
-        f, opening = openings_at(pressure, solved, slope, beyond, kinds, offset, rules)
-        if windowed:
-            opening[-2:] = panels.outside.opening
-            if fields > 1:
-                load, felt_shift = moving_load(rows, slopes, drawn, panels.outside, f, pressure)
-                solve_column(factor, load)
-                for i in range(theta.shape[0]):
-                    solved[i, 2] += load[i]
-                felt_load, felt_area = felt_from_outside(
-                    table, slope, kinds, offset, rules, rows, drawn, panels.outside
-                )
+    """Solve the assembled equations, to which the exterior is added."""
+    load = equations.load
+    empty = np.empty((0, 0))
+    coupling = ExteriorCoupling(empty, empty, empty)
+    if is_present(exterior):
+        coupling = add_exterior(nodes, equations, exterior)
+    factor, definite = cholesky(equations.matrix)
+    if not definite:
+        return no_solution(nodes.table, nodes.orders, model.device)
+    solved = load.copy()
+    solve_factored(factor, solved)
+    load_mean = 0.0
+    unit_mean = 0.0
+    for i in range(load.shape[0]):
+        load_mean += load[i, 1] * solved[i, 0]
+        unit_mean += load[i, 1] * solved[i, 1]
+    if is_present(exterior):
+        load_mean -= exterior.mean[0]
+        unit_mean += exterior.mean[1]
+    mean, pressure, separation = balance_means(load_mean, unit_mean, prescribed, model.device)
+    f, opening = combine_openings(pressure, solved, nodes, equations.end_terms, model.rules)
+    terms = no_exterior_terms()
+    if is_present(exterior):
+        opening[-2:] = exterior.opening
+        if fields > 1:
+            more, shift = translation_terms(coupling, exterior, f, pressure)
+            solve_column(factor, more)
+            for i in range(more.shape[0]):
+                solved[i, 2] += more[i]
+            singular, area = exterior_singular_terms(nodes, model.rules, coupling, exterior)
+            terms = ExteriorTerms(present=True, load=singular, area=area, shift=shift)
     return Solution(
-        table, kinds, offset, theta, weight, slope, matrix, factor, rhs, solved, beyond,
-        hold.share, unit_mean, resistance, separation, pressure, f, opening, felt_load, felt_area,
-        felt_shift,
-    )  # fmt: skip
+        nodes=nodes,
+        equations=equations,
+        factor=factor,
+        solved=solved,
+        mean=mean,
+        separation=separation,
+        pressure=pressure,
+        scaled_opening=f,
+        opening=opening,
+        exterior=terms,
+    )

@@ -1,15 +1,15 @@
-"""What a window of gaps feels of all other gaps: a linear response about a known state.
+"""Exterior of a window of gaps: a linear response about a known state, as a Schur complement.
 
 Gaps outside a window act on it through the charges q of their run at its nodes ξ
 (``cluster_tree``),
 
     q = q0 - p q1 - R g,      g = -Kᵀ w f   (the potentials of the window's gaps at ξ),
 
-so equation (1) of ``dense_solver`` holds for the window with the
-matrix less w K R Kᵀ w, S~ less w K q0, X plus w K q1, and a mean opening to which the outside adds
-m0 - p m1 + q1ᵀ Kᵀ w f. With edges held outside this is exact; where they follow by their tangent it
-is so to second order of their motion. For the window the outside is one more gap, the last one,
-whose ends do not move.
+so equation (1) of ``dense_solver`` holds for the window with the matrix less w K R Kᵀ w, S~ less
+w K q0, X plus w K q1, and a mean opening to which the exterior adds m0 - p m1 + q1ᵀ Kᵀ w f. With
+edges held outside this is exact; where they follow by their tangent it is so to second order of
+their motion. For the window the exterior is one more gap, the last one, without nodes, whose ends
+do not move.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.field.solution import Equations, Nodes
 
 
-class Outside(NamedTuple):
+class Exterior(NamedTuple):
     """Response of the gaps outside a window, r charges; empty for none.
 
     Attributes
@@ -36,7 +37,7 @@ class Outside(NamedTuple):
     mean : array, shape (2,)
         m0 and m1.
     opening : array, shape (2,)
-        C at the ends of the outside, which keep their balance.
+        C at the ends of the exterior, which keep their balance.
     """
 
     theta: Array
@@ -47,74 +48,90 @@ class Outside(NamedTuple):
     opening: Array
 
 
-NOTHING = Outside(
-    np.empty(0), np.empty(0), np.empty((0, 0)), np.empty((0, 2)), np.zeros(2), np.zeros(2)
+NO_EXTERIOR = Exterior(
+    theta=np.empty(0),
+    stretch=np.empty(0),
+    response=np.empty((0, 0)),
+    charge=np.empty((0, 2)),
+    mean=np.zeros(2),
+    opening=np.zeros(2),
 )
+"""For gaps that are all gaps of the period."""
 
 
-class Felt(NamedTuple):
-    """What the outside adds to the derivatives of a window's field.
+class ExteriorCoupling(NamedTuple):
+    """Coupling of a window's nodes to its exterior, shape (N, r).
 
     Attributes
     ----------
-    load : array, shape (N, 2L)
-        To the loads of the singular openings; empty without an outside.
-    area : array, shape (2L,)
-        To their areas.
-    shift : float
-        To the mean opening when the window's edges move together.
+    kernel : array
+        w K.
+    slope : array
+        Its derivative by θ.
+    response : array
+        w K R.
     """
 
-    load: Array
-    area: Array
-    shift: float
+    kernel: Array
+    slope: Array
+    response: Array
 
 
 @compiled
-def reach(theta: Array, weight: Array, outside: Outside) -> tuple[Array, Array]:
-    """Rows w K of nodes, shape (nodes, r), and their derivative by θ."""
-    value = np.empty((theta.shape[0], outside.theta.shape[0]))
-    slope = np.empty((theta.shape[0], outside.theta.shape[0]))
+def is_present(exterior: Exterior) -> bool:
+    """Return whether the gaps are a window with an exterior."""
+    present: bool = exterior.theta.shape[0] > 0
+    return present
+
+
+@compiled
+def exterior_kernel(theta: Array, weight: Array, exterior: Exterior) -> tuple[Array, Array]:
+    """Evaluate w K at some places, shape (places, r), and its derivative by θ."""
+    value = np.empty((theta.shape[0], exterior.theta.shape[0]))
+    slope = np.empty((theta.shape[0], exterior.theta.shape[0]))
     for i in range(theta.shape[0]):
-        for a in range(outside.theta.shape[0]):
-            x = 0.5 * (theta[i] - outside.theta[a])
+        for a in range(exterior.theta.shape[0]):
+            x = 0.5 * (theta[i] - exterior.theta[a])
             sine = np.sin(x)
-            value[i, a] = weight[i] * outside.stretch[a] / (4 * np.pi * sine * sine)
+            value[i, a] = weight[i] * exterior.stretch[a] / (4 * np.pi * sine * sine)
             slope[i, a] = -value[i, a] * np.cos(x) / sine
     return value, slope
 
 
 @compiled
-def add_outside(rows: Array, outside: Outside, matrix: Array, rhs: Array) -> Array:
-    """Put the outside into matrix and loads (S~, X) of a window; returns w K R."""
-    drawn = rows @ outside.response
-    matrix -= drawn @ np.ascontiguousarray(rows.T)
-    pulled = rows @ outside.charge
-    for i in range(rows.shape[0]):
-        rhs[i, 0] -= pulled[i, 0]
-        rhs[i, 1] += pulled[i, 1]
-    return drawn
+def add_exterior(nodes: Nodes, equations: Equations, exterior: Exterior) -> ExteriorCoupling:
+    """Add the exterior to matrix and loads (S~, X) of a window."""
+    kernel, slope = exterior_kernel(nodes.theta, nodes.weight, exterior)
+    response = kernel @ exterior.response
+    matrix, load = equations.matrix, equations.load
+    matrix -= response @ np.ascontiguousarray(kernel.T)
+    charge = kernel @ exterior.charge
+    for i in range(kernel.shape[0]):
+        load[i, 0] -= charge[i, 0]
+        load[i, 1] += charge[i, 1]
+    return ExteriorCoupling(kernel, slope, response)
 
 
 @compiled
-def moving_load(
-    rows: Array, slopes: Array, drawn: Array, outside: Outside, f: Array, pressure: float
+def translation_terms(
+    coupling: ExteriorCoupling, exterior: Exterior, f: Array, pressure: float
 ) -> tuple[Array, float]:
-    """Load and mean opening that the outside adds when all edges of the window move together."""
-    potential = np.zeros(rows.shape[1])
-    changed = np.zeros(rows.shape[1])
-    for i in range(rows.shape[0]):
-        for a in range(rows.shape[1]):
-            potential[a] += rows[i, a] * f[i]
-            changed[a] += slopes[i, a] * f[i]
-    charge = outside.response @ potential
+    """Compute load and mean opening by the exterior when all edges of the window move together."""
+    kernel, slope = coupling.kernel, coupling.slope
+    potential = np.zeros(kernel.shape[1])
+    changed = np.zeros(kernel.shape[1])
+    for i in range(kernel.shape[0]):
+        for a in range(kernel.shape[1]):
+            potential[a] += kernel[i, a] * f[i]
+            changed[a] += slope[i, a] * f[i]
+    charge = exterior.response @ potential
     for a in range(charge.shape[0]):
-        charge[a] += outside.charge[a, 0] - pressure * outside.charge[a, 1]
-    load = np.zeros(rows.shape[0])
-    for i in range(rows.shape[0]):
-        for a in range(rows.shape[1]):
-            load[i] -= slopes[i, a] * charge[a] + drawn[i, a] * changed[a]
+        charge[a] += exterior.charge[a, 0] - pressure * exterior.charge[a, 1]
+    load = np.zeros(kernel.shape[0])
+    for i in range(kernel.shape[0]):
+        for a in range(kernel.shape[1]):
+            load[i] -= slope[i, a] * charge[a] + coupling.response[i, a] * changed[a]
     mean = 0.0
     for a in range(changed.shape[0]):
-        mean += changed[a] * outside.charge[a, 1]
+        mean += changed[a] * exterior.charge[a, 1]
     return load, mean

@@ -1,7 +1,7 @@
-"""The field of many gaps: equation (1) of ``dense_solver`` on a tree of gaps.
+"""Field of many gaps: equation (1) of ``dense_solver`` on a tree of gaps.
 
-The same equation as the dense solver's, with the same nodes; the interaction of the gaps is that of
-``cluster_tree``. The work grows as the number of gaps.
+Equation and nodes are those of the dense solver; the gaps interact through ``cluster_tree``. The
+work grows as the number of gaps.
 """
 
 from __future__ import annotations
@@ -11,75 +11,68 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.field.assembly import one_gap
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.field.assembly import assemble_blocks
 from adhesis.solver.sharp.field.cholesky import factor_rows, solve_factored
 from adhesis.solver.sharp.field.cluster_tree import (
-    Response,
     Tree,
-    collect,
-    distribute,
-    plant,
-    respond,
+    TreeFactor,
+    build_tree,
+    downward_pass,
+    factor_tree,
+    upward_pass,
 )
 from adhesis.solver.sharp.field.solution import (
-    Hold,
-    PlainSolution,
+    FieldModel,
+    Nodes,
     Solution,
-    balanced,
-    openings_at,
-    plain,
+    balance_means,
+    combine_openings,
+    no_exterior_terms,
 )
 from adhesis.solver.sharp.gap.conformal_map import in_order, map_gaps
-from adhesis.solver.sharp.gap.full_contact_stress import Panels
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 
-@compiled
-def gap_blocks(
-    table: Array, kinds: Kinds, offset: Kinds, fields: int, rules: Rules, panels: Panels
-) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """θ and X of the nodes, dη/dθ at the ends, diagonal blocks, loads (S~, X, S~'), higher modes.
+class HierarchicalSystem(NamedTuple):
+    """Factored equations of many gaps, beyond their :class:`Solution`.
 
-    The block of gap k is ``blocks[offset[k] : offset[k + 1], :m]``, m its number of nodes.
+    The matrix of the solution's equations holds the diagonal blocks.
+
+    Attributes
+    ----------
+    inverse : array
+        Inverses of the diagonal blocks, flat.
+    weights : array, shape (N,)
+        Quadrature weights.
+    tree : Tree
+    factor : TreeFactor
+        Of the gaps with their edges held.
     """
-    gaps = table.shape[0]
-    n = offset[gaps]
-    widest = 0
-    for k in range(gaps):
-        widest = max(widest, rules.counts[kinds[k]])
-    theta = np.empty(n)
-    weight = np.empty(n)
-    slope = np.empty((gaps, 2))
-    rhs = np.empty((n, fields + 1))
-    beyond = np.empty((gaps, 2, fields))
-    blocks = np.zeros((n, widest))
-    for k in range(gaps):
-        own = slice(offset[k], offset[k + 1])
-        one_gap(
-            table[k], kinds[k], rules, panels, theta[own], weight[own], slope[k], rhs[own],
-            beyond[k], blocks[own, : offset[k + 1] - offset[k]],
-        )  # fmt: skip
-    return theta, weight, slope, blocks, rhs, beyond
+
+    inverse: Array
+    weights: Array
+    tree: Tree
+    factor: TreeFactor
 
 
 @compiled
-def invert_gaps(
-    kinds: Kinds, offset: Kinds, rules: Rules, blocks: Array
-) -> tuple[Array, Array, bool]:
-    """Inverses A⁻¹ of the diagonal blocks and w A⁻¹ w, flat; False if there is none."""
+def invert_blocks(nodes: Nodes, blocks: Array, rules: GaussRules) -> tuple[Array, Array, bool]:
+    """Invert the diagonal blocks A: A⁻¹ and w A⁻¹ w, flat, and whether all are definite."""
+    offset = nodes.offset
+    gaps = offset.shape[0] - 1
     size = 0
-    for k in range(kinds.shape[0]):
-        size += rules.counts[kinds[k]] ** 2
+    for k in range(gaps):
+        size += (offset[k + 1] - offset[k]) ** 2
     inverse = np.empty(size)
-    own = np.empty(size)
+    response = np.empty(size)
     at = 0
-    for k in range(kinds.shape[0]):
-        m = rules.counts[kinds[k]]
-        start = rules.start[kinds[k]]
+    for k in range(gaps):
+        m = offset[k + 1] - offset[k]
+        start = rules.vector_start[nodes.orders[k]]
         factor = blocks[offset[k] : offset[k + 1], :m].copy()
         if not factor_rows(factor, 0.0):
-            return inverse, own, False
+            return inverse, response, False
         unit = np.zeros((m, m))
         for i in range(m):
             unit[i, i] = 1.0
@@ -88,29 +81,30 @@ def invert_gaps(
             for j in range(m):
                 value = 0.5 * (unit[i, j] + unit[j, i])
                 inverse[at + i * m + j] = value
-                own[at + i * m + j] = rules.w[start + i] * value * rules.w[start + j]
+                weight = rules.weights[start + i]
+                response[at + i * m + j] = weight * value * rules.weights[start + j]
         at += m * m
-    return inverse, own, True
+    return inverse, response, True
 
 
 @compiled
-def weights_of(kinds: Kinds, offset: Kinds, rules: Rules) -> Array:
-    """Quadrature weights w of all nodes."""
-    w = np.empty(offset[kinds.shape[0]])
-    for k in range(kinds.shape[0]):
-        start = rules.start[kinds[k]]
-        for i in range(offset[k + 1] - offset[k]):
-            w[offset[k] + i] = rules.w[start + i]
+def quadrature_weights(nodes: Nodes, rules: GaussRules) -> Array:
+    """Collect the quadrature weights w of all nodes."""
+    w = np.empty(nodes.theta.shape[0])
+    for k in range(nodes.orders.shape[0]):
+        start = rules.vector_start[nodes.orders[k]]
+        for i in range(nodes.offset[k + 1] - nodes.offset[k]):
+            w[nodes.offset[k] + i] = rules.weights[start + i]
     return w
 
 
 @compiled
-def by_gaps(kinds: Kinds, offset: Kinds, rules: Rules, inverse: Array, x: Array) -> Array:
-    """Inverse diagonal blocks times the columns of x."""
+def apply_inverse(offset: Integers, inverse: Array, x: Array) -> Array:
+    """Multiply the columns of x by the inverse diagonal blocks."""
     out = np.zeros(x.shape)
     at = 0
-    for k in range(kinds.shape[0]):
-        m = rules.counts[kinds[k]]
+    for k in range(offset.shape[0] - 1):
+        m = offset[k + 1] - offset[k]
         for i in range(m):
             for j in range(m):
                 value = inverse[at + i * m + j]
@@ -120,108 +114,79 @@ def by_gaps(kinds: Kinds, offset: Kinds, rules: Rules, inverse: Array, x: Array)
     return out
 
 
-class Gaps(NamedTuple):
-    """What a step of all edges needs of a field of many gaps, beyond its :class:`Solution`.
-
-    Attributes
-    ----------
-    blocks : array, shape (N, widest)
-        Diagonal blocks of (1).
-    inverse : array
-        Their inverses, flat.
-    w : array, shape (N,)
-        Quadrature weights.
-    tree : Tree
-    response : Response
-        That of the gaps with their edges held.
-    """
-
-    blocks: Array
-    inverse: Array
-    w: Array
-    tree: Tree
-    response: Response
-
-
-@compiled
+@compiled_for_both
 def solve_many(
-    gaps: Array,
-    prescribed: float,
-    hold: Hold,
-    kinds: Kinds,
-    digits: float,
-    fields: int,
-    rules: Rules,
-    panels: Panels,
-) -> tuple[Solution, Gaps]:
-    """Solve the field of many gaps; ``matrix`` and ``factor`` are empty.
-
-    Otherwise as ``dense_solver.solve``.
+    gaps: Array, prescribed: float, orders: Integers, fields: int, model: FieldModel
+) -> tuple[Solution, HierarchicalSystem]:
+    """Solve the field of many gaps, otherwise as ``dense_solver.solve``.
 
     Of S' there is the load alone, no solution.
-
-    ``digits`` is -ln of the wanted accuracy of the interaction.
     """
     table = map_gaps(gaps)
     count = table.shape[0]
-    offset = np.zeros(count + 1, dtype=np.int64)
-    for k in range(count):
-        offset[k + 1] = offset[k] + rules.counts[kinds[k]]
-    sound = in_order(table)
-    if not sound:  # any edges with a field: what comes of them is marked as none
+    ordered = in_order(table)
+    if not ordered:  # any edges with a field, whose pressure is then set to NaN
         table = map_gaps(np.arange(2.0 * count).reshape(count, 2) * (np.pi / count))
-    theta, weight, slope, blocks, rhs, beyond = gap_blocks(
-        table, kinds, offset, fields, rules, panels
-    )
-    inverse, own, definite = invert_gaps(kinds, offset, rules, blocks)
-    w = weights_of(kinds, offset, rules)
-    tree = plant(table, offset, theta, weight / w, digits, True)
-    response = respond(tree, own, np.zeros(count, dtype=np.int64))
-    of_gaps = Gaps(blocks, inverse, w, tree, response)
-    solved = spread(of_gaps, kinds, offset, rules, rhs[:, :2].copy(), np.zeros((rhs.shape[0], 2)))
+    nodes, equations = assemble_blocks(table, orders, fields, model)
+    offset, load = nodes.offset, equations.load
+    inverse, response, definite = invert_blocks(nodes, equations.matrix, model.rules)
+    weights = quadrature_weights(nodes, model.rules)
+    tree = build_tree(table, offset, nodes.theta, nodes.weight / weights, model.digits, True)
+    factor = factor_tree(tree, response, np.zeros(count, dtype=np.int64))
+    system = HierarchicalSystem(inverse, weights, tree, factor)
+    solved = solve_loads(system, offset, load[:, :2].copy(), np.zeros((load.shape[0], 2)))
     load_mean = 0.0
     unit_mean = 0.0
-    for i in range(theta.shape[0]):
-        load_mean += weight[i] * solved[i, 0]
-        unit_mean += weight[i] * solved[i, 1]
-    resistance, pressure, separation = balanced(load_mean, unit_mean, prescribed, hold)
-    if not (sound and definite):
+    for i in range(load.shape[0]):
+        load_mean += load[i, 1] * solved[i, 0]
+        unit_mean += load[i, 1] * solved[i, 1]
+    mean, pressure, separation = balance_means(load_mean, unit_mean, prescribed, model.device)
+    if not (ordered and definite):
         pressure = np.nan
-    f, opening = openings_at(pressure, solved, slope, beyond, kinds, offset, rules)
-    empty = np.empty((0, 0))
+    f, opening = combine_openings(pressure, solved, nodes, equations.end_terms, model.rules)
     solution = Solution(
-        table, kinds, offset, theta, weight, slope, empty, empty, rhs, solved, beyond,
-        hold.share, unit_mean, resistance, separation, pressure, f, opening, empty, np.empty(0),
-        0.0,
-    )  # fmt: skip
-    return solution, of_gaps
+        nodes=nodes,
+        equations=equations,
+        factor=np.empty((0, 0)),
+        solved=solved,
+        mean=mean,
+        separation=separation,
+        pressure=pressure,
+        scaled_opening=f,
+        opening=opening,
+        exterior=no_exterior_terms(),
+    )
+    return solution, system
 
 
 @compiled
-def spread(
-    of: Gaps, kinds: Kinds, offset: Kinds, rules: Rules, load: Array, charge: Array
+def solve_loads(
+    system: HierarchicalSystem, offset: Integers, load: Array, charge: Array
 ) -> Array:
-    """(B + G)⁻¹ of loads and of the potentials of further charges, which each gap has, as columns.
+    """Apply (B + G)⁻¹ to loads, and to the potentials of further charges of the gaps, as columns.
 
-    What a gap's own further charges do to it is part of its load.
+    The potential of a gap's further charges in that gap itself is part of its load.
     """
-    alone = by_gaps(kinds, offset, rules, of.inverse, load)
-    w = of.w.reshape(-1, 1)
-    charges = collect(of.tree, of.response, alone * w + charge)
-    potential = distribute(of.tree, of.response, charges, np.zeros((0, load.shape[1])))
-    return alone - by_gaps(kinds, offset, rules, of.inverse, potential * w)
+    isolated = apply_inverse(offset, system.inverse, load)
+    w = system.weights.reshape(-1, 1)
+    charges = upward_pass(system.tree, system.factor, isolated * w + charge)
+    outside = np.zeros((0, load.shape[1]))
+    potential = downward_pass(system.tree, system.factor, charges, outside)
+    return isolated - apply_inverse(offset, system.inverse, potential * w)
 
 
 @compiled
-def solve_many_plain(
-    gaps: Array,
-    prescribed: float,
-    hold: Hold,
-    kinds: Kinds,
-    digits: float,
-    fields: int,
-    rules: Rules,
-    panels: Panels,
-) -> PlainSolution:
-    """As :func:`solve_many`, for calls from Python."""
-    return plain(solve_many(gaps, prescribed, hold, kinds, digits, fields, rules, panels)[0])
+def gap_potentials(state: Solution, weights: Array) -> Array:
+    """Compute the potential of the other gaps at every node, from the balance of its own gap."""
+    offset, load, blocks = state.nodes.offset, state.equations.load, state.equations.matrix
+    out = np.empty(state.scaled_opening.shape[0])
+    for k in range(offset.shape[0] - 1):
+        base = offset[k]
+        m = offset[k + 1] - base
+        for i in range(base, base + m):
+            # A f + w g + S~ + p X = 0
+            total = load[i, 0] + state.pressure * load[i, 1]
+            for j in range(m):
+                total += blocks[i, j] * state.scaled_opening[base + j]
+            out[i] = -total / weights[i]
+    return out

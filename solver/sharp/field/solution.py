@@ -1,174 +1,238 @@
-"""Prescribed quantity, and solution of (1) in ``dense_solver`` for given gaps."""
+"""Prescribed quantity, model and solution of (1) in ``dense_solver`` for given gaps."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 
-class Hold(NamedTuple):
-    """Prescribed quantity d = share·q0 s - give·p.
+class LoadingDevice(NamedTuple):
+    """Device that prescribes d = separation_weight·q0 s - compliance·p.
 
-    It is x of ``control`` in the units used here.
-
-    (1, 0) is a fixed separation, (1, E* q0/(2k)) a stiffness k, (0, 1) a load.
+    It is x of ``control`` in the units used here: (1, 0) is a fixed separation, (1, E* q0/(2k)) a
+    device of stiffness k, (0, 1) a load.
     """
 
-    share: float
-    give: float
+    separation_weight: float
+    compliance: float
 
 
-FIXED = Hold(1.0, 0.0)
+FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
 
 
-class Solution(NamedTuple):
-    """Solution of (1), as the compiled code hands it on; N nodes of all gaps together.
+class FieldModel(NamedTuple):
+    """Everything that a field depends on besides its gaps and the prescribed quantity.
 
     Attributes
     ----------
-    table : array
+    device : LoadingDevice
+    digits : float
+        -ln of the relative accuracy of the field.
+    rules : GaussRules
+    panels : Panels
+        Of the full-contact stress.
+    """
+
+    device: LoadingDevice
+    digits: float
+    rules: GaussRules
+    panels: Panels
+
+
+class Nodes(NamedTuple):
+    """Gaps and their Gauss-Chebyshev nodes, N of all L gaps together.
+
+    Attributes
+    ----------
+    table : array, shape (L, 5)
         Of ``conformal_map.map_gaps``.
-    kinds, offset : int array
-        Kind and first node of each gap.
+    orders, offset : int array, shape (L,) and (L + 1,)
+        Order of each gap's rule, and first node of each gap.
     theta, weight : array, shape (N,)
         θ and X of the nodes.
     slope : array, shape (L, 2)
         dη/dθ at the gap ends.
-    matrix, factor : array, shape (N, N)
-        B + G and its factor (``cholesky.cholesky``).
-    rhs, solved : array, shape (N, 2 or 3)
-        Loads S~, X and, if asked for, S~', and (B + G)⁻¹ of them.
-    beyond : array, shape (L, 2, 1 or 2)
-        What the modes of S and S' above M add at the ends.
-    share : float
-        Of the :class:`Hold`.
-    unit_mean, resistance : float
-        Xᵀ (B + G)⁻¹ X, and share·that + 2π give: -2π/resistance is ∂p/∂d at fixed edges.
-    separation, pressure : float
-        q0 s and p = 2p̄/E*.
-    f : array, shape (N,)
-        The openings over sqrt(1-η²).
-    opening : array, shape (2L,)
-        C at each gap end.
-    felt_load, felt_area, felt_shift : array, array, float
-        Of the derivatives, what comes from outside a window
-        (``exterior``): loads, shape (N, 2L), and areas, shape (2L,),
-        of the singular openings, both empty without an outside, and the mean opening when all edges
-        move together.
     """
 
     table: Array
-    kinds: NDArray[np.int64]
-    offset: NDArray[np.int64]
+    orders: Integers
+    offset: Integers
     theta: Array
     weight: Array
     slope: Array
+
+
+class Equations(NamedTuple):
+    """Equations (1) at the nodes of given gaps.
+
+    Attributes
+    ----------
+    matrix : array
+        B + G, shape (N, N), or its diagonal blocks alone, one below the other.
+    load : array, shape (N, 2 or 3)
+        S~, X and, if asked for, S~'.
+    end_terms : array, shape (L, 2, 1 or 2)
+        Terms that the modes of S and S' above M add at the ends.
+    """
+
     matrix: Array
-    factor: Array
-    rhs: Array
-    solved: Array
-    beyond: Array
-    share: float
+    load: Array
+    end_terms: Array
+
+
+class ExteriorTerms(NamedTuple):
+    """Terms that the exterior of a window adds to the derivatives of its field.
+
+    Attributes
+    ----------
+    present : bool
+        Whether the gaps are a window.
+    load : array, shape (N, 2L)
+        Added to the loads of the singular openings.
+    area : array, shape (2L,)
+        Added to their areas.
+    shift : float
+        Added to the mean opening when all edges of the window move together.
+    """
+
+    present: bool
+    load: Array
+    area: Array
+    shift: float
+
+
+class MeanResponse(NamedTuple):
+    """Response of the mean opening to the mean stress.
+
+    Attributes
+    ----------
+    separation_weight : float
+        Of the :class:`LoadingDevice`.
+    unit_mean : float
+        Xᵀ (B + G)⁻¹ X.
+    resistance : float
+        separation_weight·unit_mean + 2π compliance: -2π/resistance is ∂p/∂d at fixed edges.
+    """
+
+    separation_weight: float
     unit_mean: float
     resistance: float
+
+
+class Solution(NamedTuple):
+    """Solution of (1).
+
+    Attributes
+    ----------
+    nodes : Nodes
+    equations : Equations
+    factor : array, shape (N, ·)
+        Of the matrix (``cholesky.cholesky``); empty where the gaps are solved on a tree.
+    solved : array, shape (N, 2 or 3)
+        (B + G)⁻¹ of the loads.
+    mean : MeanResponse
+    separation, pressure : float
+        q0 s and p = 2p̄/E*; the pressure is NaN if there is no solution.
+    scaled_opening : array, shape (N,)
+        f: the openings over sqrt(1-η²).
+    opening : array, shape (2L,)
+        C at each gap end.
+    exterior : ExteriorTerms
+    """
+
+    nodes: Nodes
+    equations: Equations
+    factor: Array
+    solved: Array
+    mean: MeanResponse
     separation: float
     pressure: float
-    f: Array
+    scaled_opening: Array
     opening: Array
-    felt_load: Array
-    felt_area: Array
-    felt_shift: float
-
-
-PlainSolution = tuple[
-    Array, Kinds, Kinds, Array, Array, Array, Array, Array, Array, Array, Array, float, float,
-    float, float, float, Array, Array, Array, Array, float,
-]  # fmt: skip
-"""The fields of :class:`Solution` in order."""
+    exterior: ExteriorTerms
 
 
 @compiled
-def plain(of: Solution) -> PlainSolution:
-    """Give a solution as a plain tuple, for the way back to Python.
-
-    To make a named one, compiled code calls Python, where a signal's handler may run and raise: an
-    exception that is not expected there.
-    """
-    return (
-        of.table, of.kinds, of.offset, of.theta, of.weight, of.slope, of.matrix, of.factor, of.rhs,
-        of.solved, of.beyond, of.share, of.unit_mean, of.resistance, of.separation, of.pressure,
-        of.f, of.opening, of.felt_load, of.felt_area, of.felt_shift,
-    )  # fmt: skip
+def no_exterior_terms() -> ExteriorTerms:
+    """Make the terms of gaps that are all gaps of the period."""
+    return ExteriorTerms(present=False, load=np.empty((0, 0)), area=np.empty(0), shift=0.0)
 
 
 @compiled
-def without_field(table: Array, kinds: Kinds, hold: Hold) -> Solution:
-    """What is told of edges that are no numbers or cross."""
-    nothing, none = np.empty(0), np.empty((0, 0))
+def no_solution(table: Array, orders: Integers, device: LoadingDevice) -> Solution:
+    """Make the solution for edges that are no numbers or cross."""
+    gaps = table.shape[0]
+    empty, none = np.empty(0), np.empty((0, 0))
+    offset = np.zeros(gaps + 1, dtype=np.int64)
     return Solution(
-        table, kinds, np.zeros(table.shape[0] + 1, dtype=np.int64), nothing, nothing,
-        np.empty((table.shape[0], 2)), none, none, none, none, np.empty((0, 0, 0)), hold.share,
-        np.nan, np.nan, np.nan, np.nan, nothing, np.full(2 * table.shape[0], np.nan), none, nothing,
-        np.nan,
-    )  # fmt: skip
+        nodes=Nodes(table, orders, offset, empty, empty, np.empty((gaps, 2))),
+        equations=Equations(none, none, np.empty((0, 0, 0))),
+        factor=none,
+        solved=none,
+        mean=MeanResponse(device.separation_weight, np.nan, np.nan),
+        separation=np.nan,
+        pressure=np.nan,
+        scaled_opening=empty,
+        opening=np.full(2 * gaps, np.nan),
+        exterior=no_exterior_terms(),
+    )
 
 
 @compiled
-def edge_openings(
-    f: Array, slope: Array, kinds: Kinds, offset: Kinds, start: Kinds, ends: Array
-) -> Array:
-    """sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
+def edge_openings(f: Array, nodes: Nodes, rules: GaussRules) -> Array:
+    """Evaluate sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
+    slope, offset = nodes.slope, nodes.offset
     out = np.zeros((2 * slope.shape[0], f.shape[1]))
     for k in range(slope.shape[0]):
+        start = rules.vector_start[nodes.orders[k]]
         for side in range(2):
             scale = np.sqrt(2 * slope[k, side])
             for i in range(offset[k + 1] - offset[k]):
-                factor = scale * ends[side, start[kinds[k]] + i]
+                factor = scale * rules.end_values[side, start + i]
                 for j in range(f.shape[1]):
                     out[2 * k + side, j] += factor * f[offset[k] + i, j]
     return out
 
 
 @compiled
-def balanced(
-    load_mean: float, unit_mean: float, prescribed: float, hold: Hold
-) -> tuple[float, float, float]:
-    """Resistance, p and q0 s at which what is prescribed holds.
-
-    ``load_mean`` and ``unit_mean`` are Xᵀ (B + G)⁻¹ of S~ and of X.
-    """
-    resistance = hold.share * unit_mean + 2 * np.pi * hold.give
-    pressure = -(2 * np.pi * prescribed + hold.share * load_mean) / resistance
-    separation = prescribed
-    if hold.give != 0:
-        separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
-    return resistance, pressure, separation
+def subtract_end_terms(opening: Array, slope: Array, end_terms: Array, field: int) -> None:
+    """Subtract the terms of a field's higher modes (0: S, 1: S') from its edge openings."""
+    for k in range(slope.shape[0]):
+        for side in range(2):
+            opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * end_terms[k, side, field]
 
 
 @compiled
-def openings_at(
-    pressure: float,
-    solved: Array,
-    slope: Array,
-    beyond: Array,
-    kinds: Kinds,
-    offset: Kinds,
-    rules: Rules,
+def balance_means(
+    load_mean: float, unit_mean: float, prescribed: float, device: LoadingDevice
+) -> tuple[MeanResponse, float, float]:
+    """Find the mean response, p and q0 s at which what is prescribed holds.
+
+    ``load_mean`` and ``unit_mean`` are Xᵀ (B + G)⁻¹ of S~ and of X.
+    """
+    weight, compliance = device.separation_weight, device.compliance
+    resistance = weight * unit_mean + 2 * np.pi * compliance
+    pressure = -(2 * np.pi * prescribed + weight * load_mean) / resistance
+    separation = prescribed
+    if compliance != 0:
+        separation = -(load_mean + pressure * unit_mean) / (2 * np.pi)
+    return MeanResponse(weight, unit_mean, resistance), pressure, separation
+
+
+@compiled
+def combine_openings(
+    pressure: float, solved: Array, nodes: Nodes, end_terms: Array, rules: GaussRules
 ) -> tuple[Array, Array]:
-    """The openings over sqrt(1-η²) at a mean stress p, and C at each gap end, of all modes."""
+    """Combine f at a mean stress p, and C at each gap end, of all modes."""
     f = np.empty(solved.shape[0])
     for i in range(solved.shape[0]):
         f[i] = -solved[i, 0] - pressure * solved[i, 1]
-    opening = edge_openings(f.reshape(-1, 1), slope, kinds, offset, rules.start, rules.ends)[
-        :, 0
-    ].copy()
-    for k in range(slope.shape[0]):
-        for side in range(2):
-            opening[2 * k + side] -= np.sqrt(2 * slope[k, side]) * beyond[k, side, 0]
+    opening = edge_openings(f.reshape(-1, 1), nodes, rules)[:, 0].copy()
+    subtract_end_terms(opening, nodes.slope, end_terms, 0)
     return f, opening

@@ -4,7 +4,7 @@ In the coordinate η of a gap (``conformal_map``; its ends are η = ∓1)
 its field needs
 
     s_n  = (2/π) ∫ S U_n(η) sqrt(1 - η²) dθ,        n = 0 … M-1   (second-kind Chebyshev moments)
-    s^±  = (1/π) ∫ S sqrt((1 ± η)/(1 ∓ η)) dθ = Σ_n (±1)^n s_n    (what drives each end)
+    s^±  = (1/π) ∫ S sqrt((1 ± η)/(1 ∓ η)) dθ = Σ_n (±1)^n s_n    (the load of each end)
 
 A gap is tiled with panels (``full_contact_stress``) no longer than
 their distance from its ends; the cost of a moment grows with log(gap/λ_min), not with the number of
@@ -25,13 +25,15 @@ from adhesis.solver.sharp.gap.conformal_map import (
     LEFT_PATCH,
     RIGHT,
     RIGHT_PATCH,
+    eta_from,
+    log_ratio,
     one_minus_plus,
+    pole_distances,
     theta_at,
 )
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, value_at
+from adhesis.solver.sharp.tolerances import PANEL_PHASE, SHORT_GAP_PANELS
 
-_SHORT_GAP = 4  # gaps shorter than so many finest panels are integrated directly
-_PHASE = 3.0  # radians of the highest Chebyshev mode that one panel may span
 _LARGEST = 0.36  # z up to which artanh z is a short series
 _SAFE = 2.0  # modes·length/distance of a panel up to which it surely spans less
 
@@ -40,8 +42,8 @@ _MINUS, _PLUS, _STRESS, _SLOPE = 0, 1, 2, 3
 
 
 @compiled
-def _room(nodes: Array, count: int, more: int) -> Array:
-    """``nodes`` with room for ``more`` columns beyond ``count``."""
+def _widened(nodes: Array, count: int, more: int) -> Array:
+    """Return ``nodes`` with space for ``more`` columns beyond ``count``."""
     if count + more <= nodes.shape[1]:
         return nodes
     wider = np.empty((nodes.shape[0], 2 * (count + more)))
@@ -51,108 +53,119 @@ def _room(nodes: Array, count: int, more: int) -> Array:
 
 @compiled
 def _artanh_over(y: float) -> float:
-    """The quotient artanh z/z, y = z², where |z| is hardly above 1/3."""
+    """Compute artanh z/z, y = z², where |z| is hardly above 1/3."""
     series = 1 / 15 + y * (1 / 17 + y * (1 / 19 + y * (1 / 21 + y / 23)))
     series = 1 / 7 + y * (1 / 9 + y * (1 / 11 + y * (1 / 13 + y * series)))
     return 1 + y * (1 / 3 + y * (1 / 5 + y * series))
 
 
 @compiled
-def _room_for_ends(left: float, right: float, panels: Panels, nodes: Array) -> Array:
-    """``nodes`` with room for two end pieces beyond patches of these widths."""
+def _most_end_nodes(left: float, right: float, panels: Panels) -> int:
+    """Bound the number of nodes of both end pieces, beside patches of these widths."""
     cells = 2
-    for beyond in (left, right):
-        at = beyond
-        while at < 2 * panels.width:
-            at *= 2
+    for patch in (left, right):
+        length = patch
+        while length < 2 * panels.width:
+            length *= 2
             cells += 1
-    return _room(nodes, 0, cells * max(panels.x.shape[0], panels.end_x.shape[0]))
+    most: int = cells * max(panels.x.shape[0], panels.end_x.shape[0])
+    return most
 
 
 @compiled_sums
 def _end_piece(
     gap: Array, side: int, length: float, panels: Panels, nodes: Array, count: int
 ) -> int:
-    """Nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
+    """Put nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
 
-    ``nodes`` must have room for them; returns how many there are then.
+    ``nodes`` must have space for them; returns how many there are then.
     """
-    own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
-    far = gap[RIGHT] - gap[LEFT] + (gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH])
+    near, far = pole_distances(gap, side)
     scale = 1 / gap[ALPHA]
     nearer = nodes[_PLUS - side]
     farther = nodes[_MINUS + side]
-    origin = (gap[LEFT] if side == 0 else gap[RIGHT]) / panels.width
-    per = (1 if side == 0 else -1) / panels.width
-    last = panels.finest - 1
-    both = nodes.shape[0] > _SLOPE
-    at = 0.0
-    stop = min(length, own)
-    while at < length:
-        first = at == 0.0
+    begin = 0.0
+    stop = min(length, near)
+    while begin < length:
+        first = begin == 0.0
         rule = panels.end_x.shape[0] if first else panels.x.shape[0]
         # distances from the end, and from where the logarithm of the map is known
         if first:
             # the square root at the end becomes smooth in y
-            known, near = 0.0, 0.0
+            known, known_distance = 0.0, 0.0
             for i in range(rule):
                 y = panels.end_x[i]
                 farther[count + i] = y * y * stop
                 nodes[_STRESS, count + i] = 2 * y * panels.end_w[i] * stop
         else:
-            known, half = 0.5 * (at + stop), 0.5 * (stop - at)
-            near = 0.5 * scale * np.log1p(known * (1 / own + 1 / far) / (1 - known / far))
+            known, half = 0.5 * (begin + stop), 0.5 * (stop - begin)
+            known_distance = 0.5 * scale * log_ratio(known, near, far)
             for i in range(rule):
                 farther[count + i] = known + half * panels.x[i]
                 nodes[_STRESS, count + i] = half * panels.w[i]
-        a = own + known
+        a = near + known
         b = far - known
         d = stop - known
         if d * (a + b) < _LARGEST * (2 * a * b + d * (b - a)):
             for i in range(count, count + rule):
                 d = farther[i] - known
                 z = d * (a + b) / (2 * a * b + d * (b - a))
-                nearer[i] = near + scale * z * _artanh_over(z * z)
+                nearer[i] = known_distance + scale * z * _artanh_over(z * z)
         else:
             for i in range(count, count + rule):
-                r = farther[i]
-                nearer[i] = 0.5 * scale * np.log1p(r * (1 / own + 1 / far) / (1 - r / far))
-        for i in range(count, count + rule, 2):  # recurrences side by side, as each waits
-            place = origin + per * farther[i]
-            other_place = origin + per * farther[i + 1]
-            k = int(np.floor(place))
-            other_k = int(np.floor(other_place))
-            x = 2 * (place - k) - 1
-            y = 2 * (other_place - other_k) - 1
-            c = panels.stress[k & last]
-            e = panels.stress[other_k & last]
-            b1 = b2 = e1 = e2 = 0.0
-            if both:
-                f = panels.slope[k & last]
-                g = panels.slope[other_k & last]
-                f1 = f2 = g1 = g2 = 0.0
-                for j in range(c.shape[0] - 1, 0, -1):
-                    b1, b2 = 2 * x * b1 - b2 + c[j], b1
-                    e1, e2 = 2 * y * e1 - e2 + e[j], e1
-                    f1, f2 = 2 * x * f1 - f2 + f[j], f1
-                    g1, g2 = 2 * y * g1 - g2 + g[j], g1
-                weight, other_weight = nodes[_STRESS, i], nodes[_STRESS, i + 1]
-                nodes[_SLOPE, i] = weight * (x * f1 - f2 + f[0])
-                nodes[_SLOPE, i + 1] = other_weight * (y * g1 - g2 + g[0])
-            else:
-                for j in range(c.shape[0] - 1, 0, -1):
-                    b1, b2 = 2 * x * b1 - b2 + c[j], b1
-                    e1, e2 = 2 * y * e1 - e2 + e[j], e1
-            nodes[_STRESS, i] *= x * b1 - b2 + c[0]
-            nodes[_STRESS, i + 1] *= y * e1 - e2 + e[0]
+                nearer[i] = 0.5 * scale * log_ratio(farther[i], near, far)
+        _weigh_by_source(gap, side, panels, nodes, count, count + rule)
         for i in range(count, count + rule):
             farther[i] = 2 - nearer[i]
         count += rule
-        at = stop
-        stop = min(2 * at, length)
-        if length - stop < 0.25 * at:
+        begin = stop
+        stop = min(2 * begin, length)
+        if length - stop < 0.25 * begin:
             stop = length
     return count
+
+
+@compiled_sums
+def _weigh_by_source(
+    gap: Array, side: int, panels: Panels, nodes: Array, first: int, behind: int
+) -> None:
+    """Multiply the weights of nodes by S and S'; in place of 1 ∓ η is their distance from the end.
+
+    Two recurrences run side by side, as each waits for its last term.
+    """
+    distance = nodes[_MINUS + side]
+    origin = (gap[LEFT] if side == 0 else gap[RIGHT]) / panels.width
+    per = (1 if side == 0 else -1) / panels.width
+    last = panels.finest - 1
+    both = nodes.shape[0] > _SLOPE
+    for i in range(first, behind, 2):
+        place = origin + per * distance[i]
+        other_place = origin + per * distance[i + 1]
+        k = int(np.floor(place))
+        other_k = int(np.floor(other_place))
+        x = 2 * (place - k) - 1
+        y = 2 * (other_place - other_k) - 1
+        c = panels.stress[k & last]
+        e = panels.stress[other_k & last]
+        b1 = b2 = e1 = e2 = 0.0
+        if both:
+            f = panels.slope[k & last]
+            g = panels.slope[other_k & last]
+            f1 = f2 = g1 = g2 = 0.0
+            for j in range(c.shape[0] - 1, 0, -1):
+                b1, b2 = 2 * x * b1 - b2 + c[j], b1
+                e1, e2 = 2 * y * e1 - e2 + e[j], e1
+                f1, f2 = 2 * x * f1 - f2 + f[j], f1
+                g1, g2 = 2 * y * g1 - g2 + g[j], g1
+            weight, other_weight = nodes[_STRESS, i], nodes[_STRESS, i + 1]
+            nodes[_SLOPE, i] = weight * (x * f1 - f2 + f[0])
+            nodes[_SLOPE, i + 1] = other_weight * (y * g1 - g2 + g[0])
+        else:
+            for j in range(c.shape[0] - 1, 0, -1):
+                b1, b2 = 2 * x * b1 - b2 + c[j], b1
+                e1, e2 = 2 * y * e1 - e2 + e[j], e1
+        nodes[_STRESS, i] *= x * b1 - b2 + c[0]
+        nodes[_STRESS, i + 1] *= y * e1 - e2 + e[0]
 
 
 @compiled_sums
@@ -160,18 +173,17 @@ def _panel_nodes(
     gap: Array,
     tiles: NDArray[np.int64],
     tiled: int,
-    width: float,
-    x: Array,
-    weights: Array,
+    panels: Panels,
     nodes: Array,
     count: int,
 ) -> int:
-    """Nodes of compressed panels; ``tiles`` holds first finest panel, size and row of each.
+    """Put the nodes of compressed panels; ``tiles`` holds first finest panel, size and row of each.
 
     A panel is no longer than its distance from either end, so the logarithm of the map differs at
     its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
     """
-    p = x.shape[0]
+    p = panels.x.shape[0]
+    width = panels.width
     length = gap[RIGHT] - gap[LEFT]
     scale = 1 / (2 * gap[ALPHA])
     above = np.empty(tiled * p)
@@ -180,17 +192,16 @@ def _panel_nodes(
         centre = (tiles[0, tile] + 0.5 * tiles[1, tile]) * width - gap[LEFT]
         half = 0.5 * tiles[1, tile] * width
         side = 0 if centre < length - centre else 1
-        own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
-        far = length + (gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH])
+        near, far = pole_distances(gap, side)
         if side == 1:
             centre, half = length - centre, -half
-        a = own + centre
+        a = near + centre
         b = far - centre
         for i in range(p):
-            d = half * x[i]
+            d = half * panels.x[i]
             above[tile * p + i] = d * (a + b)
             below[tile * p + i] = 2 * a * b + d * (b - a)
-    # what costs, over all panels at once: the processor's vectors are wider than a panel's loop
+    # the costly part over all panels at once: the processor's vectors are wider than a panel's loop
     for i in range(tiled * p):
         z = above[i] / below[i]
         above[i] = 2 * z * _artanh_over(z * z) * scale
@@ -198,30 +209,29 @@ def _panel_nodes(
         centre = (tiles[0, tile] + 0.5 * tiles[1, tile]) * width - gap[LEFT]
         row = tiles[2, tile]
         side = 0 if centre < length - centre else 1
-        own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
-        far = length + (gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH])
+        near, far = pole_distances(gap, side)
         if side == 1:
             centre = length - centre
-        near = np.log1p(centre * (1 / own + 1 / far) / (1 - centre / far)) * scale
+        distance = log_ratio(centre, near, far) * scale
         nearer = nodes[_PLUS - side]
         farther = nodes[_MINUS + side]
         for i in range(p):
-            value = near + above[tile * p + i]
+            value = distance + above[tile * p + i]
             nearer[count + i] = value
             farther[count + i] = 2 - value
-            nodes[_STRESS, count + i] = weights[0, row, i]
+            nodes[_STRESS, count + i] = panels.weights[0, row, i]
         if nodes.shape[0] > _SLOPE:
             for i in range(p):
-                nodes[_SLOPE, count + i] = weights[1, row, i]
+                nodes[_SLOPE, count + i] = panels.weights[1, row, i]
         count += p
     return count
 
 
 @compiled
 def _short_gap(gap: Array, modes: int, panels: Panels, nodes: Array) -> tuple[Array, int]:
-    """Gauss-Chebyshev nodes of the first kind in η: they serve s_n and s^± alike."""
+    """Put Gauss-Chebyshev nodes of the first kind in η: they serve s_n and s^± alike."""
     count = max(3 * panels.x.shape[0] + 6, 2 * modes)
-    nodes = _room(nodes, 0, count)
+    nodes = _widened(nodes, 0, count)
     for i in range(count):
         t = (i + 0.5) * np.pi / count
         theta, stretch = theta_at(gap, np.cos(t))
@@ -236,31 +246,31 @@ def _short_gap(gap: Array, modes: int, panels: Panels, nodes: Array) -> tuple[Ar
 
 @compiled
 def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Array, int]:
-    """Nodes of the moments of one gap and their number."""
+    """Make the nodes of the moments of one gap; returns their number, too."""
     nodes = np.empty((2 + fields, 1024))
     left = gap[LEFT]
     right = gap[RIGHT]
     width = panels.width
-    if right - left <= _SHORT_GAP * width:
+    if right - left <= SHORT_GAP_PANELS * width:
         return _short_gap(gap, modes, panels, nodes)
     first = int(np.floor(left / width)) + 2  # an end piece is one to two finest panels long
     last = int(np.ceil(right / width)) - 2
-    nodes = _room_for_ends(gap[LEFT_PATCH], gap[RIGHT_PATCH], panels, nodes)
+    nodes = _widened(nodes, 0, _most_end_nodes(gap[LEFT_PATCH], gap[RIGHT_PATCH], panels))
     count = _end_piece(gap, 0, first * width - left, panels, nodes, 0)
     count = _end_piece(gap, 1, right - last * width, panels, nodes, count)
     levels = panels.level_start.shape[0]
     tiles = np.empty((3, max(0, last - first)), dtype=np.int64)
     tiled = 0
-    at = first
-    while at < last:
+    panel = first
+    while panel < last:
         level = 0
         size = 1
         while level + 1 < levels:
             twice = 2 * size
-            if at & (twice - 1) != 0 or at + twice > last:
+            if panel & (twice - 1) != 0 or panel + twice > last:
                 break
-            start = at * width - left
-            stop = right - (at + twice) * width
+            start = panel * width - left
+            stop = right - (panel + twice) * width
             if start < twice * width or stop < twice * width:
                 break
             # the highest mode turns by modes·Δη/sqrt(1-η²) over the panel
@@ -268,25 +278,25 @@ def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Arra
                 a_minus, a_plus = one_minus_plus(gap, start, 0)
                 b_minus, b_plus = one_minus_plus(gap, stop, 1)
                 nearest = min(a_minus * a_plus, b_minus * b_plus)
-                if modes * (b_plus - a_plus) > _PHASE * np.sqrt(nearest):
+                if modes * (b_plus - a_plus) > PANEL_PHASE * np.sqrt(nearest):
                     break
             level += 1
             size = twice
-        tiles[0, tiled] = at
+        tiles[0, tiled] = panel
         tiles[1, tiled] = size
         tiles[2, tiled] = panels.level_start[level] + (
-            (at >> level) & ((panels.finest >> level) - 1)
+            (panel >> level) & ((panels.finest >> level) - 1)
         )
         tiled += 1
-        at += size
-    nodes = _room(nodes, count, tiled * panels.x.shape[0])
-    count = _panel_nodes(gap, tiles, tiled, width, panels.x, panels.weights, nodes, count)
+        panel += size
+    nodes = _widened(nodes, count, tiled * panels.x.shape[0])
+    count = _panel_nodes(gap, tiles, tiled, panels, nodes, count)
     return nodes, count
 
 
 @compiled_sums
 def _add_up(nodes: Array, count: int, s: Array, ends: Array) -> None:
-    """Moments of the nodes, by the recurrence of sin((n+1)t), cos t = η."""
+    """Sum the moments of the nodes, by the recurrence of sin((n+1)t), cos t = η."""
     fields = s.shape[1]
     twice = np.empty(count)
     current = np.empty(count)
@@ -298,7 +308,7 @@ def _add_up(nodes: Array, count: int, s: Array, ends: Array) -> None:
         plus = nodes[_PLUS, i]
         root = np.sqrt(minus * plus)
         current[i] = root
-        twice[i] = 2 * (plus - 1 if plus < minus else 1 - minus)
+        twice[i] = 2 * eta_from(minus, plus)
         share = nodes[_STRESS, i] / (root * np.pi)
         low0 += share * minus
         high0 += share * plus
@@ -334,7 +344,7 @@ def _add_up(nodes: Array, count: int, s: Array, ends: Array) -> None:
 
 @compiled
 def gap_moments(gap: Array, panels: Panels, s: Array, ends: Array) -> None:
-    """Moments of (S, S') over a gap: fills ``s``, shape (modes, 2), and ``ends``, (2, 2).
+    """Fill ``s``, shape (modes, 2), and ``ends``, (2, 2), with the moments of (S, S') over a gap.
 
     With ``s`` of shape (modes, 1) those of S alone. ``gap`` is a row of
     ``conformal_map.map_gaps``.

@@ -24,7 +24,7 @@ _COLUMNS = 5
 
 @compiled_for_both
 def map_gaps(gaps: Array) -> Array:
-    """Table of gaps, shape (L, 5): both ends, widths of the patches beside them, α.
+    """Make the table of gaps, shape (L, 5): both ends, widths of the patches beside them, α.
 
     ``gaps`` holds the ends in θ, shape (L, 2), increasing, within one period.
     """
@@ -46,7 +46,7 @@ def map_gaps(gaps: Array) -> Array:
 
 @compiled
 def in_order(table: Array) -> bool:
-    """Whether every gap and patch has a length; not so where an edge is no number."""
+    """Return whether every gap and patch has a length; not so where an edge is no number."""
     for k in range(table.shape[0]):
         # not written as <= : a length that is no number is a failure, too
         length = table[k, RIGHT] - table[k, LEFT]
@@ -56,32 +56,60 @@ def in_order(table: Array) -> bool:
 
 
 @compiled
-def one_minus_plus(gap: Array, r: float, side: int) -> tuple[float, float]:
-    """(1 - η, 1 + η) at the distance r from the left (side 0) or right end, relatively exact."""
-    own = gap[LEFT_PATCH] if side == 0 else gap[RIGHT_PATCH]
-    other = gap[RIGHT_PATCH] if side == 0 else gap[LEFT_PATCH]
-    far = gap[RIGHT] - gap[LEFT] + other
-    near = np.log1p(r * (1 / own + 1 / far) / (1 - r / far)) / (2 * gap[ALPHA])
+def pole_distances(gap: Array, side: int) -> tuple[float, float]:
+    """Return the distances of an end from both poles of the map: beside it, and at the far side."""
     if side == 0:
-        return 2 - near, near
-    return near, 2 - near
+        return gap[LEFT_PATCH], gap[RIGHT] - gap[LEFT] + gap[RIGHT_PATCH]
+    return gap[RIGHT_PATCH], gap[RIGHT] - gap[LEFT] + gap[LEFT_PATCH]
+
+
+@compiled
+def log_ratio(r: float, near: float, far: float) -> float:
+    """Take the logarithm of the map at the distance r from an end; see :func:`pole_distances`."""
+    value: float = np.log1p(r * (1 / near + 1 / far) / (1 - r / far))
+    return value
+
+
+@compiled
+def one_minus_plus(gap: Array, r: float, side: int) -> tuple[float, float]:
+    """Compute (1 - η, 1 + η) at the distance r from the left (side 0) or right end, to rounding."""
+    near, far = pole_distances(gap, side)
+    distance = log_ratio(r, near, far) / (2 * gap[ALPHA])
+    if side == 0:
+        return 2 - distance, distance
+    return distance, 2 - distance
+
+
+@compiled
+def eta_from(minus: float, plus: float) -> float:
+    """Compute η from 1 - η and 1 + η, by the smaller of them."""
+    return plus - 1 if plus < minus else 1 - minus
+
+
+@compiled
+def eta_at(gap: Array, theta: float) -> tuple[float, float, float]:
+    """Compute η, 1 - η² and dη/dθ at θ, measured from the nearer end."""
+    side = 0 if theta - gap[LEFT] < gap[RIGHT] - theta else 1
+    r = theta - gap[LEFT] if side == 0 else gap[RIGHT] - theta
+    minus, plus = one_minus_plus(gap, r, side)
+    near, far = pole_distances(gap, side)
+    slope = (1 / (near + r) + 1 / (far - r)) / (2 * gap[ALPHA])
+    return eta_from(minus, plus), minus * plus, slope
 
 
 @compiled
 def theta_at(gap: Array, eta: float) -> tuple[float, float]:
-    """θ and dθ/dη at η."""
-    from_left = eta < 0
-    own = gap[LEFT_PATCH] if from_left else gap[RIGHT_PATCH]
-    other = gap[RIGHT_PATCH] if from_left else gap[LEFT_PATCH]
-    far = gap[RIGHT] - gap[LEFT] + other
-    grown = np.expm1(2 * gap[ALPHA] * (1 + eta if from_left else 1 - eta))
-    r = grown / (1 / own + (1 + grown) / far)  # distance from the nearer end
-    stretch = 2 * gap[ALPHA] / (1 / (own + r) + 1 / (far - r))
-    return (gap[LEFT] + r if from_left else gap[RIGHT] - r), stretch
+    """Compute θ and dθ/dη at η, measured from the nearer end."""
+    side = 0 if eta < 0 else 1
+    near, far = pole_distances(gap, side)
+    grown = np.expm1(2 * gap[ALPHA] * (1 + eta if side == 0 else 1 - eta))
+    r = grown / (1 / near + (1 + grown) / far)  # distance from the nearer end
+    stretch = 2 * gap[ALPHA] / (1 / (near + r) + 1 / (far - r))
+    return (gap[LEFT] + r if side == 0 else gap[RIGHT] - r), stretch
 
 
 @compiled
-def convergence(gap: Array) -> float:
-    """Rate ln ρ of a gap: the error of M modes falls as ρ^-M."""
+def convergence_rate(gap: Array) -> float:
+    """Return the rate ln ρ of a gap: the error of M modes falls as ρ^-M."""
     rate: float = np.arcsinh(np.pi / (2 * gap[ALPHA]))
     return rate

@@ -12,7 +12,7 @@ from adhesis.solver.model.profile import Array
 
 
 def widths(gaps: Array) -> tuple[Array, Array]:
-    """Lengths of the gaps, and of the patches to the right of each, shape (L,)."""
+    """Measure the gaps, and the patches to the right of each, shape (L,)."""
     patch = np.empty(len(gaps))
     patch[:-1] = gaps[1:, 0]
     patch[-1] = gaps[0, 0] + 2 * np.pi
@@ -20,7 +20,7 @@ def widths(gaps: Array) -> tuple[Array, Array]:
 
 
 def outward(gaps: Array) -> Array:
-    """+1 at left gap ends, where contact grows to the right, -1 at right ones, shape (2L,)."""
+    """Return +1 at left gap ends, where contact grows to the right, else -1, shape (2L,)."""
     sign = np.ones(2 * len(gaps))
     sign[1::2] = -1.0
     return sign
@@ -32,7 +32,7 @@ def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:
 
 
 def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
-    """Drop patches, ``keep`` telling of the patch to the right of each gap: their gaps join."""
+    """Drop the patches that ``keep`` (one value for the patch right of each gap) excludes."""
     if not keep.any():
         return np.empty((0, 2))
     # A gap starts after a kept patch (the one to the left of gap k is patch k - 1).
@@ -59,7 +59,7 @@ def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
 
 
 def without_small(gaps: Array, smallest: float) -> Array | None:
-    """Gaps without closed gaps or vanished patches, or None if all are as long as ``smallest``."""
+    """Drop closed gaps or vanished patches; None if all are as long as ``smallest``."""
     length, patch = widths(gaps)
     if length.min() < smallest and len(gaps) > 1:
         keep = length >= smallest

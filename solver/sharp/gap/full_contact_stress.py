@@ -1,4 +1,4 @@
-"""The full-contact stress as a source for gaps: compressed panels.
+"""Full-contact stress as a source for gaps: compressed panels.
 
 Method ``sharp`` sees the rough profile only through the full-contact stress S(θ) = 2σ_full/E*,
 θ = q0 x. It is smooth on the scale of a shortest wave only, while what it is integrated with is
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.field.exterior import NOTHING, Outside
 
 # Nodes p of a panel, by the tolerance they serve. The finest panel is at most half a shortest wave
 # long: interpolation there leaves (π/2)^p/(p! 2^(p-1)) of the shortest wave's amplitude. A panel as
@@ -32,7 +31,7 @@ _PIECES_BY_SLOPE = 4.0
 
 
 class Panels(NamedTuple):
-    """What the compiled code needs of a source; p nodes a panel.
+    """Panels of a source, for the compiled code; p nodes a panel.
 
     Attributes
     ----------
@@ -52,8 +51,6 @@ class Panels(NamedTuple):
         Row of ``weights`` at which each level starts.
     end_x, end_w : array
         Gauss-Legendre rule on (0, 1) of an end piece (at most one shortest wave, in sqrt scale).
-    outside : Outside
-        The gaps outside the window whose gaps are solved; nothing if all are solved.
     """
 
     width: float
@@ -67,16 +64,6 @@ class Panels(NamedTuple):
     level_start: NDArray[np.int64]
     end_x: Array
     end_w: Array
-    outside: Outside
-
-
-@compiled
-def with_outside(of: Panels, outside: Outside) -> Panels:
-    """The same source for a window of gaps."""
-    return Panels(
-        of.width, of.finest, of.x, of.w, of.stress, of.slope, of.tilt, of.weights,
-        of.level_start, of.end_x, of.end_w, outside,
-    )  # fmt: skip
 
 
 class StressSource:
@@ -151,29 +138,28 @@ class StressSource:
             level_start=np.cumsum([0, *sizes[:-1]]),
             end_x=(t + 1) / 2,
             end_w=end / 2,
-            outside=NOTHING,
         )
 
     def sample(self, theta: Array) -> Array:
-        """(S, S') at any angles, shape (len(theta), 2)."""
+        """Evaluate (S, S') at any angles, shape (len(theta), 2)."""
         at = np.ascontiguousarray(theta)
         width, stress, slope = self.panels.width, self.panels.stress, self.panels.slope
         return np.stack([interpolate(at, width, stress), interpolate(at, width, slope)], axis=1)
 
     def measure_between(self, left: Array, right: Array) -> float:
-        """Sum over the intervals of ∫ sqrt(1 + h'²) dθ from ``left`` to ``right``."""
+        """Sum ∫ sqrt(1 + h'²) dθ from ``left`` to ``right`` over the intervals."""
         return _measure_between(
             left, right, self._measure_before, self.panels.tilt, self._piece_x, self._piece_w
         )
 
 
 def _to_chebyshev(nodes: Array) -> Array:
-    """Matrix that turns rows of values at ``nodes`` into rows of Chebyshev coefficients."""
+    """Make the matrix that turns rows of values at ``nodes`` into Chebyshev coefficients."""
     return np.asarray(np.linalg.inv(chebyshev.chebvander(nodes, len(nodes) - 1)).T)
 
 
 def _on_panels(a: NDArray[np.complex128], x: Array, count: int) -> Array:
-    """Values of Σ a_m e^{imθ} at the nodes of the finest panels, shape (count, len(x))."""
+    """Evaluate Σ a_m e^{imθ} at the nodes of the finest panels, shape (count, len(x))."""
     m = np.arange(a.size)
     out = np.empty((count, x.size))
     for i, node in enumerate(x):
@@ -185,7 +171,7 @@ def _on_panels(a: NDArray[np.complex128], x: Array, count: int) -> Array:
 
 
 def _lagrange(nodes: Array, x: Array) -> Array:
-    """Lagrange polynomials of ``nodes`` at ``x``, shape (len(x), len(nodes))."""
+    """Evaluate the Lagrange polynomials of ``nodes`` at ``x``, shape (len(x), len(nodes))."""
     degree = len(nodes) - 1
     return np.asarray(
         legendre.legvander(x, degree) @ np.linalg.inv(legendre.legvander(nodes, degree))
@@ -194,6 +180,7 @@ def _lagrange(nodes: Array, x: Array) -> Array:
 
 @compiled
 def _clenshaw(coefficients: Array, x: float) -> float:
+    """Sum a Chebyshev series at ``x``."""
     b1 = 0.0
     b2 = 0.0
     for j in range(coefficients.shape[0] - 1, 0, -1):
@@ -204,7 +191,7 @@ def _clenshaw(coefficients: Array, x: float) -> float:
 
 @compiled
 def value_at(coefficients: Array, place: float) -> float:
-    """The piecewise series at θ = place · panel width."""
+    """Evaluate the piecewise series at θ = place · panel width."""
     k = int(np.floor(place))
     # the number of panels is a power of two
     return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
@@ -212,7 +199,7 @@ def value_at(coefficients: Array, place: float) -> float:
 
 @compiled_for_both
 def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
-    """Values of a piecewise series at each angle, shape (len(theta),)."""
+    """Evaluate a piecewise series at each angle, shape (len(theta),)."""
     count = theta.shape[0]
     out = np.empty(count)
     last = coefficients.shape[0] - 1
@@ -238,7 +225,7 @@ def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
 
 @compiled
 def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
-    """sqrt(1 + h'²) and its θ-derivative at one angle."""
+    """Evaluate sqrt(1 + h'²) and its θ-derivative at one angle."""
     place = theta / panels.width
     k = int(np.floor(place))
     x = 2 * (place - k) - 1
@@ -257,7 +244,7 @@ def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
 
 @compiled
 def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, w: Array) -> Array:
-    """∫ sqrt(1 + h'²) over the first ``share`` of each panel, in panel widths."""
+    """Integrate sqrt(1 + h'²) over the first ``share`` of each panel, in panel widths."""
     out = np.empty(panel.shape[0])
     for i in range(panel.shape[0]):
         total = 0.0
@@ -272,7 +259,7 @@ def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, 
 def _measure_between(
     left: Array, right: Array, before: Array, tilt: Array, nodes: Array, w: Array
 ) -> float:
-    """As :meth:`StressSource.measure_between`; ``before`` is the measure before each panel."""
+    """Sum as :meth:`StressSource.measure_between`; ``before`` is the measure before each panel."""
     count = tilt.shape[0]
     width = 2 * np.pi / count
     panel = np.empty(2, dtype=np.int64)

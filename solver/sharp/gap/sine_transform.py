@@ -8,17 +8,36 @@ again (Press et al., Numerical Recipes, section 12.4).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 
-_ANEW = 64  # rotations before a cosine is computed anew
+_ROTATIONS = 64  # before a cosine is computed anew, so that rounding does not grow
+_THIRD = float(np.sqrt(0.75))
+_C1, _S1 = float(np.cos(0.4 * np.pi)), float(np.sin(0.4 * np.pi))
+_C2, _S2 = float(np.cos(0.8 * np.pi)), float(np.sin(0.8 * np.pi))
+
+
+class Circle(NamedTuple):
+    """Cosine and sine of π j/N for j = 0 … 2N - 1."""
+
+    cosine: Array
+    sine: Array
+
+
+class Parts(NamedTuple):
+    """Real and imaginary parts."""
+
+    re: Array
+    im: Array
 
 
 @compiled
-def circle(count: int) -> tuple[Array, Array]:
-    """Cosine and sine of π j/N, N = ``count``, for j = 0 … 2N - 1."""
+def tabulate_circle(count: int) -> Circle:
+    """Tabulate the circle of N = ``count``, even."""
     cosine = np.empty(2 * count)
     sine = np.empty(2 * count)
     turn = np.pi / count
@@ -26,7 +45,7 @@ def circle(count: int) -> tuple[Array, Array]:
     half = count // 2
     c, s = 1.0, 0.0
     for j in range(half + 1):
-        if j % _ANEW == 0:
+        if j % _ROTATIONS == 0:
             c = np.cos(turn * j)
             s = np.sin(turn * j)
         cosine[j] = c
@@ -40,93 +59,114 @@ def circle(count: int) -> tuple[Array, Array]:
     for j in range(count + 1, 2 * count):
         cosine[j] = cosine[2 * count - j]
         sine[j] = -sine[2 * count - j]
-    return cosine, sine
+    return Circle(cosine, sine)
 
 
 @compiled
-def _stage(
-    radix: int,
-    parts: int,
-    stride: int,
-    cosine: Array,
-    sine: Array,
-    re: Array,
-    im: Array,
-    out_re: Array,
-    out_im: Array,
-) -> None:
-    """One stage of Stockham's transform: ``parts`` butterflies of ``radix`` for each of ``stride``.
-
-    The circle holds four times as many places as the transform.
-    """
+def _butterflies_of_two(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
+    """Take ``parts`` butterflies of radix 2 for each of ``stride``."""
+    re, im, out_re, out_im = x.re, x.im, out.re, out.im
     far = stride * parts
     for p in range(parts):
-        at = stride * p
-        to = stride * radix * p
+        first = stride * p
+        to = stride * 2 * p
         w1 = 4 * p * stride
-        c1, s1 = cosine[w1], sine[w1]
-        if radix == 2:
-            for q in range(stride):
-                a_re, a_im = re[at + q], im[at + q]
-                b_re, b_im = re[at + far + q], im[at + far + q]
-                out_re[to + q] = a_re + b_re
-                out_im[to + q] = a_im + b_im
-                a_re -= b_re
-                a_im -= b_im
-                out_re[to + stride + q] = a_re * c1 - a_im * s1
-                out_im[to + stride + q] = a_re * s1 + a_im * c1
-            continue
-        c2, s2 = cosine[2 * w1], sine[2 * w1]
-        if radix == 3:
-            for q in range(stride):
-                a_re, a_im = re[at + q], im[at + q]
-                b_re, b_im = re[at + far + q], im[at + far + q]
-                c_re, c_im = re[at + 2 * far + q], im[at + 2 * far + q]
-                sum_re, sum_im = b_re + c_re, b_im + c_im
-                off_re, off_im = _THIRD * (b_re - c_re), _THIRD * (b_im - c_im)
-                out_re[to + q] = a_re + sum_re
-                out_im[to + q] = a_im + sum_im
-                a_re -= 0.5 * sum_re
-                a_im -= 0.5 * sum_im
-                x_re, x_im = a_re - off_im, a_im + off_re
-                out_re[to + stride + q] = x_re * c1 - x_im * s1
-                out_im[to + stride + q] = x_re * s1 + x_im * c1
-                x_re, x_im = a_re + off_im, a_im - off_re
-                out_re[to + 2 * stride + q] = x_re * c2 - x_im * s2
-                out_im[to + 2 * stride + q] = x_re * s2 + x_im * c2
-            continue
-        c3, s3 = cosine[3 * w1], sine[3 * w1]
-        if radix == 4:
-            for q in range(stride):
-                a_re, a_im = re[at + q], im[at + q]
-                b_re, b_im = re[at + far + q], im[at + far + q]
-                c_re, c_im = re[at + 2 * far + q], im[at + 2 * far + q]
-                d_re, d_im = re[at + 3 * far + q], im[at + 3 * far + q]
-                ac_re, ac_im = a_re + c_re, a_im + c_im
-                bd_re, bd_im = b_re + d_re, b_im + d_im
-                a_re -= c_re
-                a_im -= c_im
-                b_re -= d_re
-                b_im -= d_im
-                out_re[to + q] = ac_re + bd_re
-                out_im[to + q] = ac_im + bd_im
-                x_re, x_im = a_re - b_im, a_im + b_re
-                out_re[to + stride + q] = x_re * c1 - x_im * s1
-                out_im[to + stride + q] = x_re * s1 + x_im * c1
-                x_re, x_im = ac_re - bd_re, ac_im - bd_im
-                out_re[to + 2 * stride + q] = x_re * c2 - x_im * s2
-                out_im[to + 2 * stride + q] = x_re * s2 + x_im * c2
-                x_re, x_im = a_re + b_im, a_im - b_re
-                out_re[to + 3 * stride + q] = x_re * c3 - x_im * s3
-                out_im[to + 3 * stride + q] = x_re * s3 + x_im * c3
-            continue
-        c4, s4 = cosine[4 * w1], sine[4 * w1]
+        c1, s1 = circle.cosine[w1], circle.sine[w1]
         for q in range(stride):
-            a_re, a_im = re[at + q], im[at + q]
-            b_re, b_im = re[at + far + q], im[at + far + q]
-            c_re, c_im = re[at + 2 * far + q], im[at + 2 * far + q]
-            d_re, d_im = re[at + 3 * far + q], im[at + 3 * far + q]
-            e_re, e_im = re[at + 4 * far + q], im[at + 4 * far + q]
+            a_re, a_im = re[first + q], im[first + q]
+            b_re, b_im = re[first + far + q], im[first + far + q]
+            out_re[to + q] = a_re + b_re
+            out_im[to + q] = a_im + b_im
+            a_re -= b_re
+            a_im -= b_im
+            out_re[to + stride + q] = a_re * c1 - a_im * s1
+            out_im[to + stride + q] = a_re * s1 + a_im * c1
+
+
+@compiled
+def _butterflies_of_three(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
+    """Take ``parts`` butterflies of radix 3 for each of ``stride``."""
+    re, im, out_re, out_im = x.re, x.im, out.re, out.im
+    far = stride * parts
+    for p in range(parts):
+        first = stride * p
+        to = stride * 3 * p
+        w1 = 4 * p * stride
+        c1, s1 = circle.cosine[w1], circle.sine[w1]
+        c2, s2 = circle.cosine[2 * w1], circle.sine[2 * w1]
+        for q in range(stride):
+            a_re, a_im = re[first + q], im[first + q]
+            b_re, b_im = re[first + far + q], im[first + far + q]
+            c_re, c_im = re[first + 2 * far + q], im[first + 2 * far + q]
+            sum_re, sum_im = b_re + c_re, b_im + c_im
+            off_re, off_im = _THIRD * (b_re - c_re), _THIRD * (b_im - c_im)
+            out_re[to + q] = a_re + sum_re
+            out_im[to + q] = a_im + sum_im
+            a_re -= 0.5 * sum_re
+            a_im -= 0.5 * sum_im
+            x_re, x_im = a_re - off_im, a_im + off_re
+            out_re[to + stride + q] = x_re * c1 - x_im * s1
+            out_im[to + stride + q] = x_re * s1 + x_im * c1
+            x_re, x_im = a_re + off_im, a_im - off_re
+            out_re[to + 2 * stride + q] = x_re * c2 - x_im * s2
+            out_im[to + 2 * stride + q] = x_re * s2 + x_im * c2
+
+
+@compiled
+def _butterflies_of_four(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
+    """Take ``parts`` butterflies of radix 4 for each of ``stride``."""
+    re, im, out_re, out_im = x.re, x.im, out.re, out.im
+    far = stride * parts
+    for p in range(parts):
+        first = stride * p
+        to = stride * 4 * p
+        w1 = 4 * p * stride
+        c1, s1 = circle.cosine[w1], circle.sine[w1]
+        c2, s2 = circle.cosine[2 * w1], circle.sine[2 * w1]
+        c3, s3 = circle.cosine[3 * w1], circle.sine[3 * w1]
+        for q in range(stride):
+            a_re, a_im = re[first + q], im[first + q]
+            b_re, b_im = re[first + far + q], im[first + far + q]
+            c_re, c_im = re[first + 2 * far + q], im[first + 2 * far + q]
+            d_re, d_im = re[first + 3 * far + q], im[first + 3 * far + q]
+            ac_re, ac_im = a_re + c_re, a_im + c_im
+            bd_re, bd_im = b_re + d_re, b_im + d_im
+            a_re -= c_re
+            a_im -= c_im
+            b_re -= d_re
+            b_im -= d_im
+            out_re[to + q] = ac_re + bd_re
+            out_im[to + q] = ac_im + bd_im
+            x_re, x_im = a_re - b_im, a_im + b_re
+            out_re[to + stride + q] = x_re * c1 - x_im * s1
+            out_im[to + stride + q] = x_re * s1 + x_im * c1
+            x_re, x_im = ac_re - bd_re, ac_im - bd_im
+            out_re[to + 2 * stride + q] = x_re * c2 - x_im * s2
+            out_im[to + 2 * stride + q] = x_re * s2 + x_im * c2
+            x_re, x_im = a_re + b_im, a_im - b_re
+            out_re[to + 3 * stride + q] = x_re * c3 - x_im * s3
+            out_im[to + 3 * stride + q] = x_re * s3 + x_im * c3
+
+
+@compiled
+def _butterflies_of_five(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
+    """Take ``parts`` butterflies of radix 5 for each of ``stride``."""
+    re, im, out_re, out_im = x.re, x.im, out.re, out.im
+    far = stride * parts
+    for p in range(parts):
+        first = stride * p
+        to = stride * 5 * p
+        w1 = 4 * p * stride
+        c1, s1 = circle.cosine[w1], circle.sine[w1]
+        c2, s2 = circle.cosine[2 * w1], circle.sine[2 * w1]
+        c3, s3 = circle.cosine[3 * w1], circle.sine[3 * w1]
+        c4, s4 = circle.cosine[4 * w1], circle.sine[4 * w1]
+        for q in range(stride):
+            a_re, a_im = re[first + q], im[first + q]
+            b_re, b_im = re[first + far + q], im[first + far + q]
+            c_re, c_im = re[first + 2 * far + q], im[first + 2 * far + q]
+            d_re, d_im = re[first + 3 * far + q], im[first + 3 * far + q]
+            e_re, e_im = re[first + 4 * far + q], im[first + 4 * far + q]
             be_re, be_im = b_re + e_re, b_im + e_im
             cd_re, cd_im = c_re + d_re, c_im + d_im
             b_re -= e_re
@@ -157,37 +197,39 @@ def _stage(
             out_im[to + 3 * stride + q] = x_re * s3 + x_im * c3
 
 
-_THIRD = float(np.sqrt(0.75))
-_C1, _S1 = float(np.cos(0.4 * np.pi)), float(np.sin(0.4 * np.pi))
-_C2, _S2 = float(np.cos(0.8 * np.pi)), float(np.sin(0.8 * np.pi))
-
-
 @compiled
-def _fourier(re: Array, im: Array, cosine: Array, sine: Array) -> tuple[Array, Array]:
-    """Σ_j z_j exp(2πi j k/M); uses up ``re`` and ``im``."""
-    out_re = np.empty(re.shape[0])
-    out_im = np.empty(re.shape[0])
-    left = re.shape[0]
+def _fourier(x: Parts, circle: Circle) -> Parts:
+    """Sum z_j exp(2πi j k/M) over j; ``x`` is overwritten.
+
+    The circle holds four times as many places as the transform.
+    """
+    count = x.re.shape[0]
+    out = Parts(np.empty(count), np.empty(count))
+    left = count
     stride = 1
     while left > 1:
-        radix = 5
         if left % 4 == 0:
             radix = 4
+            _butterflies_of_four(left // 4, stride, circle, x, out)
         elif left % 2 == 0:
             radix = 2
+            _butterflies_of_two(left // 2, stride, circle, x, out)
         elif left % 3 == 0:
             radix = 3
+            _butterflies_of_three(left // 3, stride, circle, x, out)
+        else:
+            radix = 5
+            _butterflies_of_five(left // 5, stride, circle, x, out)
         left //= radix
-        _stage(radix, left, stride, cosine, sine, re, im, out_re, out_im)
         stride *= radix
-        re, out_re = out_re, re
-        im, out_im = out_im, im
-    return re, im
+        x, out = out, x
+    return x
 
 
 @compiled
-def sine_sums(x: Array, cosine: Array, sine: Array, out: Array) -> None:
-    """Set out_k to Σ_j x_j sin(π (j+1)(k+1)/N), N - 1 = len(x), with the :func:`circle` of N."""
+def sine_sums(x: Array, circle: Circle, out: Array) -> None:
+    """Set out_k to Σ_j x_j sin(π (j+1)(k+1)/N), N - 1 = len(x), with the circle of N."""
+    cosine, sine = circle.cosine, circle.sine
     count = x.shape[0] + 1
     half = count // 2
     re = np.empty(half)
@@ -201,7 +243,8 @@ def sine_sums(x: Array, cosine: Array, sine: Array, out: Array) -> None:
             im[j >> 1] = y
         else:
             re[j >> 1] = y
-    re, im = _fourier(re, im, cosine, sine)
+    parts = _fourier(Parts(re, im), circle)
+    re, im = parts.re, parts.im
     # Σ_j y_j exp(2πi j k/N) from even and odd places; its imaginary parts are the even sums, its
     # real parts the steps between the odd ones
     odd = 0.5 * (re[0] + im[0])

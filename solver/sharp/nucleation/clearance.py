@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.gap.quadrature import RULES, Kinds, Rules
+from adhesis.solver.sharp.field.solution import Nodes
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules, Integers
 from adhesis.solver.sharp.tolerances import (
     CLEARANCE_LEFT,
     CLOSING_SAFETY,
@@ -42,8 +43,8 @@ class Seen(NamedTuple):
     """
 
     gaps: Array
-    kinds: Kinds
-    offset: Kinds
+    kinds: Integers
+    offset: Integers
     theta: Array
     opening: Array
     clearance: Array
@@ -82,7 +83,7 @@ class Clearances:
         """
         of = field.solution
         left, place = clearance_left(
-            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, self.seen, self._near,
+            field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, self._near,
             self._beside,
         )  # fmt: skip
         return left, place
@@ -91,13 +92,13 @@ class Clearances:
         """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
         of = field.solution
         self.seen = noted(
-            field.gaps, of.kinds, of.offset, of.theta, of.f, RULES, self.seen, place, clearance
+            field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, place, clearance
         )
 
 
 @compiled
-def _low_opening(f: float, kind: int, node: int, rules: Rules) -> float:
-    eta = rules.eta[rules.start[kind] + node]
+def _low_opening(f: float, kind: int, node: int, rules: GaussRules) -> float:
+    eta = rules.eta[rules.vector_start[kind] + node]
     opening: float = f * np.sqrt(1 - eta * eta)
     return opening
 
@@ -121,16 +122,15 @@ def _to_any_minimum(seen: Seen, gap: int, nodes: int, inside: float) -> float:
 @compiled
 def clearance_left(
     gaps: Array,
-    kinds: Kinds,
-    offset: Kinds,
-    theta: Array,
+    nodes: Nodes,
     f: Array,
-    rules: Rules,
+    rules: GaussRules,
     seen: Seen,
     near: float,
     beside: float,
-) -> tuple[Array, Kinds]:
+) -> tuple[Array, Integers]:
     """As :meth:`Clearances.left`; ``beside`` is the closing beside an edge for its motion."""
+    kinds, offset, theta = nodes.orders, nodes.offset, nodes.theta
     left = np.full(gaps.shape[0], -1.0)
     place = np.full(gaps.shape[0], -1)
     j = 0
@@ -178,16 +178,15 @@ def clearance_left(
 @compiled
 def noted(
     gaps: Array,
-    kinds: Kinds,
-    offset: Kinds,
-    theta: Array,
+    nodes: Nodes,
     f: Array,
-    rules: Rules,
+    rules: GaussRules,
     seen: Seen,
-    place: Kinds,
+    place: Integers,
     clearance: Array,
 ) -> Seen:
     """As :meth:`Clearances.note`."""
+    kinds, offset, theta = nodes.orders, nodes.offset, nodes.theta
     new_gaps = gaps.copy()
     new_theta = theta.copy()
     new_opening = np.empty(theta.shape[0])

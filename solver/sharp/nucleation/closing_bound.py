@@ -33,10 +33,10 @@ class ClosingBound:
         rate = self.rate_held(point)
         if self._edges.is_fixed:
             return rate
-        # d(q0 s)/dd along the branch, from d = share q0 s - give p and dY/dd
-        share, give = self._edges.law.hold
-        mean = 1 + give * point.slope if share else point.slope
-        return rate * max(1.0, abs(mean))
+        # d(q0 s)/dd along the branch, from d = weight q0 s - compliance p and dY/dd
+        weight, compliance = self._edges.model.device
+        mean = 1 + compliance * point.slope if weight else point.slope
+        return float(rate * max(1.0, abs(mean)))
 
     def rate_held(self, point: Point) -> float:
         """Return the closing of a gap by q0 s while edges are held.

@@ -6,14 +6,17 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.field.opening_series import SHAPE_NODES, fine_nodes_of, opened, sum_modes
-from adhesis.solver.sharp.gap.quadrature import Kinds, Rules
-from adhesis.solver.sharp.gap.sine_transform import circle
+from adhesis.solver.sharp.field.opening_series import count_sine_nodes, open_gap, sum_modes
+from adhesis.solver.sharp.field.solution import Nodes
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
+from adhesis.solver.sharp.gap.sine_transform import tabulate_circle
 from adhesis.solver.sharp.tolerances import (
     MINIMUM_DOUBT,
     MINIMUM_IS_LOW,
     MINIMUM_REFINEMENTS,
     NO_CURVATURE,
+    SHAPE_NODES,
 )
 
 
@@ -74,34 +77,28 @@ def _bottom(gap: Array, modes: Array, at: float, width: float) -> tuple[float, f
 
 @compiled
 def bottoms_of(
-    gaps: Kinds,
-    table: Array,
-    kinds: Kinds,
-    offset: Kinds,
+    gaps: Integers,
+    nodes: Nodes,
     f: Array,
-    rules: Rules,
+    rules: GaussRules,
     top: int,
-    panel: float,
-    stress: Array,
-) -> tuple[Array, Array, Array, Kinds]:
+    panels: Panels,
+) -> tuple[Array, Array, Array, Integers]:
     """Minima of the openings of some gaps of a field: place, value, κ, and in which gap each lies.
 
-    ``top``, ``panel`` and ``stress`` are those of the source; ``gaps`` rise.
+    ``top`` and ``panels`` are those of the source; ``gaps`` rise.
     """
     out = np.empty((3, 64))
     where = np.empty(64, dtype=np.int64)
     found = 0
     last = 0
-    cosine, sine = circle(4)
+    circle = tabulate_circle(4)
     for k in gaps:
-        count = fine_nodes_of(table[k], top, SHAPE_NODES)
+        count = count_sine_nodes(nodes.table[k], top, SHAPE_NODES)
         if count != last:
-            cosine, sine = circle(count + 1)
+            circle = tabulate_circle(count + 1)
             last = count
-        theta, _, opening, modes = opened(
-            table[k], count, kinds[k], f[offset[k] : offset[k + 1]], rules, panel, stress, cosine,
-            sine,
-        )  # fmt: skip
+        theta, _, opening, modes = open_gap(nodes, k, f, circle, rules, panels)
         at, low, half, width, doubt = bottoms(theta, opening)
         while found + at.shape[0] > where.shape[0]:
             wider = np.empty((3, 2 * where.shape[0]))
@@ -111,7 +108,7 @@ def bottoms_of(
             out, where = wider, longer
         for j in range(at.shape[0]):
             if low[j] < max(MINIMUM_IS_LOW * half[j] * width[j] ** 2, MINIMUM_DOUBT * doubt[j]):
-                at[j], low[j], half[j] = _bottom(table[k], modes, at[j], 0.5 * width[j])
+                at[j], low[j], half[j] = _bottom(nodes.table[k], modes, at[j], 0.5 * width[j])
             out[0, found] = at[j]
             out[1, found] = low[j]
             out[2, found] = 2 * half[j]

@@ -21,7 +21,7 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.ends import with_patches
-from adhesis.solver.sharp.gap.quadrature import RULES, Kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.clearance import Clearances
 from adhesis.solver.sharp.nucleation.closing import Closing
@@ -110,14 +110,13 @@ class Nucleation:
         overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
         return profile.h_max * profile.q0 - overlap, highest
 
-    def minima(self, field: GapField, gaps: Kinds) -> tuple[Minima, Kinds]:
+    def minima(self, field: GapField, gaps: Integers) -> tuple[Minima, Integers]:
         """Local minima of the opening inside some gaps, and in which of them each lies."""
         self.edges.count.openings += len(gaps)
         of, source = field.solution, field.source
         theta, opening, curvature, where = bottoms_of(
-            gaps, of.table, of.kinds, of.offset, of.f, RULES, source.top, source.panels.width,
-            source.panels.stress,
-        )  # fmt: skip
+            gaps, of.nodes, of.scaled_opening, GAUSS_RULES, source.top, source.panels
+        )
         return Minima(theta, opening, curvature), where
 
     def clearance(self, opening: Array, curvature: Array) -> Array:
@@ -198,10 +197,10 @@ class Nucleation:
             point = None
             reach = CORRECTED * self.edges.wave
             if many:
-                point = self.edges.equilibrium(last.towards(hit, aim), aim, reach)
+                point = self.edges.equilibrium(last.interpolate(hit, aim), aim, reach)
             for start in (last, hit) if share < 0.5 else (hit, last):
                 if point is None:
-                    point = self.edges.equilibrium(start.predicted(aim), aim, reach)
+                    point = self.edges.equilibrium(start.extrapolate(aim), aim, reach)
             if point is None:
                 break
             value, minima = self.least(point.field)
@@ -220,14 +219,14 @@ class Nucleation:
             late *= -hit_value / (clear_value - hit_value)
         return Located(hit, self.ready(hit_minima), late), 0.0
 
-    def _clearance_of(self, field: GapField, gaps: Kinds) -> Array:
+    def _clearance_of(self, field: GapField, gaps: Integers) -> Array:
         """Clearance of each of some gaps."""
         minima, where = self.minima(field, gaps)
         out = np.full(len(field.gaps), np.inf)
         np.minimum.at(out, where, self.clearance(minima.opening, minima.curvature))
         return out[gaps]
 
-    def _closing(self, clear: Point, hit: Point) -> tuple[Closing | None, Kinds]:
+    def _closing(self, clear: Point, hit: Point) -> tuple[Closing | None, Integers]:
         """How the gaps close that are open at one point and overlap at another, and which."""
         left, _ = self.clearances.left(hit.field)
         closed = np.flatnonzero(left <= 0)

@@ -14,7 +14,7 @@ from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
-from adhesis.solver.sharp.field.solution import Hold
+from adhesis.solver.sharp.field.solution import LoadingDevice
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN, Seen
 
@@ -41,12 +41,12 @@ class Memory:
     seen: Seen = NOT_SEEN
 
 
-def hold_of(problem: Problem) -> Hold:
+def hold_of(problem: Problem) -> LoadingDevice:
     """The control of a problem in the units of the field."""
     if problem.control.is_load:
-        return Hold(0.0, 1.0)
-    give = 0.5 * problem.half_space.modulus * problem.profile.q0 / problem.control.stiffness
-    return Hold(1.0, give)
+        return LoadingDevice(0.0, 1.0)
+    compliance = 0.5 * problem.half_space.modulus * problem.profile.q0 / problem.control.stiffness
+    return LoadingDevice(1.0, compliance)
 
 
 class States:

@@ -14,7 +14,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.opening_series import fine_opening, finer_opening, sum_modes
+from adhesis.solver.sharp.field.opening_series import fine_opening, refine_opening, sum_modes
 
 _FIELD_NODES = 6.0  # sine nodes per shortest wave
 _FINER = 8  # points of an opening, between which it is taken as linear, for each of these nodes
@@ -44,7 +44,7 @@ def fields_of(problem: Problem, field: GapField | None, separation: float, n: in
     for k, (left, right) in enumerate(field.gaps):
         inside = (place > left) & (place < right)
         fine = fine_opening(field, k, _FIELD_NODES)
-        gap[inside] = sum_modes(field.solution.table[k], place[inside], fine.modes)
+        gap[inside] = sum_modes(field.solution.nodes.table[k], place[inside], fine.modes)
         pull[contact] += _pull(theta[contact], fine.theta, fine.opening * fine.weight)
     stress = np.zeros(n)
     full = field.source.sample(theta[contact])[:, 0]
@@ -64,7 +64,7 @@ def openings_of(field: GapField, q0: float) -> list[Opening]:
     out = []
     for k, (left, right) in enumerate(field.gaps):
         modes = fine_opening(field, k, _FIELD_NODES).modes
-        theta, sine_sum = finer_opening(field.solution.table[k], modes, _FINER)
+        theta, sine_sum = refine_opening(field.solution.nodes.table[k], modes, _FINER)
         theta = np.concatenate([[left], theta, [right]])
         out.append(Opening(theta / q0, np.concatenate([[0.0], sine_sum, [0.0]]) / q0))
     return out

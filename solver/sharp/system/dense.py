@@ -12,14 +12,15 @@ from adhesis.solver.sharp.descent.gradient_flow import Descent, descend
 from adhesis.solver.sharp.descent.track import Stage, Track
 from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import Law
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
-from adhesis.solver.sharp.field.dense_solver import solve_plain
+from adhesis.solver.sharp.field.dense_solver import solve
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
-from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Integers
 from adhesis.solver.sharp.tolerances import FASTEST_CLOSING
 
 
@@ -32,44 +33,42 @@ class DenseSystem(EdgeSystem):
     def solution(self, gaps: Array, prescribed: float, share: float) -> Solution:
         """Solve the field of these gaps to a ``share`` of the tolerance."""
         problem = self._problem
-        digits = -np.log(share * problem.tolerance)
-        kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
-        solved = solve_plain(
-            gaps, prescribed, problem.law.hold, kinds, 2, RULES, problem.source.panels
-        )
-        return Solution(*solved)
+        model = problem.model._replace(digits=float(-np.log(share * problem.tolerance)))
+        orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+        solution: Solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
+        return solution
 
-    def stiffness(self, point: Point, edges: Kinds) -> Array:
+    def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂θ_f between some edges, the others held, shape (edges, edges)."""
         return point.field.derivatives[0][np.ix_(edges, edges)]
 
     def equilibrium(
-        self, gaps: Array, prescribed: float, reach: float, kinds: Kinds, *, patient: bool
+        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
     ) -> Equilibrium:
         """Iterate for the equilibrium near these gaps, by the matrix of all edges."""
         problem = self._problem
         found, at, solution, rate, slope, steps = equilibrium(
-            gaps, prescribed, reach, kinds, patient, problem.law, RULES, problem.source.panels
+            gaps, prescribed, reach, orders, patient, problem.law, problem.model, NO_EXTERIOR
         )
         problem.count.newton(steps)
-        return Equilibrium(found, at, Solution(*solution), rate, slope)
+        return Equilibrium(found, at, solution, rate, slope)
 
     def descend(
         self,
         gaps: Array,
         prescribed: float,
         most: int,
-        kinds: Kinds,
-        law: Law,
+        orders: Integers,
+        law: EdgeLaw,
         track: Track,
         *,
         equal_speeds: bool,
         compare: bool,
     ) -> Descent:
         """Descend with all edges at once."""
-        problem = FlowProblem(law, RULES, self._problem.source.panels)
+        problem = FlowProblem(law, self._problem.model, NO_EXTERIOR)
         comparison = Comparison(track.of(gaps.size if compare else 0), track.has_left, 0)
-        found = descend(gaps, prescribed, most, kinds, equal_speeds, problem, comparison)
+        found = descend(gaps, prescribed, most, orders, equal_speeds, problem, comparison)
         track.has_left = found.has_left
         if not compare:
             track.ways.append(found.trajectory)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.griffith import Law
-from adhesis.solver.sharp.field.solution import FIXED, Hold
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES
 from adhesis.solver.sharp.tolerances import (
     COARSE_FIELD,
     DESCENT_HANDS_OVER,
@@ -31,8 +32,8 @@ class EdgeProblem:
         4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
     tolerance : float
         Relative accuracy of the field.
-    hold : Hold
-        Prescribed quantity.
+    device : LoadingDevice
+        What prescribes the quantity d.
 
     Attributes
     ----------
@@ -44,12 +45,17 @@ class EdgeProblem:
         How far an equilibrium may move with the error of the field.
     smallest : float
         Narrower patches and gaps are removed.
-    law : Law
+    law : EdgeLaw
+    model : FieldModel
     count : Counters
     """
 
     def __init__(
-        self, source: StressSource, critical: float, tolerance: float, hold: Hold = FIXED
+        self,
+        source: StressSource,
+        critical: float,
+        tolerance: float,
+        device: LoadingDevice = FIXED_SEPARATION,
     ) -> None:
         self.source, self.critical, self.tolerance = source, critical, tolerance
         self.wave = 2 * np.pi / source.top
@@ -63,27 +69,31 @@ class EdgeProblem:
         if critical > 0:
             self.smallest = min(self.smallest, SMALLEST_OF_SEED * seed)
         roughness_opening = np.sqrt(source.m2 * self.wave)
-        self.law = Law(
+        self.law = EdgeLaw(
             critical=float(critical),
-            digits=float(-np.log(tolerance)),
-            settled=self.settled,
-            coarse=self.coarse,
-            near=DESCENT_HANDS_OVER * self.wave,
-            longest=self.longest_step,
+            newton_tolerance=self.settled,
+            field_error=self.coarse,
+            rest_step=DESCENT_HANDS_OVER * self.wave,
+            longest_step=self.longest_step,
             smallest=float(self.smallest),
-            overlapping=float(OVERLAPPING * max(critical, roughness_opening)),
-            hold=hold,
-            faint=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
+            overlap_limit=float(OVERLAPPING * max(critical, roughness_opening)),
+            force_error=max(FAINT_FORCE * tolerance, LEAST_FAINT_FORCE) * float(critical) ** 2,
             origin=source.highest,
+        )
+        self.model = FieldModel(
+            device=device,
+            digits=float(-np.log(tolerance)),
+            rules=GAUSS_RULES,
+            panels=source.panels,
         )
         self.count = Counters()
 
     @property
     def is_fixed(self) -> bool:
         """Whether the separation is prescribed."""
-        return self.law.hold == FIXED
+        return self.model.device == FIXED_SEPARATION
 
     @property
     def is_load(self) -> bool:
         """Whether the mean stress is prescribed."""
-        return self.law.hold.share == 0
+        return self.model.device.separation_weight == 0

@@ -13,12 +13,12 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.descent.gradient_flow import Descent
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import Law
-from adhesis.solver.sharp.equilibrium.linear_exterior import About
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 
-Kinds = NDArray[np.int64]
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Equilibrium:
         dY/dd along the branch.
     lost_edge : int
         Where nothing was found, the edge that moved away; -1 if it is unknown.
-    linearisation : About or None
+    linearisation : Linearisation or None
         Of many gaps: with which windows are set up.
     """
 
@@ -47,7 +47,7 @@ class Equilibrium:
     rate: Array
     slope: float
     lost_edge: int = -1
-    linearisation: About | None = None
+    linearisation: Linearisation | None = None
 
 
 class EdgeSystem(ABC):
@@ -77,12 +77,12 @@ class EdgeSystem(ABC):
         """Solve the field of these gaps to a ``share`` of the tolerance."""
 
     @abstractmethod
-    def stiffness(self, point: Point, edges: Kinds) -> Array:
+    def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂θ_f between some edges, the others held, shape (edges, edges)."""
 
     @abstractmethod
     def equilibrium(
-        self, gaps: Array, prescribed: float, reach: float, kinds: Kinds, *, patient: bool
+        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
     ) -> Equilibrium:
         """Iterate for the equilibrium near these gaps.
 
@@ -98,8 +98,8 @@ class EdgeSystem(ABC):
         gaps: Array,
         prescribed: float,
         most: int,
-        kinds: Kinds,
-        law: Law,
+        orders: Integers,
+        law: EdgeLaw,
         track: Track,
         *,
         equal_speeds: bool,

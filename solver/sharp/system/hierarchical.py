@@ -13,14 +13,15 @@ from adhesis.solver.sharp.descent.gradient_flow import Descent
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.descent.windowed_descent import descend_many
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.edge_elimination import between_edges
-from adhesis.solver.sharp.equilibrium.griffith import Law
+from adhesis.solver.sharp.equilibrium.edge_elimination import openings_between_edges
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import equilibrium_many
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many_plain
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
+from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import RULES, choose_kinds
-from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Kinds
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Integers
 from adhesis.solver.sharp.tolerances import CLOSING_BY_MOTION, CLOSING_OF_MANY
 
 
@@ -33,43 +34,40 @@ class HierarchicalSystem(EdgeSystem):
     def solution(self, gaps: Array, prescribed: float, share: float) -> Solution:
         """Solve the field of these gaps to a ``share`` of the tolerance."""
         problem = self._problem
-        digits = problem.law.digits - math.log(share)
-        kinds = choose_kinds(map_gaps(gaps), digits, RULES.counts)
-        solved = solve_many_plain(
-            gaps, prescribed, problem.law.hold, kinds, digits, 2, RULES, problem.source.panels
-        )
-        return Solution(*solved)
+        model = problem.model._replace(digits=problem.model.digits - math.log(share))
+        orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+        solution: Solution = solve_many(gaps, prescribed, orders, 2, model)[0]
+        return solution
 
-    def stiffness(self, point: Point, edges: Kinds) -> Array:
+    def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂θ_f between some edges, the others held; the diagonal is not given."""
         problem = self._problem
-        by_edge: Array = between_edges(
-            point.gaps, point.at, problem.law.hold, point.field.solution.kinds,
-            problem.law.digits, edges, RULES, problem.source.panels,
-        )  # fmt: skip
+        by_edge: Array = openings_between_edges(
+            point.gaps, point.at, point.field.solution.nodes.orders, edges, problem.model
+        )
         return by_edge
 
     def equilibrium(
-        self, gaps: Array, prescribed: float, reach: float, kinds: Kinds, *, patient: bool
+        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
     ) -> Equilibrium:
         """Iterate for the equilibrium near these gaps, the edges of each gap eliminated."""
         problem = self._problem
         found, at, about, rate, slope, steps = equilibrium_many(
-            gaps, prescribed, reach, kinds, patient, problem.law, RULES, problem.source.panels
+            gaps, prescribed, reach, orders, patient, problem.law, problem.model
         )
         problem.count.newton(steps)
         lost = -1
         if not found and np.isfinite(rate).all():
             lost = int(np.argmax(np.abs(rate)))
-        return Equilibrium(found, at, about.of, rate, slope, lost, about)
+        return Equilibrium(found, at, about.solution, rate, slope, lost, about)
 
     def descend(
         self,
         gaps: Array,
         prescribed: float,
         most: int,
-        kinds: Kinds,
-        law: Law,
+        orders: Integers,
+        law: EdgeLaw,
         track: Track,
         *,
         equal_speeds: bool,
@@ -77,8 +75,8 @@ class HierarchicalSystem(EdgeSystem):
     ) -> Descent:
         """Descend in windows, one after the other; the track is not known."""
         track.is_complete = False
-        problem = FlowProblem(law, RULES, self._problem.source.panels)
-        found: Descent = descend_many(gaps, prescribed, most, kinds, equal_speeds, problem)
+        problem = FlowProblem(law, self._problem.model, NO_EXTERIOR)
+        found: Descent = descend_many(gaps, prescribed, most, orders, equal_speeds, problem)
         self._problem.count.descent(found.fields, found.tangents)
         return found
 

@@ -1,0 +1,201 @@
+"""Weight functions of the edges: how the field changes when an edge moves.
+
+The derivative of the field with respect to an edge is the homogeneous solution with an opening
+∝ 1/sqrt(r) there (Bueckner's and Rice's weight function). It is split into the opening
+sqrt((1∓η)/(1±η)) of the edge's own gap and a regular part. The density of the former at the nodes
+is 1/(1±η) and, as the rule is exact for polynomials only, a further weight π/(M+1) at the edge
+itself. Its load on all nodes is the right-hand side of the regular part.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled, compiled_sums
+from adhesis.solver.sharp.field.assembly import mapped_kernel, periodic_images
+from adhesis.solver.sharp.field.exterior import Exterior, ExteriorCoupling, exterior_kernel
+from adhesis.solver.sharp.field.solution import (
+    Nodes,
+    Solution,
+    edge_openings,
+    subtract_end_terms,
+)
+from adhesis.solver.sharp.gap.conformal_map import ALPHA, LEFT
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
+
+
+@compiled
+def end_singularity(nodes: Nodes, e: int, rules: GaussRules) -> tuple[Array, float, float]:
+    """Compute the singular opening of edge e: density at its nodes, weight at the edge, area."""
+    k, side = e // 2, e % 2
+    base, m = nodes.offset[k], nodes.offset[k + 1] - nodes.offset[k]
+    start = rules.vector_start[nodes.orders[k]]
+    strength = np.pi / (m + 1) / nodes.slope[k, side]
+    area = strength
+    density = np.empty(m)
+    for j in range(m):
+        x = rules.eta[start + j]
+        density[j] = 1 / (1 + x) if side == 0 else 1 / (1 - x)
+        area += nodes.weight[base + j] * density[j]
+    return density, strength, area
+
+
+@compiled
+def own_singular_load(
+    nodes: Nodes, e: int, block: Array, density: Array, strength: float, rules: GaussRules
+) -> Array:
+    """Load the gap of edge e, whose diagonal block is ``block``, by the edge's singular opening."""
+    k, side = e // 2, e % 2
+    order = nodes.orders[k]
+    base, m = nodes.offset[k], density.shape[0]
+    square = rules.matrix_start[order]
+    crack = rules.crack[square : square + m * m].reshape(m, m)
+    point = np.pi / (m + 1)
+    out = np.empty(m)
+    for i in range(m):
+        total = 0.0
+        for j in range(m):
+            total -= (block[i, j] - crack[i, j]) * density[j]
+        place = rules.vector_start[order] + i
+        mapped = mapped_kernel(nodes.table[k, ALPHA], rules.eta[place] - (2 * side - 1))
+        images = periodic_images(nodes.theta[base + i] - nodes.table[k, LEFT + side])
+        near = rules.weights[place] * point * mapped
+        far = nodes.weight[base + i] * strength * images
+        out[i] = total + (near + far) / (4 * np.pi)
+    return out
+
+
+@compiled
+def singular_loads(
+    state: Solution, edges: Integers, columns: int, rules: GaussRules
+) -> tuple[Array, Array]:
+    """Load all nodes by the singular openings of some edges, one a column; with their areas.
+
+    There may be more ``columns`` than edges, for ``cholesky``; those are zero, as are those of the
+    exterior of a window, a gap without nodes.
+    """
+    nodes, matrix = state.nodes, state.equations.matrix
+    n = nodes.theta.shape[0]
+    load = np.zeros((n, columns))
+    area = np.zeros(edges.shape[0])
+    sine = np.sin(0.5 * nodes.theta)
+    cosine = np.cos(0.5 * nodes.theta)
+    column = np.empty(n)
+    for c in range(edges.shape[0]):
+        e = edges[c]
+        k = e // 2
+        first, behind = nodes.offset[k], nodes.offset[k + 1]
+        if first == behind:
+            continue
+        density, strength, area[c] = end_singularity(nodes, e, rules)
+        rows = matrix[first:behind]
+        edge = nodes.table[k, LEFT + e % 2]
+        _load_by_edge(rows, density, strength, edge, sine, cosine, nodes.weight, column)
+        column[first:behind] = own_singular_load(
+            nodes, e, rows[:, first:behind], density, strength, rules
+        )
+        load[:, c] = column
+    return load, area
+
+
+@compiled_sums
+def _load_by_edge(
+    rows: Array,
+    density: Array,
+    strength: float,
+    edge: float,
+    sine: Array,
+    cosine: Array,
+    weight: Array,
+    out: Array,
+) -> None:
+    """Load other gaps, into ``out``, by a density of a gap's ``rows`` and a weight at an edge."""
+    scale = strength / (4 * np.pi)
+    edge_sine = np.sin(0.5 * edge)
+    edge_cosine = np.cos(0.5 * edge)
+    for i in range(out.shape[0]):
+        half = sine[i] * edge_cosine - cosine[i] * edge_sine
+        out[i] = scale * weight[i] / (half * half)
+    for j in range(density.shape[0]):
+        row = rows[j]
+        value = density[j]
+        for i in range(out.shape[0]):
+            out[i] -= value * row[i]
+
+
+@compiled
+def openings_by_edges(
+    state: Solution, edges: Integers, regular: Array, area: Array, rules: GaussRules
+) -> tuple[Array, Array]:
+    """Compute ∂C_e/∂θ_f, e ≠ f, shape (2L, edges), and ∂Y/∂θ_f for some edges f.
+
+    ``regular`` are the regular parts at fixed p, which are overwritten; ``area`` are the areas of
+    the singular openings. Y is p, under a load q0 s.
+    """
+    count = edges.shape[0]
+    load, slope = state.equations.load, state.nodes.slope
+    conjugate = area.copy()
+    for i in range(regular.shape[0]):
+        for c in range(count):
+            conjugate[c] += load[i, 1] * regular[i, c]
+    if state.mean.separation_weight == 0:
+        conjugate /= 2 * np.pi  # of the separation; the pressure stays
+    else:
+        conjugate /= state.mean.resistance
+        for i in range(regular.shape[0]):
+            for c in range(count):
+                regular[i, c] -= state.solved[i, 1] * conjugate[c]
+    by_edge = edge_openings(regular, state.nodes, rules)[:, :count].copy()
+    for c in range(count):
+        f = edges[c]
+        k, side = f // 2, f % 2
+        by_edge[f ^ 1, c] += 0.5 * np.sqrt(2 * slope[k, 1 - side])  # the singular opening's far end
+        strength = (2 * side - 1) * state.opening[f] * np.sqrt(slope[k, side] / 8)
+        conjugate[c] *= strength
+        for e in range(by_edge.shape[0]):
+            by_edge[e, c] *= strength
+    return by_edge, conjugate
+
+
+@compiled
+def openings_by_translation(state: Solution, rules: GaussRules) -> Array:
+    """Compute the derivatives of all openings when all edges move together against the profile."""
+    n = state.solved.shape[0]
+    drift = 0.0
+    for i in range(n):
+        drift -= state.equations.load[i, 1] * state.solved[i, 2]
+    drift += state.exterior.shift
+    drift = state.mean.separation_weight * drift / state.mean.resistance
+    moving = np.empty((n, 1))
+    for i in range(n):
+        moving[i, 0] = -state.solved[i, 2] - drift * state.solved[i, 1]
+    opening = edge_openings(moving, state.nodes, rules)[:, 0].copy()
+    subtract_end_terms(opening, state.nodes.slope, state.equations.end_terms, 1)
+    return opening
+
+
+@compiled
+def exterior_singular_terms(
+    nodes: Nodes, rules: GaussRules, coupling: ExteriorCoupling, exterior: Exterior
+) -> tuple[Array, Array]:
+    """Compute the terms of an exterior in loads and areas of a window's singular openings."""
+    kernel = coupling.kernel
+    gaps = nodes.table.shape[0]
+    load = np.zeros((kernel.shape[0], 2 * gaps))
+    area = np.zeros(2 * gaps)
+    place, strength = np.empty(1), np.empty(1)
+    for k in range(gaps - 1):
+        for side in range(2):
+            e = 2 * k + side
+            density, strength[0], _ = end_singularity(nodes, e, rules)
+            place[0] = nodes.table[k, LEFT + side]
+            at_edge, _ = exterior_kernel(place, strength, exterior)
+            for a in range(kernel.shape[1]):
+                area[e] += at_edge[0, a] * exterior.charge[a, 1]
+                for i in range(kernel.shape[0]):
+                    load[i, e] += coupling.response[i, a] * at_edge[0, a]
+            for j in range(density.shape[0]):
+                for a in range(kernel.shape[1]):
+                    area[e] += density[j] * kernel[nodes.offset[k] + j, a] * exterior.charge[a, 1]
+    return load, area
