@@ -13,7 +13,8 @@ import pytest
 from adhesis.ensemble import versions
 from adhesis.ensemble.doctor import examine as doctor
 from adhesis.ensemble.run import launch
-from adhesis.solver import code_cache, warm
+from adhesis.solver import precompile as warm
+from adhesis.solver.runtime import disk_cache as code_cache
 from adhesis.solver.runtime.disk_cache import CodeFiles
 
 

@@ -11,7 +11,8 @@ import pytest
 
 from adhesis.ensemble import warm as ensemble_warm
 from adhesis.ensemble.command import warm as command
-from adhesis.solver import code_cache, warm
+from adhesis.solver import precompile as warm
+from adhesis.solver.runtime import disk_cache as code_cache
 from adhesis.solver.runtime import jit as door
 from adhesis.solver.runtime.disk_cache import CodeFiles
 from adhesis.solver.runtime.jit import Compilation

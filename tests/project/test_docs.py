@@ -86,6 +86,7 @@ TEXT = {
     "loss = ∮ p̄ dΔ": "formula",
     "loss = (1/λ) Σ": "formula",
     "W = U + λ": "formula",
+    "branch = Branch(": "pseudo-code",
 }
 PROGRAMS = (
     "adhesis",
