@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 from collections.abc import Callable
 
@@ -28,6 +29,9 @@ def interrupted(work: Work, delay: float) -> str:
         raise raised[-1]
 
     before = signal.signal(signal.SIGALRM, handler)
+    # Python drops what is raised inside a finalizer, and the collector runs those of others' objects.
+    collects = gc.isenabled()
+    gc.disable()
     try:
         signal.setitimer(signal.ITIMER_REAL, delay)
         work()
@@ -39,4 +43,6 @@ def interrupted(work: Work, delay: float) -> str:
         return f"{type(error).__name__}: {error}"[:200]
     finally:
         signal.signal(signal.SIGALRM, before)
+        if collects:
+            gc.enable()
     return "lost" if raised else "done"

@@ -16,9 +16,9 @@ import numpy as np
 
 from adhesis.ensemble.outputs import whole_file
 from adhesis.solver.checks import counted
-from adhesis.solver.interior import range_summary
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
+from adhesis.solver.loading.zero_range import range_summary
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.problem import Problem

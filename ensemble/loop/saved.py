@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from adhesis.ensemble.outputs import whole_file
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult
+from adhesis.solver.loading.zero_range import InteriorTension
 from adhesis.solver.method import MethodReport
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -112,7 +113,9 @@ def to_xarray(result: Result) -> xr.Dataset:
         elif isinstance(value, np.ndarray):
             dim = "jump" if entry.name == "jump_leg" else "state"
             variables[entry.name] = _variable(dim, entry.name, value)
-        else:
+        elif is_dataclass(value) and not isinstance(value, type):
+            about[entry.name] = json.dumps(asdict(value))
+        elif value is not None:
             about[entry.name] = np.array(value) if isinstance(value, tuple) else value
     problem = result.problem
     coefficients = problem.profile.coefficients
@@ -225,6 +228,8 @@ def _result(found: xr.Dataset) -> Result:
             values[name] = array.astype(str) if array.dtype.kind == "O" else array
         elif name == "turning_points":
             values[name] = tuple(np.atleast_1d(about[name]).tolist())
+        elif name == "interior":
+            values[name] = InteriorTension(**json.loads(about[name])) if name in about else None
         elif name in about and name not in _NOT_KEPT:
             values[name] = np.asarray(about[name]).item()
     coefficients = found["coefficient_real"].values + 1j * found["coefficient_imag"].values

@@ -16,7 +16,7 @@ from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.axes import cell_name, lines_along, place, together
 from adhesis.ensemble.report.tables.losses import least
 from adhesis.ensemble.task.doubt import BEYOND_LIMIT, bound, doubtful
-from adhesis.solver.interior import beyond_limit
+from adhesis.solver.loading.zero_range import beyond_limit
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3

@@ -28,7 +28,7 @@ from adhesis.ensemble.results.read import (
 )
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from adhesis.ensemble.task.doubt import BEYOND_LIMIT, doubtful
-from adhesis.solver.interior import beyond_limit
+from adhesis.solver.loading.zero_range import beyond_limit
 from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
@@ -56,9 +56,10 @@ def read_status(path: Path | str) -> dict[str, Any]:
         cell are pending), and all this as a sentence (``precision``); ``failures``, one dict for
         each failed task; ``doubtful``, one for each loss whose own checks say that it is wrong
         (:mod:`adhesis.ensemble.task.doubt`), the worst first; ``beyond_limit``, one for each loss
-        that is that of the zero-range limit alone (:func:`adhesis.solver.interior.beyond_limit`),
-        the least valid range first; ``last_row``, when the file was last written to (as
-        ``time.time()`` counts), None before the first row.
+        that is that of the zero-range limit alone
+        (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least valid range first;
+        ``last_row``, when the file was last written to (as ``time.time()`` counts), None before the
+        first row.
 
     Raises
     ------

@@ -31,8 +31,8 @@ from adhesis.ensemble.task.compute import Runner, check_task, methods_of
 from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
-from adhesis.solver.interior import beyond_limit
 from adhesis.solver.loading.loop import Progress
+from adhesis.solver.loading.zero_range import beyond_limit
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Told:
     steered : float
         The quantity of ``[stop]``.
     beyond_limit : bool
-        See :func:`adhesis.solver.interior.beyond_limit`.
+        See :func:`adhesis.solver.loading.zero_range.beyond_limit`.
     """
 
     loss: float
@@ -145,7 +145,7 @@ class Summary:
         (:mod:`adhesis.ensemble.task.doubt`).
     beyond_limit : int
         Losses, of those computed now, that are those of the zero-range limit alone
-        (:func:`adhesis.solver.interior.beyond_limit`).
+        (:func:`adhesis.solver.loading.zero_range.beyond_limit`).
     stopped : str or None
         Why it stopped before the last task.
     precisions : tuple of (str, Precision)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.solver.interior import DOUBTFUL_LOSS, DOUBTFUL_RANGE
+from adhesis.solver.loading.zero_range import DOUBTFUL_LOSS, DOUBTFUL_RANGE
 
 BEYOND_LIMIT = (
     f"valid_range is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "

@@ -73,8 +73,8 @@ def main() -> None:
 
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists."""
-    from adhesis.solver.interior import range_warnings
     from adhesis.solver.loading.loop import run_loop
+    from adhesis.solver.loading.zero_range import range_warnings
     from adhesis.solver.method import Branch, ContactState
     from adhesis.solver.model.half_space import HalfSpace
     from adhesis.solver.model.problem import Problem

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import choice, counted, reals
-from adhesis.solver.interior import (
+from adhesis.solver.loading.path_record import Record
+from adhesis.solver.loading.zero_range import (
     InteriorTension,
     edge_range,
     interior_tension,
@@ -25,7 +26,6 @@ from adhesis.solver.interior import (
     range_warnings,
     valid_range,
 )
-from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import ContactState, Method, MethodReport
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch, Jump
@@ -99,7 +99,7 @@ class LoopResult(ByValue, Viewed):
         Largest local maximum of tension inside patches, and where it occurred; None if no patch
         has one (docs/zero-range.md).
     narrowest_length : float
-        Shortest length in m that decides where edges stand (:mod:`adhesis.solver.interior`).
+        Shortest length in m that decides where edges stand (``zero_range``).
 
     References
     ----------

@@ -21,7 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
-from adhesis.solver.interior import (
+from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
+from adhesis.solver.loading.loop_result import estimated_error
+from adhesis.solver.loading.path_record import Axis, Record
+from adhesis.solver.loading.zero_range import (
     InteriorTension,
     edge_range,
     interior_tension,
@@ -29,9 +32,6 @@ from adhesis.solver.interior import (
     range_warnings,
     valid_range,
 )
-from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
-from adhesis.solver.loading.loop_result import estimated_error
-from adhesis.solver.loading.path_record import Axis, Record
 from adhesis.solver.method import ContactState, Method, MethodReport, PathError
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
@@ -139,7 +139,7 @@ class PathResult(ByValue, Viewed):
         Largest local maximum of tension inside patches, and where it occurred; None if no patch
         has one (docs/zero-range.md).
     narrowest_length : float
-        Shortest length in m that decides where edges stand (:mod:`adhesis.solver.interior`).
+        Shortest length in m that decides where edges stand (``zero_range``).
 
     References
     ----------

@@ -43,7 +43,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States, hold_of
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
-from adhesis.solver.sharp.tension import largest_tension
+from adhesis.solver.sharp.output.interior_tension import largest_tension
 from adhesis.solver.sharp.tolerances import (
     CORRECTED,
     FIELD_ACCURACY,

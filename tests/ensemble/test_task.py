@@ -14,10 +14,10 @@ from adhesis.ensemble.task.compute import Runner, make_problem, run_task
 from adhesis.ensemble.task.dataset import KEPT, row_shape, sizes_of
 from adhesis.ensemble.task.doubt import doubtful
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_of, row_scales
-from adhesis.solver.interior import InteriorTension
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path_record import Record
+from adhesis.solver.loading.zero_range import InteriorTension
 from adhesis.solver.method import MethodReport, PathError
 from adhesis.solver.model.jump import JUMP_KINDS, Jump
 from adhesis.solver.registry import make_method

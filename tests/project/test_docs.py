@@ -77,6 +77,7 @@ NOT_RUN = {
     "python benchmarks/precision_coverage.py --campaigns 4000": "takes minutes; "
     "test_precision.py asks four kinds of a thousand",
     '.venv/bin/pip install "SurfaceTopography>=1.27"': "needs a network",
+    "python3 -m venv .venv && .venv/bin/pip install .": "needs a network; see check-package",
 }
 # Blocks that are neither code nor commands, by how they begin.
 TEXT = {
@@ -97,6 +98,7 @@ PROGRAMS = (
     "qsub",
     "export",
     "python",
+    "python3",
     ".venv/bin/pip",
 )
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.campaign_support import environment
 from tests.support.synthetic_results import campaign, rows, text_of, write
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -69,7 +70,7 @@ SOLVER_FOR_ENSEMBLE = {
     "adhesis.solver.checks",
     "adhesis.solver.model.control",
     "adhesis.solver.observables",
-    "adhesis.solver.interior",
+    "adhesis.solver.loading.zero_range",
     "adhesis.solver.model.jump",
     "adhesis.solver.loading.loop",
     "adhesis.solver.loading.loop_result",
@@ -222,6 +223,7 @@ def loaded(code: str, *words: str, blocked: str = "") -> set[str]:
         capture_output=True,
         text=True,
         check=False,
+        env=environment(),
     )
     assert done.returncode == 0, done.stderr
     return set(done.stdout.splitlines()[-1].split()[1:])

@@ -152,7 +152,7 @@ def test_a_state_that_is_not_found_is_reported_in_the_units_of_the_turning_point
 @pytest.mark.parametrize(
     ("share", "max_stress", "where"),
     [
-        (1e3, 1e12, "at first touch: no state"),
+        (1e3, 1e12, "at first touch: there is no state with a gap"),
         (0.2, 1e12, r"before a mean stress of 5e\+11 Pa"),
     ],
 )

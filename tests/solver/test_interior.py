@@ -22,7 +22,7 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from adhesis.solver.interior import _narrowest_moved, beyond_limit
+from adhesis.solver.loading.zero_range import _narrowest_moved, beyond_limit
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.references.exact_wave import ExactWave
 from tests.support.explicit_solution import explicit_openings, explicit_solution
