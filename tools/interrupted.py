@@ -29,7 +29,7 @@ def interrupted(work: Work, delay: float) -> str:
         raise raised[-1]
 
     before = signal.signal(signal.SIGALRM, handler)
-    # Python drops what is raised inside a finalizer, and the collector runs those of others' objects.
+    # Python drops what is raised inside a finalizer; the collector runs those of other objects.
     collects = gc.isenabled()
     gc.disable()
     try:
