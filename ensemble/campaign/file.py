@@ -142,9 +142,10 @@ def _check_zip(
                     f"of several values, here {', '.join(sorted(length))}"
                 )
         if len({length[name] for name in group}) > 1:
-            told = ", ".join(f"{name} {length[name]}" for name in group)
+            lengths = ", ".join(f"{name} {length[name]}" for name in group)
             raise InputError(
-                f"{source}: [sweep] zip joins lists of different lengths ({told}): they must have "
+                f"{source}: [sweep] zip joins lists of different lengths ({lengths}): they must "
+                "have "
                 "as many values each"
             )
 

@@ -383,7 +383,7 @@ class Campaign:
         ]
 
     def identity(self, task: Task) -> tuple[Any, ...]:
-        """What tells a task from all others, also in a campaign that grew new axes."""
+        """Return what identifies a task, also in a campaign that grew new axes."""
         here = self.at(task)
         rest = tuple(
             getattr(getattr(here, table), entry.name)

@@ -296,13 +296,13 @@ def _tell_price(
             heard = time.monotonic()
             say(f"pilot loop: {task}: {seconds:.3g} s")
 
-    told = price(
+    estimate = price(
         *(campaign, path, part),
         compute=lambda c, t: engine.compute(c, t, None),
         prepare=prepare,
         on_pilot=tried,
     )
-    print(as_text(told))
+    print(as_text(estimate))
     return DONE
 
 

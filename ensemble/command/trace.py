@@ -111,8 +111,8 @@ class _Progress:
         expected = self.plan.seconds
         running = {name: now - started for name, (started, _, _) in pool.running.items()}
         ended = list(pool.took)[1:]  # without the first one, which may have made machine code
-        told = sum(expected[name] for name in ended)
-        ratio = sum(pool.took[name] for name in ended) / told if told > 0 else 1.0
+        predicted = sum(expected[name] for name in ended)
+        ratio = sum(pool.took[name] for name in ended) / predicted if predicted > 0 else 1.0
         rest = [
             max(ratio * expected[name] - seconds, 0.25 * seconds)
             for name, seconds in running.items()

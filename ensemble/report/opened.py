@@ -118,7 +118,7 @@ class CampaignResults:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """What tells the loops apart: H, γ, what else is a list in the campaign, realisation."""
+        """Names of the axes: H, γ, further lists of the campaign, realisation."""
         return (*(axis.name for axis in self.campaign.axes), "realisation")
 
     # ------------------------------------------------------------------ arrays
@@ -192,7 +192,7 @@ class CampaignResults:
 
     @property
     def _cell(self) -> tuple[str, ...]:
-        """The axes that tell the cells apart."""
+        """Names of the axes of the cells."""
         return self.axes[:-1]
 
     def _arranged(self, datasets: Iterable[Dataset]) -> xr.Dataset:

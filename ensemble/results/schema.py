@@ -1,7 +1,7 @@
 """The shape of a results file: one table that lays it out, reads it and documents it.
 
-What a loop leaves behind is told in :mod:`adhesis.ensemble.task.row`; here what the task is and how
-it went are added to it. ``docs/results-file.md`` describes the same datasets for people; a test
+Columns of a loop are defined in :mod:`adhesis.ensemble.task.row`; here the columns of its task and
+its status are added. ``docs/results-file.md`` describes the same datasets for people; a test
 compares the two.
 """
 

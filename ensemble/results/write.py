@@ -221,5 +221,5 @@ def reason(error: Exception) -> str:
     """Return the reason of an error in one line, without HDF5's particulars."""
     if isinstance(error, OSError) and error.errno:
         return os.strerror(error.errno)
-    told = re.search(r"error message = '([^']*)'", str(error))
-    return told.group(1) if told else " ".join(str(error).split("(")[0].split())
+    found = re.search(r"error message = '([^']*)'", str(error))
+    return found.group(1) if found else " ".join(str(error).split("(")[0].split())

@@ -305,7 +305,7 @@ class Master:
             self._channel.send(rank, answer, urgent=True)
             self._hand_out()  # it may have come back
             return
-        if kind == "stop":  # a worker was told to stop, by a signal say
+        if kind == "stop":  # a worker received a request to stop, such as a signal
             self._halt(message[1])
             return
         if kind == "claim":
@@ -407,7 +407,7 @@ class Worker:
         self._limits = limits
         self._clock = clock
         self._halted = False
-        self._told = False
+        self._reported = False
         self._looking = False
         # When it last sent a heartbeat, when the last one was that the master has answered, and
         # whether the master ever handed its tasks to others: they may lie among its messages yet.
@@ -463,14 +463,14 @@ class Worker:
         return granted
 
     def _stopped(self) -> bool:
-        """Whether the master says stop, or a signal to this rank; the master is told of that."""
+        """Whether the master or a signal to this rank asks to stop; a signal is passed on."""
         if not self._looking:  # the timer of a task may go off within a look
             self._looking = True
             try:
                 self._look()
             finally:
                 self._looking = False
-        return self._halted or self._told
+        return self._halted or self._reported
 
     def _look(self) -> None:
         """Send a heartbeat if it is time to, and look for urgent messages."""
@@ -484,6 +484,6 @@ class Worker:
                 self._answered_at, self._recalled = rest
             else:
                 self._halted = True
-        if not self._halted and not self._told and (reason := self._limits.stop()) is not None:
-            self._told = True
+        if not self._halted and not self._reported and (reason := self._limits.stop()) is not None:
+            self._reported = True
             self._channel.send(MASTER, ("stop", reason))

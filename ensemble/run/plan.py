@@ -80,7 +80,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Plan:
-    """What there is to do, found by rank 0 and told to all.
+    """Tasks that are left, determined by rank 0 and broadcast to all.
 
     Attributes
     ----------

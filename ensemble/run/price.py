@@ -1,4 +1,4 @@
-"""What a campaign costs, told before it starts: a few pilot loops, or the times measured so far."""
+"""Estimate the cost of a campaign from a few pilot loops, or from the times measured so far."""
 
 from __future__ import annotations
 

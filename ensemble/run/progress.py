@@ -41,7 +41,7 @@ class Counts:
 
 
 class ProgressLine:
-    """Tells how far a run is, on rank 0.
+    """Report the progress of a run, on rank 0.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ T = TypeVar("T")
 _TAG, _URGENT_TAG = 1, 2
 _PAUSE = 2e-3  # s
 
-# How launchers tell a process how many it is one of, and which one; the first that is set counts.
+# Variables in which launchers give the number of processes and the rank; the first set one counts.
 # Slurm's SLURM_NTASKS is not among them: a batch script has it too, outside any launcher.
 _LAUNCHERS = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "Open MPI's mpirun"),
@@ -40,7 +40,7 @@ _HINTS = (
 
 
 def launched(environ: Mapping[str, str] = os.environ) -> tuple[int, int, str]:
-    """Return (number of processes, this one's place, launcher) as the launcher tells them.
+    """Return (number of processes, this one's place, launcher) from the launcher's variables.
 
     (1, 0, "") without a launcher.
     """

@@ -36,8 +36,8 @@ from adhesis.solver.loading.zero_range import beyond_limit
 
 
 @dataclass(frozen=True)
-class Told:
-    """What the master is told of a row that was written elsewhere.
+class RowSummary:
+    """Numbers of a row that a worker wrote, for the master.
 
     Attributes
     ----------
@@ -218,7 +218,7 @@ def run_campaign(
         On every rank, before any work, if the campaign cannot be computed or the file is foreign,
         damaged, of another campaign, in use or not writable.
     adhesis.ensemble.run.dispatch.Overdue
-        If workers did not stop in time when told to; the results file is sound.
+        If workers did not stop in time when asked to; the results file is sound.
     OutOfReach
         On rank 0, if workers do not answer at the end; the results file is sound. The other ranks
         wait: the caller has to end the job.
@@ -404,9 +404,10 @@ class _Session:
             self._writer.write_result(outcome.task, outcome.result, outcome.rank)
         else:
             self._writer.write_failure(outcome.task, outcome.error, outcome.seconds, outcome.rank)
-        return replace(outcome, result=self._told(outcome.result, self._plan.tasks[outcome.task]))
+        summary = self._summarise(outcome.result, self._plan.tasks[outcome.task])
+        return replace(outcome, result=summary)
 
-    def _told(self, row: Row | None, task: Task) -> Told | None:
+    def _summarise(self, row: Row | None, task: Task) -> RowSummary | None:
         if row is None:
             return None
         loss, residual = float(row["loss"]), float(row["audit_residual"])
@@ -415,19 +416,19 @@ class _Session:
         steered = float(row[self._campaign.stop.quantity])
         contact = row["largest_contact_fraction"]
         beyond = beyond_limit(row["valid_range"], loss, task.work_of_adhesion, contact)
-        return Told(loss, residual, error, bool(wrong), steered, bool(beyond))
+        return RowSummary(loss, residual, error, bool(wrong), steered, bool(beyond))
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         if outcome.error is None:
             self._counts.done += 1
-            told: Told = outcome.result
-            self._counts.beyond_limit += told.beyond_limit
-            if told.doubtful:
+            written: RowSummary = outcome.result
+            self._counts.beyond_limit += written.beyond_limit
+            if written.doubtful:
                 self._counts.doubtful += 1
                 what = str(self._plan.tasks[outcome.task])
-                share = 100 * told.loss_error / (abs(told.loss) or 1.0)
+                share = 100 * written.loss_error / (abs(written.loss) or 1.0)
                 progress.doubt(
-                    f"{what}: audit residual {100 * told.audit_residual:.2g} %, "
+                    f"{what}: audit residual {100 * written.audit_residual:.2g} %, "
                     f"estimated error {share:.2g} %"
                 )
         else:

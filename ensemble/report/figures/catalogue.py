@@ -63,7 +63,7 @@ LOSSES = (
         "table1_losses",
         "Loss against work of adhesion",
         "Means with 95 % intervals. The curves are moved apart a little so that the intervals can "
-        "be told apart.",
+        "be distinguished.",
         losses.loss_against_adhesion,
         "Table 1",
     ),
