@@ -22,7 +22,7 @@ from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
-from adhesis.solver.sharp.equilibrium.branch_point import Before, Point
+from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 
 WAVE, FOLD = 1.0, 0.2
 
@@ -98,7 +98,7 @@ def test_a_predictor_sees_the_fold_of_a_square_root(before):
     curve = Curve()
     here = 0.25
     earlier = curve.point(before)
-    point = curve.point(here).behind(Before(earlier.at, earlier.rate, earlier.gaps))
+    point = curve.point(here).with_previous(PreviousPoint(earlier.at, earlier.rate, earlier.gaps))
     predictor = Predictor(point)
     assert predictor.fold_distance == pytest.approx(here - FOLD, rel=1e-9)
     at = 0.22
@@ -109,7 +109,7 @@ def test_a_predictor_is_straight_beyond_one_point_and_sees_no_fold():
     point = Curve().point(0.5)
     predictor = Predictor(point)
     assert np.isinf(predictor.fold_distance)
-    np.testing.assert_array_equal(predictor.gaps(0.48), point.predicted(0.48))
+    np.testing.assert_array_equal(predictor.gaps(0.48), point.extrapolate(0.48))
 
 
 # ---------------------------------------------------------------------- step size
