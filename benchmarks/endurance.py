@@ -8,7 +8,7 @@ another): what remains is hand-out and file. Then tasks that only wait tell what
 costs. ``campaign`` computes a whole campaign into a new results file and compares its makespan,
 from reading the campaign to the closed file without the start of the processes, with the ideal:
 the sum of the task times in the file over the number of workers, or the longest task where that
-is more. Wall times mean little on a busy machine: its load is told first. CPU times grow there,
+is more. Wall times mean little on a busy machine: its load is stated first. CPU times grow there,
 too, by a factor of two or so, and by the looks that a rank takes around while it waits.
 """
 

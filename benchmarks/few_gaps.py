@@ -44,12 +44,12 @@ def main() -> None:
             method = SharpMethod(problem, accuracy=given.accuracy)
             loop = run_loop(method, max_penetration=0.9, load_steps=40)
             spent = process_time() - started
-            told = method.report()
+            reported = method.report()
             print(
                 f"{gamma:6g} {seed:5d} {loop.loss_dimensionless:9.5f} "
                 f"{loop.loss_error / loop.loss:7.1e} {loop.audit_residual:8.1e} "
-                f"{len(loop.jumps):6d} {told.fields:7d} {told.descent_steps:8d} "
-                f"{told.newton_steps:7d} {told.energies:9d} {spent:8.2f}"
+                f"{len(loop.jumps):6d} {reported.fields:7d} {reported.descent_steps:8d} "
+                f"{reported.newton_steps:7d} {reported.energies:9d} {spent:8.2f}"
             )
 
 

@@ -28,7 +28,7 @@ from adhesis.solver.sharp.method import SharpMethod
 
 _COLUMNS = (
     "γ (J/m²)", "m to", "periods", "CPU s", "patches", "jumps", "solutions", "ms each", "W~",
-    "audit", "error told", "MB", "exponent",
+    "audit", "reported error", "MB", "exponent",
 )  # fmt: skip
 
 

@@ -90,17 +90,17 @@ def audits(profiles: int) -> None:
     print("|---|---|---|---|")
     for name, run in PATHS:
         found: list[float] = []
-        told: list[str] = []
+        reported: list[str] = []
         started = process_time()
         for seed in range(1, profiles + 1):
             try:
                 found += run(seed)
             except PathError as error:
-                told.append(str(error))
+                reported.append(str(error))
         each = (process_time() - started) / profiles
         worst = f"{np.max(np.abs(found)):.1e}" if found else ""
-        if told:
-            worst = "; ".join(filter(None, [worst, f"{len(told)}: {told[0]}"]))
+        if reported:
+            worst = "; ".join(filter(None, [worst, f"{len(reported)}: {reported[0]}"]))
         print(f"| {name} | {profiles} | {worst} | {each:.1f} |", flush=True)
 
 

@@ -2,7 +2,7 @@
 
     python benchmarks/windows.py --gamma 0.01 0.005 0.0025 --many 8 30 30
 
-The paper's roughness; CPU times. Jumps of one loop that the other does not have are told with the
+The paper's roughness; CPU times. Jumps of one loop that the other does not have are listed with the
 largest of their drops; they are the same if they lie within 5e-3 h_max of each other and are of one
 kind.
 """

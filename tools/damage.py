@@ -122,8 +122,8 @@ class Damage:
                 else:
                     raise Wrong(f"{command} takes what verify refuses: {err}")
             return "refused", _sentence(err)
-        told = json.loads(out)
-        named = tuple(d["row"] for d in told["damaged"])
+        reported = json.loads(out)
+        named = tuple(d["row"] for d in reported["damaged"])
         if bool(named) != (code == 1):
             raise Wrong(f"verify ends with {code} and names {named}")
         with Results(path) as results:

@@ -118,8 +118,8 @@ def figures(part: Part) -> list[Path]:
 
 def source(name: str) -> str:
     """Return the stamp of a part's figures."""
-    told = versions()
-    return f"adhesis {told['adhesis_version']}, commit {commit()}: make figures-of-docs ARGS={name}"
+    version = versions()["adhesis_version"]
+    return f"adhesis {version}, commit {commit()}: make figures-of-docs ARGS={name}"
 
 
 def make(name: str, ranks: int) -> None:

@@ -1,4 +1,4 @@
-"""Draw anew for as long as is told: every program of tools/fuzz/ gets its share of the time.
+"""Draw anew for as long as is asked: every program of tools/fuzz/ gets its share of the time.
 
     python tools/fuzz.py --seconds 600 [--seed N] [--only NAME]
 

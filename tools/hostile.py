@@ -201,6 +201,6 @@ def _compare(found: dict[str, Any], loop: LoopResult, other: LoopResult) -> None
     if off > loop.loss_error + other.loss_error and not found["raced"]:
         name = other.method.name
         found["wrong"].append(
-            f"loss {loop.loss:.6e} is {off / abs(loop.loss):.1e} from {name}'s, told are "
+            f"loss {loop.loss:.6e} is {off / abs(loop.loss):.1e} from {name}'s, reported are "
             f"{loop.loss_error / abs(loop.loss):.1e} and {other.loss_error / abs(loop.loss):.1e}"
         )

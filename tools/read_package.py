@@ -28,11 +28,11 @@ def main(wheel: str, sdist: str, commit: str) -> None:
     """Compare; AssertionError with what is wrong."""
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
-        told = archive.read("adhesis/ensemble/commit.txt").decode().strip()
+        reported = archive.read("adhesis/ensemble/commit.txt").decode().strip()
         (metadata,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
         about = message_from_string(archive.read(metadata).decode())
     assert names == sources(), names ^ sources()
-    assert told == commit, told
+    assert reported == commit, reported
     text = str(about.get_payload())
     assert "# adhesis" in text
     assert not re.search(r"\]\((?!https?:)", text), "a link that leads nowhere"

@@ -264,14 +264,14 @@ def test_full_benchmark_adds_the_growth(no_runs, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "reported"),
     [
         (["--budget", "0"], "--budget is 0.0: it must be positive"),
         (["--to", "{file}"], "--to is"),
     ],
 )
-def test_bad_input_is_refused_before_anything_is_measured(arguments, told, tmp_path, capsys):
+def test_bad_input_is_refused_before_anything_is_measured(arguments, reported, tmp_path, capsys):
     (tmp_path / "file").touch()
     words = [word.format(file=tmp_path / "file") for word in arguments]
     assert main(["bench", *words]) == 2
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err

@@ -407,5 +407,5 @@ def test_fields_under_a_load_are_kept_at_parts_of_it():
     plan = field_plan(parse_campaign(text))
     np.testing.assert_allclose(plan.penetration, [0.25, 0.75, 1.0])  # of 4 load steps
     assert plan.max_stress == 300
-    told = refused(text.replace("jumps = 8", "jumps = 8\nfield_penetrations = [0.1]"))
-    assert "field_penetrations is given under a load" in told
+    reported = refused(text.replace("jumps = 8", "jumps = 8\nfield_penetrations = [0.1]"))
+    assert "field_penetrations is given under a load" in reported

@@ -218,9 +218,9 @@ def test_verify_names_the_rows_and_what_is_to_be_done(path, capsys):
     assert "row 3: H = 0.7, γ = 0.04 J/m², realisation 1, seed" in said
     assert "adhesis run CAMPAIGN.toml" in said
     assert main(["verify", str(path), "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert [d["row"] for d in told["damaged"]] == [3, 6]
-    assert (told["done"], told["failed"], told["pending"]) == (5, 1, 0)
+    reported = json.loads(capsys.readouterr().out)
+    assert [d["row"] for d in reported["damaged"]] == [3, 6]
+    assert (reported["done"], reported["failed"], reported["pending"]) == (5, 1, 0)
     assert main(["verify", str(path.with_name("none.h5"))]) == 2
     assert "does not exist" in capsys.readouterr().err
 
@@ -304,14 +304,14 @@ def test_a_file_of_an_earlier_version_is_read_resumed_and_merged_with_a_sentence
     assert main(["verify", str(path)]) == 0
     assert ("before rows had checksums" in capsys.readouterr().out) == (version < (1, 1))
     assert sentence in as_text(read_status(path))
-    assert any(sentence in told for told in missing(aggregate(path)))
+    assert any(sentence in reported for reported in missing(aggregate(path)))
     merged = merge([path], tmp_path / "all.h5")
-    assert any(sentence in told for told in merged.doubts)
+    assert any(sentence in reported for reported in merged.doubts)
     into = age(shutil.copy(damage.sound, tmp_path / "into.h5"), version)
     merge([path], into)
     said: list[str] = []
     run_campaign(damage.campaign, path, say=said.append, engine=fake_engine(""))
-    assert any(sentence in told for told in said)
+    assert any(sentence in reported for reported in said)
     for file in (path, tmp_path / "all.h5", into):
         with Results(file) as results:
             assert results.has_checksums
@@ -358,7 +358,7 @@ def test_rows_of_several_versions_are_told_apart(tmp_path, monkeypatch):
         summary.computed
     ]
     assert "has rows of 2 versions or processors" in as_text(read_status(path))
-    assert any("2 versions or processors" in told for told in missing(aggregate(path)))
+    assert any("2 versions or processors" in reported for reported in missing(aggregate(path)))
     merged = merge([path], tmp_path / "all.h5")
-    assert any("2 versions or processors" in told for told in merged.doubts)
+    assert any("2 versions or processors" in reported for reported in merged.doubts)
     assert read_status(tmp_path / "all.h5")["computed_by"] == counts

@@ -269,7 +269,7 @@ def test_a_signal_to_one_worker_stops_all():
 
 
 class StopsAtTheDoor(SimulatedRanks):
-    """Worker 1 is told to stop just as it is dismissed."""
+    """Worker 1 is asked to stop just as it is dismissed."""
 
     def send(self, to, message, *, urgent=False):
         """Let the signal come before the dismissal."""
@@ -344,12 +344,12 @@ def test_a_stop_reaches_a_worker_in_the_middle_of_its_task():
 
     worker = threading.Thread(target=work)
     worker.start()
-    limits = Limits(stop=lambda: "told to" if under_way.is_set() else None, grace=10.0)
+    limits = Limits(stop=lambda: "asked to" if under_way.is_set() else None, grace=10.0)
     collected = []
     schedule = Schedule([0], {0: 0}, {0: 1.0})
     master = Master(Mailboxes(0, boxes), schedule, {0: 0}, collected.append, limits)
     try:
-        assert master.run() == "told to"
+        assert master.run() == "asked to"
     finally:
         released.set()
         boxes[1, False].put((0, ("dismissed",)))
@@ -732,10 +732,10 @@ def test_a_stop_gives_up_the_task_in_progress():
                 time.sleep(0.01)
         return task
 
-    limits = Limits(stop=lambda: "told to" if stop.is_set() else None)
+    limits = Limits(stop=lambda: "asked to" if stop.is_set() else None)
     outcomes, reason = alone(compute, limits=limits)
     assert [o.task for o in outcomes] == [0]
-    assert reason == "told to"
+    assert reason == "asked to"
 
 
 def test_attempts_work_in_a_thread_too():

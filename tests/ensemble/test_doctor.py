@@ -114,10 +114,10 @@ def test_versions_are_texts_and_do_not_start_mpi() -> None:
 
 
 def test_a_results_file_tells_the_versions_that_doctor_tells(findings: dict[str, Any]) -> None:
-    written, told = versions.versions(), findings["versions"]
-    assert written["adhesis_version"] == told["adhesis"]
+    written, reported = versions.versions(), findings["versions"]
+    assert written["adhesis_version"] == reported["adhesis"]
     for name in ("python", "numpy", "scipy", "numba", "llvmlite", "hdf5", "fftw"):
-        assert written[name] == told[name]
+        assert written[name] == reported[name]
     (check,) = [check for check in findings["checks"] if check["name"] == "compiled code"]
     assert f"for {written['processor']}, numba {written['numba']}" in check["text"]
 

@@ -82,10 +82,10 @@ def test_status_prints_no_control_characters(tmp_path, campaign, capsys, monkeyp
             "import sys; from adhesis.ensemble.run.lock import described, holder; "
             "print(described(holder(sys.argv[1])))"
         )
-        told = subprocess.run(
+        reported = subprocess.run(
             [sys.executable, "-c", code, path], capture_output=True, text=True, check=True
         )
-    assert told.stdout.startswith(r"host node\x1b[2J, process ")
+    assert reported.stdout.startswith(r"host node\x1b[2J, process ")
     for words in ([], ["--json"]):
         assert main(["status", str(path), *words]) == 0
         shown = capsys.readouterr().out

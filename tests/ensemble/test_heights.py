@@ -267,13 +267,13 @@ def test_the_warning_goes_to_stderr_json_and_exit_code(
         code = main(["loop", *map(str, (*words, *more))])
         return code, capsys.readouterr().err
 
-    code, told = run("--heights", "a.csv")
-    (sentence,) = told.splitlines()
+    code, reported = run("--heights", "a.csv")
+    (sentence,) = reported.splitlines()
     assert code == 0
     assert sentence.startswith("adhesis loop: the ends of a.csv do not meet")
     data = json.loads(Path("o.json").read_text())
     assert data["warnings"] == [sentence.removeprefix("adhesis loop: ")]
-    assert run("--heights", "a.csv", "--strict") == (1, told)
+    assert run("--heights", "a.csv", "--strict") == (1, reported)
     assert run("--heights", "b.csv", "--strict") == (0, "")
     assert json.loads(Path("o.json").read_text())["warnings"] == []
 

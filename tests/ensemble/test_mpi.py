@@ -189,9 +189,9 @@ def test_tasks_of_a_rank_that_hangs_are_done_by_others_and_the_job_ends(tmp_path
 
 
 def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(tmp_path):
-    """One worker is told to stop, while the last task, on the other, does not look up."""
+    """One worker is asked to stop, while the last task, on the other, does not look up."""
     path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
-    fake = "told=0.7:0.01:0 deaf=0.7:0.04:0"
+    fake = "asked=0.7:0.01:0 deaf=0.7:0.04:0"
     for k in range(5):
         out = tmp_path / f"{k}.h5"
         process = adhesis("run", path, "--out", out, ranks=3, fake=fake)
@@ -274,7 +274,7 @@ def test_an_error_that_is_not_a_tasks_ends_the_job(tmp_path):
 
 
 def test_a_run_that_is_complete_does_not_say_why_it_stopped(tmp_path):
-    """The last task ends although the run was told to stop: nothing is left to resume."""
+    """The last task ends although the run was asked to stop: nothing is left to resume."""
     path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
     words = ("run", path, "--out", tmp_path / "r.h5", "--max-failures", "1")
     # the failing task takes so long that the other one has surely begun

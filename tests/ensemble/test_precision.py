@@ -221,11 +221,11 @@ def test_every_cell_gets_what_its_quantity_needs_and_no_more(tmp_path, quantity)
         assert (status[mine][count:] == NOT_NEEDED).all()
         assert LEAST <= count < 80
     assert summary.done == sum(needed[steered])
-    told = json.loads(json.dumps(read_status(out)))
-    assert told["not_needed"] == 160 - summary.done
-    shown = as_text(told)
+    reported = json.loads(json.dumps(read_status(out)))
+    assert reported["not_needed"] == 160 - summary.done
+    shown = as_text(reported)
     for group, (name, known), values_of in zip(
-        told["groups"], summary.precisions, np.split(values[steered], 2), strict=True
+        reported["groups"], summary.precisions, np.split(values[steered], 2), strict=True
     ):
         assert name == f"H = {group['hurst']:g}, γ = 0.04 J/m²"
         assert known.met

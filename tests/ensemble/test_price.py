@@ -1,4 +1,4 @@
-"""What a campaign costs, told before it starts."""
+"""What a campaign costs, estimated before it starts."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def compute(campaign, task):
 def test_pilots_tell_what_the_campaign_costs():
     campaign = parse_campaign(campaign_text(realisations="10"))
     true = sum(cost(task) for task in campaign.tasks())
-    told = price(campaign, compute=compute)
-    assert told.pilots == 40  # they take no time here
-    assert told.seconds == pytest.approx(true)
-    assert told.longest == pytest.approx(4.0 * 1.9)
-    assert told.makespan(2) == pytest.approx(true / 2)
-    assert told.makespan(1000) == told.longest
+    reported = price(campaign, compute=compute)
+    assert reported.pilots == 40  # they take no time here
+    assert reported.seconds == pytest.approx(true)
+    assert reported.longest == pytest.approx(4.0 * 1.9)
+    assert reported.makespan(2) == pytest.approx(true / 2)
+    assert reported.makespan(1000) == reported.longest
     hurried = price(campaign, compute=compute, seconds=0.0)
     assert hurried.pilots == 0
 
@@ -42,11 +42,11 @@ def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
     clock = iter(range(100))
     monkeypatch.setattr("adhesis.ensemble.run.price.time.monotonic", lambda: float(next(clock)))
     campaign = parse_campaign(campaign_text(realisations="10"))
-    told = price(campaign, compute=compute, seconds=3.0)
-    assert told.pilots == 3
-    assert [bool(cell.measured) for cell in told.cells].count(False) == 1
-    assert "~ extrapolated from other cells" in as_text(told)
-    assert all(cell.seconds > 0 for cell in told.cells)
+    reported = price(campaign, compute=compute, seconds=3.0)
+    assert reported.pilots == 3
+    assert [bool(cell.measured) for cell in reported.cells].count(False) == 1
+    assert "~ extrapolated from other cells" in as_text(reported)
+    assert all(cell.seconds > 0 for cell in reported.cells)
 
 
 def test_cells_that_take_more_than_in_proportion_are_followed(monkeypatch):
@@ -58,10 +58,10 @@ def test_cells_that_take_more_than_in_proportion_are_followed(monkeypatch):
     def compute(campaign, task):
         return {"cpu_time": 0.1 * prior(task) ** 2}
 
-    told = price(campaign, compute=compute, seconds=3.0)
-    assert told.pilots == 3
+    reported = price(campaign, compute=compute, seconds=3.0)
+    assert reported.pilots == 3
     true = sum(0.1 * prior(task) ** 2 for task in campaign.tasks())
-    assert told.seconds == pytest.approx(true, rel=1e-9)
+    assert reported.seconds == pytest.approx(true, rel=1e-9)
 
 
 def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
@@ -70,9 +70,9 @@ def test_what_was_measured_counts_and_is_not_computed_again(tmp_path):
     with Writer(path) as writer:
         for row, task in enumerate(campaign.tasks()[:6]):
             writer.write_result(row, fake_result(campaign, task) | {"cpu_time": 7.0})
-    told = price(campaign, path, compute=compute)
-    assert (told.done, told.pilots) == (6, 2)
-    assert told.seconds == pytest.approx(cost(campaign.tasks()[6]) + cost(campaign.tasks()[7]))
+    reported = price(campaign, path, compute=compute)
+    assert (reported.done, reported.pilots) == (6, 2)
+    assert reported.seconds == pytest.approx(cost(campaign.tasks()[6]) + cost(campaign.tasks()[7]))
 
 
 def test_a_results_file_of_another_campaign_is_refused(tmp_path):
@@ -94,11 +94,11 @@ def test_loops_on_one_loading_branch_are_tried_together(monkeypatch):
     def compute(campaign, task):
         return {"cpu_time": took[dict(task.others)["max_penetration"]]}
 
-    told = price(campaign, compute=compute, seconds=1.0)
-    assert told.pilots == 3
-    assert told.longest == pytest.approx(9.0)  # a rank gets all three
-    assert [cell.seconds for cell in told.cells] == [2.0, 3.0, 4.0]
-    assert [cell.measured for cell in told.cells] == [1, 1, 1]
+    reported = price(campaign, compute=compute, seconds=1.0)
+    assert reported.pilots == 3
+    assert reported.longest == pytest.approx(9.0)  # a rank gets all three
+    assert [cell.seconds for cell in reported.cells] == [2.0, 3.0, 4.0]
+    assert [cell.measured for cell in reported.cells] == [1, 1, 1]
 
 
 def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
@@ -109,9 +109,10 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
     def compute(campaign, task):
         return {"cpu_time": 1.0, "loss_dimensionless": 3.0 * (1 + 0.4 * rng.standard_normal())}
 
-    told = price(campaign, compute=compute)  # all 200 of each cell are tried: they take no time
-    assert told.left in (4 * 80, 4 * 88)  # whole batches
-    assert "loss_dimensionless of 800 loops scatters by 40 % so far; at least 56" in as_text(told)
+    reported = price(campaign, compute=compute)  # all 200 of each cell are tried: they take no time
+    assert reported.left in (4 * 80, 4 * 88)  # whole batches
+    text = as_text(reported)
+    assert "loss_dimensionless of 800 loops scatters by 40 % so far; at least 56" in text
     blind = price(campaign, compute=compute, seconds=-1.0)
     assert "[stop]: 56 to 200 realisations a cell; the price is for 200" in as_text(blind)
     # What the rule has left out is not priced.
@@ -121,9 +122,9 @@ def test_with_a_stop_the_spread_of_its_quantity_tells_how_many(tmp_path):
         for row, task in enumerate(campaign.tasks()[:72]):
             writer.write_result(row, fake_result(campaign, task) | {"cpu_time": 7.0})
         writer.mark(range(72, 200), needed=False)
-    told = price(campaign, path, compute=compute, seconds=-1.0)
-    assert told.done == 72
-    assert told.cells[0].tasks == 0
+    reported = price(campaign, path, compute=compute, seconds=-1.0)
+    assert reported.done == 72
+    assert reported.cells[0].tasks == 0
 
 
 def test_a_part_costs_its_share():

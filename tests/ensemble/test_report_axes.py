@@ -192,13 +192,13 @@ def test_works_are_told_per_nominal_and_per_contact_area(data):
     table = works(data)
     names = [column.name for column in table.columns]
     for row, cell in zip(table.rows, data.cells, strict=True):
-        told = dict(zip(names, row, strict=True))
+        reported = dict(zip(names, row, strict=True))
         gained, spent = cell.values["work_gained"], cell.values["work_spent"]
         contact = cell.values["largest_contact_fraction"]
-        assert told["work_gained_mean [J/m^2]"] == gained.mean()
-        separation = told["effective_work_of_separation_mean [J/m^2]"]
+        assert reported["work_gained_mean [J/m^2]"] == gained.mean()
+        separation = reported["effective_work_of_separation_mean [J/m^2]"]
         assert separation == pytest.approx((spent / contact).mean())
-        approach = told["effective_work_of_approach_mean [J/m^2]"]
+        approach = reported["effective_work_of_approach_mean [J/m^2]"]
         assert approach == pytest.approx((gained / contact).mean())
-        low = told["loss_per_contact_ci_low [J/m^2]"]
+        low = reported["loss_per_contact_ci_low [J/m^2]"]
         assert low <= (cell.values["loss"] / contact).mean()

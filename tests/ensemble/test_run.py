@@ -153,7 +153,7 @@ def test_growing_computes_exactly_what_is_new(tmp_path):
 
 
 def test_a_campaign_on_further_axes(tmp_path):
-    """Run, told by status along its axes, interrupted by nothing, grown along one of them."""
+    """Run, listed by status along its axes, interrupted by nothing, grown along one of them."""
     axes = {"ratio": "[4, 2]", "max_penetration": "[0.6, 0.3]", "realisations": "1"}
     process, out = run(tmp_path, hurst="[0.7]", **axes)
     assert "8 of 8 tasks done" in process.stderr
@@ -237,8 +237,8 @@ def test_an_interrupted_campaign_has_every_cell_about_as_often(tmp_path):
 def test_a_doubtful_loss_is_said(tmp_path):
     process, out = run(tmp_path, fake="doubt=0.7:*:1")
     assert process.returncode == 0
-    told = "doubtful loss: H = 0.7, γ = 0.01 J/m², realisation 1: audit residual 19 %"
-    assert told in process.stderr
+    reported = "doubtful loss: H = 0.7, γ = 0.01 J/m², realisation 1: audit residual 19 %"
+    assert reported in process.stderr
     assert "2 losses are doubtful: by their own account they may be off by more than 0.1 %" in (
         process.stderr
     )

@@ -76,7 +76,7 @@ class Cluster:
         return done.stdout
 
     def job(self, number: str) -> dict[str, str]:
-        """What scontrol tells of a job."""
+        """Return the output of scontrol on a job."""
         text = self.call("scontrol", "--oneliner", "show", "job", number)
         pairs = [word.partition("=") for word in text.split()]
         return {key: value for key, _, value in pairs}
@@ -196,7 +196,7 @@ class Job:
 
     @property
     def values(self) -> dict[str, str]:
-        """What scontrol tells of the job."""
+        """Return the output of scontrol on the job."""
         return self.cluster.job(self.number)
 
     @property

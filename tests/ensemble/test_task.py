@@ -208,7 +208,7 @@ def under_load(stress, **changes):
 
 
 def test_a_loop_under_a_load_is_that_of_the_library_on_axes_of_penetration():
-    """A jump is a line at its load; nothing is told beyond the turning point."""
+    """A jump is a line at its load; nothing is reported beyond the turning point."""
     campaign = parse_campaign(under_load("300"))
     task = campaign.tasks()[0]
     row = run_task(campaign, task)
@@ -288,5 +288,5 @@ def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
 
 def test_a_loss_is_doubtful_where_it_misses_the_accuracy_asked_for():
     """The estimated error is calibrated (docs/methods.md), so it is held against it as it is."""
-    told = doubtful(1e-3, -np.ones(4), [0, 0, 2e-3, -2e-3], [9e-4, 1.1e-3, 0, 0])
-    assert told.tolist() == [False, True, True, True]
+    flags = doubtful(1e-3, -np.ones(4), [0, 0, 2e-3, -2e-3], [9e-4, 1.1e-3, 0, 0])
+    assert flags.tolist() == [False, True, True, True]

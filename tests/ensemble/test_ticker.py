@@ -18,10 +18,10 @@ def test_what_takes_long_is_told_and_what_is_over_is_not() -> None:
             time.sleep(0.005)
     assert said[0] == "0 of 2 (0 s)"
     assert said[1].startswith("1 of 2")
-    told = len(said)
+    reported = len(said)
     with ticking("no sooner than it is due", said.append, every=60.0):
         pass
-    assert len(said) == told
+    assert len(said) == reported
 
 
 def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(monkeypatch) -> None:

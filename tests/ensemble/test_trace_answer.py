@@ -311,13 +311,13 @@ def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert "400 points" in capsys.readouterr().out
     loop = json.loads((tmp_path / "l.json").read_text())
     assert loop["period"] == pytest.approx(0.95 * LENGTH)
-    for more, told in (
+    for more, reported in (
         (["--seed", "1"], "--seed belongs to --hurst"),
         (["--period", "1"], "--period belongs to --hurst"),
         (["--hurst", "0.8"], "several are given"),
         (["--degree", "8"], "--degree is 8"),
     ):
         assert main([*words, *more]) == 2
-        assert told in capsys.readouterr().err
+        assert reported in capsys.readouterr().err
     assert main(["loop", "--hurst", "0.8", "--cut-off", "1um"]) == 2
     assert "--cut-off belongs to --trace" in capsys.readouterr().err

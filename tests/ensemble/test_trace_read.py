@@ -250,7 +250,7 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (["--plan"], "states no unit"),
         (["--plan", "--unit", "um", "--columns", "1"], "--columns"),
@@ -268,13 +268,13 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
     ],
 )
 def test_the_command_refuses_with_one_sentence_and_code_2(
-    words: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    words: list[str], reported: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "t.txt"
     path.write_text("\n".join(rows(" ", ".")))
     assert main(["trace", str(path), *CONTACT, *words]) == 2
     error = capsys.readouterr().err
-    assert told in error
+    assert reported in error
     assert len(error.splitlines()) == 1
     assert sorted(tmp_path.iterdir()) == [path]
 

@@ -41,8 +41,8 @@ def missing() -> str:
         return f"no {', '.join(lacking)} here"
     if os.geteuid() != 0:
         return "only root may make network namespaces"
-    told = subprocess.run([MPIRUN, "--version"], capture_output=True, text=True, check=False)
-    return "" if "Open MPI) 4" in told.stdout else "the options are those of Open MPI 4"
+    reported = subprocess.run([MPIRUN, "--version"], capture_output=True, text=True, check=False)
+    return "" if "Open MPI) 4" in reported.stdout else "the options are those of Open MPI 4"
 
 
 @dataclass

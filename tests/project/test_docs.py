@@ -278,12 +278,12 @@ def test_transcripts_are_what_is_printed(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(folder)
-    line, _, told = block.text.partition("\n")
+    line, _, reported = block.text.partition("\n")
     words = adhesis_words(line.removeprefix("$ "))
     assert words is not None
     main(words)
     printed = capsys.readouterr()
-    assert printed.out + printed.err == told
+    assert printed.out + printed.err == reported
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -320,7 +320,7 @@ def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
     codes = {run.DONE, run.SOME_FAILED, run.BAD_INPUT, run.OUR_ERROR, run.WRITE_FAILED, run.RESUME}
     signals = {launch.KILLED, INTERRUPTED, TERMINATED}
     assert tables.pop("README.md") == codes | signals
-    assert [name for name, told in tables.items() if run.RESUME in told] == []
+    assert [name for name, reported in tables.items() if run.RESUME in reported] == []
 
 
 # ---------------------------------------------------------------------- links and images

@@ -16,8 +16,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 def test_versions_agree() -> None:
     citation = (ROOT / "CITATION.cff").read_text()
-    told = dict(re.findall(r"^([a-z-]+): (.+)$", citation, re.MULTILINE))
-    assert (told["version"], told["license"]) == (PROJECT["version"], PROJECT["license"])
+    reported = dict(re.findall(r"^([a-z-]+): (.+)$", citation, re.MULTILINE))
+    assert (reported["version"], reported["license"]) == (PROJECT["version"], PROJECT["license"])
     assert re.search(r'volume: 92\n    start: "062404"', citation)
     assert "value: arXiv:1511.08891" in citation
     heads = re.findall(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)

@@ -171,12 +171,12 @@ DESCRIBED = [
 @pytest.mark.parametrize("name", DESCRIBED)
 def test_arguments_and_fields_are_told_with_shapes_and_units(name: str) -> None:
     text = inspect.getdoc(THINGS[name]) or ""
-    told = entries(text)
+    reported = entries(text)
     lead = text.split("\n\n")[0]
-    assert [n for n in arguments(THINGS[name]) if n not in told] == []
+    assert [n for n in arguments(THINGS[name]) if n not in reported] == []
     for argument, annotation in arguments(THINGS[name]).items():
         kind = annotation.split(" | None")[0]
-        words = told[argument]
+        words = reported[argument]
         if ("Array" in kind and "tuple" not in kind) or "Sequence" in kind:
             assert "shape" in words or "shape" in lead, f"{argument}: which shape?"
         if kind in ("float", "Array") or "complex" in kind or "Sequence[float]" in kind:

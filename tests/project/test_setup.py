@@ -179,8 +179,8 @@ def test_parts_of_set_up_go_on_side_by_side_and_tell_of_themselves(tmp_path: Pat
     assert [re.sub(r"\d+ s", "… s", line) for line in lines if " at " in line][:2] == [
         "setup: at … s: the first (… s); the second (… s)"
     ] * 2
-    told = [re.sub(r"\d+ s", "", line) for line in lines if " at " not in line]
-    assert sorted(told) == ["setup: the first: ", "setup: the second: "]
+    reported = [re.sub(r"\d+ s", "", line) for line in lines if " at " not in line]
+    assert sorted(reported) == ["setup: the first: ", "setup: the second: "]
     assert "met b" in (tmp_path / ".setup" / "first.log").read_text()
     assert "met a" in (tmp_path / "log").read_text()
 

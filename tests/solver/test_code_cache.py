@@ -147,9 +147,9 @@ def test_only_what_nobody_else_could_have_written_is_read(
     for folder in (place, place.parent):
         os.chown(folder, folders, folders)
         folder.chmod(mode[0])
-    content, told = read()
+    content, reported = read()
     assert content == (None if words else b"code")
-    assert re.search(words, told) if words else told == ""
+    assert re.search(words, reported) if words else reported == ""
 
 
 @root_only

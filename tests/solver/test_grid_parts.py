@@ -327,7 +327,7 @@ def test_relaxation_stops_when_told_to():
 
 
 def test_moves_that_seem_to_pay_by_turns_do_not_go_on_for_ever(monkeypatch):
-    # Loosely solved stresses have less energy here than their error tells, so that two moves which
+    # Loosely solved stresses have less energy here than their error says, so that two moves which
     # cost energy seem to pay, until they are solved because the watch would stop there.
     method = rough()
     relaxation = method.relaxation

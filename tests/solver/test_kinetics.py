@@ -255,6 +255,6 @@ def test_a_coarse_grid_tells_what_it_misses_on_equal_crests():
     exact = loss(problem)
     for nodes in (128, 512):
         grid = run_loop(GridMethod(problem, nodes=nodes), max_penetration=0.8, load_steps=10)
-        told = grid.loss_error / grid.loss
-        assert abs(grid.loss_dimensionless / exact - 1) < told < 0.5
+        reported = grid.loss_error / grid.loss
+        assert abs(grid.loss_dimensionless / exact - 1) < reported < 0.5
         assert any("numerical error of the loss" in text for text in grid.warnings)

@@ -108,7 +108,7 @@ def test_only_dimensionless_groups_matter():
         single_wave(AMPLITUDE, PERIOD).scaled(64, 8), HalfSpace(4e6, 0.5), other.work_of_adhesion
     )
     scaled = run_loop(ExactWave(problem), max_penetration=0.7, load_steps=10)
-    # The slope is not the same: the arc measure is felt at (A q0)² = 2.5e-9 at most.
+    # The slope is not the same: the arc measure contributes (A q0)² = 2.5e-9 at most.
     assert scaled.loss_dimensionless == pytest.approx(base.loss_dimensionless, rel=1e-8)
     assert scaled.contact_fraction == pytest.approx(base.contact_fraction, rel=1e-7, abs=1e-12)
 

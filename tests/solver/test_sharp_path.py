@@ -133,7 +133,7 @@ def test_states_come_in_the_order_of_the_path_at_any_accuracy():
 
 @pytest.mark.parametrize("alpha", [0.01, 0.03, 0.05, 0.1, 0.3, 0.6])
 def test_the_loss_is_as_accurate_as_asked_for_and_its_error_is_told(alpha):
-    """Single wave, weak adhesion included: within the accuracy, and within the error told."""
+    """Single wave, weak adhesion included: within the accuracy, and within the reported error."""
     amplitude, period = 1e-8, 1e-3
     wave = SingleWave.with_alpha(alpha, amplitude, period, SOLID.modulus)
     result = loop(
@@ -231,9 +231,9 @@ def test_edges_that_are_no_numbers_have_no_field():
 
 
 def test_the_error_told_covers_the_error_made_on_random_scenes():
-    """Against a run at a hundredth of the accuracy; and it is not told ten times too large."""
+    """Against a run at a hundredth of the accuracy; and it is not ten times too large."""
     rng = np.random.default_rng(11)
-    told = []
+    ratios = []
     for _ in range(6):
         n0, ratio = int(rng.integers(2, 4)), int(rng.choice([2, 3]))
         profile = profile_of(rng.uniform(0.2, 0.9), n0, ratio, int(rng.integers(10**6)), "rayleigh")
@@ -247,8 +247,8 @@ def test_the_error_told_covers_the_error_made_on_random_scenes():
         error = abs(result.loss - tight.loss_from_drops)
         assert error < result.loss_error
         assert min(jump.energy_drop for jump in result.jumps) > 0
-        told.append(result.loss_error / error)
-    assert np.median(told) < 10
+        ratios.append(result.loss_error / error)
+    assert np.median(ratios) < 10
 
 
 def test_a_step_across_a_fold_that_is_none_is_taken_once(monkeypatch):

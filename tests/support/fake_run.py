@@ -2,7 +2,7 @@
 
 BEHAVIOUR is a list of words, tasks given as H:γ:realisation with ``*`` for any:
 ``step=SECONDS`` time of a load step, ``fail=TASK`` raise, ``hang=TASK`` never reach the next load
-step, ``deaf=TASK`` take 0.3 s without looking up, ``told=TASK`` be told to stop, by a signal, at
+step, ``deaf=TASK`` take 0.3 s without looking up, ``asked=TASK`` be asked to stop, by a signal, at
 its end, ``doubt=TASK`` a loss whose audit is 19 % off,
 ``hold=N`` after N tasks of a process stay in the next one, looking up, until stopped, or until
 there is the file of ``free=FILE``,
@@ -84,7 +84,7 @@ def fake_engine(behaviour: str) -> Engine:
                 progress("loading", 0.0, None)
         if matches(settings.get("fail"), task):
             raise FloatingPointError("the sum of γ diverged")
-        if matches(settings.get("told"), task):
+        if matches(settings.get("asked"), task):
             os.kill(os.getpid(), signal.SIGUSR1)
         row = fake_result(campaign, task)
         return row | {"audit_residual": 0.19} if matches(settings.get("doubt"), task) else row

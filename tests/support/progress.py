@@ -12,7 +12,7 @@ _EVERY = 10.0  # s
 class Waiting:
     """Write which tests are under way, whenever none has ended for some seconds.
 
-    Of several processes, the one that hands the tests out is told when each begins and ends.
+    Of several processes, the one that hands the tests out is notified when each begins and ends.
 
     Parameters
     ----------

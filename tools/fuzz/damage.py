@@ -103,8 +103,8 @@ def main() -> int:
             if time.monotonic() > end:
                 break
     for kind, counts in found.items():
-        told = ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
-        print(f"{kind}: {told or 'none'}")
+        reported = ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
+        print(f"{kind}: {reported or 'none'}")
     return 1 if wrong else 0
 
 

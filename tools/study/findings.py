@@ -37,10 +37,10 @@ def _readings(study: Study) -> list[str]:
     best = max(every, key=lambda reading: reading.p)
     p = "below 1e-5" if best.p < 1e-5 else f"{best.p:.1g}"
     numbers = Counter(len(reading.cells) for reading in every)
-    told = ", ".join(f"{count} with {n} values" for n, count in sorted(numbers.items()))
+    reported = ", ".join(f"{count} with {n} values" for n, count in sorted(numbers.items()))
     return [
         "some readings are compatible with all values of Table 1",
-        f"of {len(every)} readings ({told}) {verdicts['compatible']} are compatible, "
+        f"of {len(every)} readings ({reported}) {verdicts['compatible']} are compatible, "
         f"{verdicts['doubtful']} doubtful, {verdicts['excluded']} excluded; the best, "
         f"{best.name}, has p {p}; the value that lies furthest off is most often H = {hurst:g}, "
         f"γ = {gamma:g} ({often} readings)",
@@ -54,7 +54,7 @@ def _monotone(study: Study) -> list[str]:
         name: Counter(row.verdict for row in rows if row.quantity == name)
         for name in ("loss_dimensionless", "loss")
     }
-    told = "; ".join(
+    reported = "; ".join(
         f"{title}: "
         + ", ".join(f"{count} {verdict}" for verdict, count in sorted(verdicts[name].items()))
         for name, title in (("loss_dimensionless", "W~"), ("loss", "J/m²"))
@@ -64,11 +64,12 @@ def _monotone(study: Study) -> list[str]:
     new = monotone.around(study, "loss", monotone.NEW)
     if new is not None:
         n = min(step.n for step in new.steps)
-        told += f"; H = 0.9, 0.7, 0.5 at γ = 0.04 and 0.6, {n} new profiles, J/m²: {new.verdict}"
+        fresh = f"{n} new profiles, J/m²: {new.verdict}"
+        reported += f"; H = 0.9, 0.7, 0.5 at γ = 0.04 and 0.6, {fresh}"
         seen = seen or new.verdict == "not monotone"
     return [
         "the loss is not monotone in m2 (the paper's guess)",
-        f"rows with ten realisations or more: {told}",
+        f"rows with ten realisations or more: {reported}",
         "seen"
         if seen
         else "not seen at one γ and turning point; the sign of the change depends on them"

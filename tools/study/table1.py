@@ -14,11 +14,11 @@ from tools.study.text import Table, mean_text
 
 def _reading_row(reading: Reading) -> list[str]:
     means = dict(zip(reading.cells, reading.means, strict=True))
-    told = [f"{means[cell]:.3g}" if cell in means else "" for cell in TABLE_1]
+    reported = [f"{means[cell]:.3g}" if cell in means else "" for cell in TABLE_1]
     p = "< 1e-5" if reading.p < 1e-5 else f"{reading.p:.2g}"
     hurst, gamma = reading.worst
     return [
-        *(reading.name, f"{reading.realisations}", *told),
+        *(reading.name, f"{reading.realisations}", *reported),
         *(f"{np.abs(reading.z).max():.1f} at {hurst:g}, {gamma:g}", p),
         *(f"{reading.log_likelihood:.0f}", reading.verdict),
     ]
@@ -85,7 +85,7 @@ def tens(study: Study) -> Table:
     losses = Losses(study)
     rows = []
     for (hurst, gamma), paper in TABLE_1.items():
-        told = []
+        reported = []
         for turn in (0.6, 0.8):
             found = losses.direct("loss_dimensionless", hurst, gamma, turn, 100)
             values = np.array(list(found.values()))
@@ -99,9 +99,9 @@ def tens(study: Study) -> Table:
             )  # fmt: skip
             low, high = np.quantile(means, [0.025, 0.975])
             beyond = int(min((means >= paper).sum(), (means <= paper).sum()))
-            told += [f"{low:.3g} … {high:.3g}", f"{means.min():.3g} … {means.max():.3g}"]
-            told.append(f"{beyond}")
-        rows.append([f"{gamma:g}", f"{hurst:g}", f"{values.size}", f"{paper:g}", *told])
+            reported += [f"{low:.3g} … {high:.3g}", f"{means.min():.3g} … {means.max():.3g}"]
+            reported.append(f"{beyond}")
+        rows.append([f"{gamma:g}", f"{hurst:g}", f"{values.size}", f"{paper:g}", *reported])
     header = ["γ (J/m²)", "H", "profiles", "paper"]
     for turn in (0.6, 0.8):
         header += [f"95 % at {turn:g}", "least … largest", "as far as the paper"]
@@ -152,9 +152,9 @@ def under_load(study: Study) -> Table:
             mean = mean_text(done["loss_dimensionless"]) if len(done) > 1 else ""
             contact = f"{done['largest_contact_fraction'].mean():.2f}" if len(done) else ""
             paper = TABLE_1.get((hurst, gamma))
-            told = "–" if paper is None else f"{paper:g}"
+            quoted = "–" if paper is None else f"{paper:g}"
             rows.append(
-                [f"{gamma:g}", f"{hurst:g}", f"{len(done)}", f"{len(failed)}", mean, contact, told]
+                [f"{gamma:g}", f"{hurst:g}", f"{len(done)}", f"{len(failed)}", mean, contact, quoted]
             )
     header = ["γ (J/m²)", "H", "loops", "into full contact", "W~", "largest A/A0", "paper"]
     return header, rows

@@ -53,8 +53,8 @@ def around(study: Study) -> Table:
     header, rows = [], []
     for profiles, campaigns in both:
         found = [monotone.around(study, name, campaigns) for name in monotone.QUANTITIES]
-        header, told = _told([row for row in found if row is not None])
-        rows += [[profiles, *row[2:]] for row in told]
+        header, reported = _told([row for row in found if row is not None])
+        rows += [[profiles, *row[2:]] for row in reported]
     return ["profiles", *header[2:]], rows
 
 
@@ -133,15 +133,15 @@ def turning_point(study: Study) -> Table:
     )
     rows = []
     for campaign, hurst, gamma in cells(study):
-        told = []
+        reported = []
         for _, of in quantities:
             below, above = of(campaign, hurst, gamma, 0.6), of(campaign, hurst, gamma, 0.9)
             if not below or not above:
                 break
             low, high = aligned(below, above)
-            told.append(ratio_text(high, low))
+            reported.append(ratio_text(high, low))
         else:
-            rows.append([f"{gamma:g}", f"{hurst:g}", f"{low.size}", *told])
+            rows.append([f"{gamma:g}", f"{hurst:g}", f"{low.size}", *reported])
     return ["γ (J/m²)", "H", "n", *(name for name, _ in quantities)], rows
 
 
@@ -313,9 +313,9 @@ def errors(study: Study) -> Table:
         fine = study.by_realisation("loss", campaign="steps", **place)
         if fine:
             both = aligned(coarse, fine)
-            told = f"{abs(both[1].mean() / both[0].mean() - 1):.1e}"
+            reported = f"{abs(both[1].mean() / both[0].mean() - 1):.1e}"
             each = f"{np.abs(both[1] / both[0] - 1).max():.1e}"
-            rows.append([f"load steps and accuracy, Δ~max = {turn:g}", told, each])
+            rows.append([f"load steps and accuracy, Δ~max = {turn:g}", reported, each])
     worst = 0.0
     for name in set(study.loops["campaign"].tolist()):
         here = study.loops.where(campaign=name)
