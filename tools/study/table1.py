@@ -152,9 +152,8 @@ def under_load(study: Study) -> Table:
             mean = mean_text(done["loss_dimensionless"]) if len(done) > 1 else ""
             contact = f"{done['largest_contact_fraction'].mean():.2f}" if len(done) else ""
             paper = TABLE_1.get((hurst, gamma))
-            quoted = "–" if paper is None else f"{paper:g}"
-            rows.append(
-                [f"{gamma:g}", f"{hurst:g}", f"{len(done)}", f"{len(failed)}", mean, contact, quoted]
-            )
+            paper_value = "–" if paper is None else f"{paper:g}"
+            counts = f"{len(done)}", f"{len(failed)}"
+            rows.append([f"{gamma:g}", f"{hurst:g}", *counts, mean, contact, paper_value])
     header = ["γ (J/m²)", "H", "loops", "into full contact", "W~", "largest A/A0", "paper"]
     return header, rows
