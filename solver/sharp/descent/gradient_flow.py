@@ -75,7 +75,7 @@ class Descent(NamedTuple):
     event : int
         Why: one of the events of this module.
     orders : int array, shape (L,)
-        Integers of the gaps.
+        Order of the quadrature rule of each gap.
     fields, tangents : int
         Fields and tangents that were computed.
     trajectory : array, shape (n, 2L)

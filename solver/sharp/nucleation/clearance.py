@@ -34,7 +34,7 @@ class Seen(NamedTuple):
     Attributes
     ----------
     gaps : array, shape (L, 2)
-    kinds, offset : int array
+    orders, offset : int array
         Of the field's nodes.
     theta, opening : array, shape (nodes,)
         Nodes, and the opening of the lower modes there.
@@ -43,7 +43,7 @@ class Seen(NamedTuple):
     """
 
     gaps: Array
-    kinds: Integers
+    orders: Integers
     offset: Integers
     theta: Array
     opening: Array
@@ -130,7 +130,7 @@ def clearance_left(
     beside: float,
 ) -> tuple[Array, Integers]:
     """As :meth:`Clearances.left`; ``beside`` is the closing beside an edge for its motion."""
-    kinds, offset, theta = nodes.orders, nodes.offset, nodes.theta
+    orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
     left = np.full(gaps.shape[0], -1.0)
     place = np.full(gaps.shape[0], -1)
     j = 0
@@ -141,10 +141,10 @@ def clearance_left(
             break
         begin = gaps[k, 0] - seen.gaps[j, 0]
         end = gaps[k, 1] - seen.gaps[j, 1]
-        if abs(begin) > near or abs(end) > near or kinds[k] != seen.kinds[j]:
+        if abs(begin) > near or abs(end) > near or orders[k] != seen.orders[j]:
             continue
         closed = 0.0
-        m = rules.counts[kinds[k]]
+        m = rules.counts[orders[k]]
         comparable = True
         for i in range(m):
             at = seen.offset[j] + i
@@ -161,7 +161,7 @@ def clearance_left(
             if abs(moved) > near:
                 comparable = False
             was = seen.opening[at] + (high - low) / (after - before) * moved
-            closed = max(closed, was - _low_opening(f[offset[k] + i], kinds[k], i, rules))
+            closed = max(closed, was - _low_opening(f[offset[k] + i], orders[k], i, rules))
         if not comparable:
             continue
         grown = max(begin, 0.0) + max(-end, 0.0)
@@ -186,7 +186,7 @@ def noted(
     clearance: Array,
 ) -> Seen:
     """As :meth:`Clearances.note`."""
-    kinds, offset, theta = nodes.orders, nodes.offset, nodes.theta
+    orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
     new_gaps = gaps.copy()
     new_theta = theta.copy()
     new_opening = np.empty(theta.shape[0])
@@ -196,11 +196,11 @@ def noted(
         if j >= 0:
             new_gaps[k] = seen.gaps[j]
             new_clearance[k] = seen.clearance[j]
-        for i in range(rules.counts[kinds[k]]):
+        for i in range(rules.counts[orders[k]]):
             at = offset[k] + i
             if j >= 0:
                 new_theta[at] = seen.theta[seen.offset[j] + i]
                 new_opening[at] = seen.opening[seen.offset[j] + i]
             else:
-                new_opening[at] = _low_opening(f[at], kinds[k], i, rules)
-    return Seen(new_gaps, kinds.copy(), offset.copy(), new_theta, new_opening, new_clearance)
+                new_opening[at] = _low_opening(f[at], orders[k], i, rules)
+    return Seen(new_gaps, orders.copy(), offset.copy(), new_theta, new_opening, new_clearance)
