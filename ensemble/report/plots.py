@@ -23,12 +23,13 @@ class Plots:
         self._averages = averages
 
     def _draw(self, name: str) -> list[Axes]:
-        from adhesis.ensemble.report.axes import common, place
-        from adhesis.ensemble.report.figures import fields, loops, losses
+        from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
         from adhesis.ensemble.report.figures.style import say_below, style
+        from adhesis.ensemble.report.further_axes import common, place
 
+        modules = (loops, loss_figures, shapes_and_spectra)
         draw: Callable[[Aggregate], Figure] = next(
-            getattr(room, name) for room in (loops, losses, fields) if hasattr(room, name)
+            getattr(module, name) for module in modules if hasattr(module, name)
         )
         with style():
             shown = self._averages().shown

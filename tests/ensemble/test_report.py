@@ -29,16 +29,15 @@ from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings, paper
-from adhesis.ensemble.report.figures import fields as field_figures
-from adhesis.ensemble.report.figures import loops, losses
+from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
 from adhesis.ensemble.report.figures.style import save, spread_out, style
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.report.page import write_page
-from adhesis.ensemble.report.tables import losses as loss_tables
+from adhesis.ensemble.report.markdown_page import write_page
+from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.table import number
-from adhesis.ensemble.report.write import write_report
+from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
 from tests.support.synthetic_results import campaign, rows, write
@@ -166,7 +165,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path, drawn):
     assert "aper" not in page.replace("paper.h5", "")
     assert "19.36" not in (tmp_path / "out" / "losses.csv").read_text()
     with style():
-        assert "H = 0.8, paper" not in lines_of(losses.loss_against_adhesion(data).axes[0])
+        assert "H = 0.8, paper" not in lines_of(loss_figures.loss_against_adhesion(data).axes[0])
 
 
 def test_numbers_are_written_as_people_write_them():
@@ -263,7 +262,7 @@ def test_loops_are_drawn_with_one_standard_deviation(data):
 
 def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
     with style():
-        axes = losses.loss_against_adhesion(data).axes[0]
+        axes = loss_figures.loss_against_adhesion(data).axes[0]
     for container, hurst in zip(axes.containers, (0.7, 0.8), strict=True):
         found = [data.cell(hurst, g).estimates["loss_dimensionless"] for g in GAMMAS]
         line, _, (bars,) = container.lines
@@ -278,7 +277,7 @@ def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
 
 def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
     with style():
-        axes = losses.loss_by_mechanism(data).axes[0]
+        axes = loss_figures.loss_by_mechanism(data).axes[0]
     large, small = (c for c in axes.containers if isinstance(c, BarContainer))
     for k, cell in enumerate(data.cells):
         top = small[k].get_y() + small[k].get_height()
@@ -293,7 +292,7 @@ def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
 
 def test_jump_densities_integrate_to_the_number_of_jumps(data):
     with style():
-        figure = losses.jump_energies(data)
+        figure = loss_figures.jump_energies(data)
     cell = data.cell(0.7, 0.01)
     total = 0.0
     for axes in figure.axes[:2]:
@@ -308,7 +307,7 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data):
 
 def test_shapes_show_profile_and_surface_at_the_same_separation(data):
     with style():
-        figure = field_figures.shapes(data)
+        figure = shapes_and_spectra.shapes(data)
     assert len(figure.axes) == 6
     cell = findings.typical_cell(data)
     shape = data.fields.shapes[data.cells.index(cell)]
@@ -330,7 +329,8 @@ def test_the_detail_of_the_shapes_goes_on_across_the_end_of_the_period(data):
         higher[-1] = 2 * higher.max()  # the highest point, half a wave from a crest
         turned.append(replace(shape, height=higher))
     with style():
-        figure = field_figures.shapes(replace(data, fields=replace(fields, shapes=tuple(turned))))
+        other = replace(data, fields=replace(fields, shapes=tuple(turned)))
+        figure = shapes_and_spectra.shapes(other)
     x, y = lines_of(figure.axes[1])["rigid"].T
     period = 1e3 * data.campaign.profile.period
     assert x[0] < period < x[-1]
@@ -354,7 +354,7 @@ def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, drawn):
 
 def test_spectra_carry_both_reference_slopes(data):
     with style():
-        axes = field_figures.spectra_on_loading(data).axes[1]
+        axes = shapes_and_spectra.spectra_on_loading(data).axes[1]
     drawn = lines_of(axes)
     for label, slope in (("slope -2.6", -2.6), ("slope -2.8", -2.8), ("rigid", -2.6)):
         x, y = np.log(drawn[label]).T
@@ -367,8 +367,8 @@ def test_spectra_carry_both_reference_slopes(data):
 
 def test_densities_are_drawn_as_they_are(data):
     with style():
-        heights = lines_of(field_figures.height_density(data).axes[0])
-        gaps = lines_of(field_figures.gap_density(data).axes[0])
+        heights = lines_of(shapes_and_spectra.height_density(data).axes[0])
+        gaps = lines_of(shapes_and_spectra.gap_density(data).axes[0])
     near_zero = heights["H = 0.8"][np.abs(heights["H = 0.8"][:, 0]).argmin()]
     assert near_zero[1] == pytest.approx(heights["Gaussian"][:, 1].max(), rel=0.02)
     assert len(gaps) == 6
@@ -422,7 +422,7 @@ def test_nothing_is_cut_off_whatever_the_ticks(data, stretched):
         for shape in fields.shapes
     )
     with style():
-        figure = field_figures.shapes(replace(data, fields=replace(fields, shapes=shapes)))
+        figure = shapes_and_spectra.shapes(replace(data, fields=replace(fields, shapes=shapes)))
         figure.set_dpi(300)
         figure.draw_without_rendering()
     assert margin(figure) >= 0
@@ -637,7 +637,7 @@ def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, drawn
     data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
     assert "loss_against_max_penetration" in drawn
     with style():
-        axes = losses.loss_against_penetration(data).axes[0]
+        axes = loss_figures.loss_against_penetration(data).axes[0]
     assert len(axes.containers) == len(GAMMAS)
     for curve in axes.containers:
         x, y = curve.lines[0].get_data()
@@ -655,7 +655,7 @@ def test_campaigns_with_one_gamma_in_common_are_drawn_for_each_hurst(file, tmp_p
     values = {name: row for name, row in rows(plan).items() if row.ndim == 1}
     data = aggregate(file, [write(tmp_path / "lower.h5", lower, values)])
     with style():
-        axes = losses.loss_against_penetration(data).axes[0]
+        axes = loss_figures.loss_against_penetration(data).axes[0]
     assert axes.get_title(loc="left") == r"$\gamma$ = 0.04 J/m²"
     assert [curve.get_label() for curve in axes.containers] == ["H = 0.7", "H = 0.8"]
     # Only the realisations that both have.

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.report.axes import together
-from adhesis.ensemble.report.figures import fields, loops, losses
+from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.along import TURNING_POINTS, along, with_figure
+from adhesis.ensemble.report.further_axes import together
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ LOSSES = (
         "Loss against work of adhesion",
         "Means with 95 % intervals. The curves are moved apart a little so that the intervals can "
         "be distinguished.",
-        losses.loss_against_adhesion,
+        loss_figures.loss_against_adhesion,
         "Table 1",
     ),
     Illustration(
         "loss_against_m2",
         "Loss against mean square slope",
         "Means with 95 % intervals. The curves are moved apart a little.",
-        losses.loss_against_slope,
+        loss_figures.loss_against_slope,
     ),
 )
 SHAPES = (
@@ -82,7 +82,7 @@ SHAPES = (
         "elastic surface v on both branches, at the same separation. In contact the two coincide. "
         "Right: one and a half of the longest waves around the highest point, carried on across "
         "the end of the period where it lies near one.",
-        fields.shapes,
+        shapes_and_spectra.shapes,
         "Fig. 3",
     ),
     Illustration(
@@ -91,14 +91,14 @@ SHAPES = (
         "Two-sided, mean over the realisations in contact, middle γ. Thin lines: slopes of a "
         "self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the profile's "
         "highest wave number only the edges of contact have power.",
-        fields.spectra_on_loading,
+        shapes_and_spectra.spectra_on_loading,
         "Fig. 4",
     ),
     Illustration(
         "fig5_spectra_unloading",
         "Spectral density on unloading",
         "As on loading. At the largest penetration both branches are one state.",
-        fields.spectra_on_unloading,
+        shapes_and_spectra.spectra_on_unloading,
         "Fig. 5",
     ),
     Illustration(
@@ -106,7 +106,7 @@ SHAPES = (
         "Probability density of the separation",
         "Gap outside contact, in units of each realisation's h_max; the integral is the fraction "
         "out of contact. Middle γ. At the largest penetration both branches are one state.",
-        fields.gap_density,
+        shapes_and_spectra.gap_density,
         "Fig. 8",
     ),
 )
@@ -115,7 +115,7 @@ HEIGHTS = (
         "fig9_height_density",
         "Probability density of the heights",
         "Rigid profiles, mean over realisations, with the Gaussian of the same variance.",
-        fields.height_density,
+        shapes_and_spectra.height_density,
         "Fig. 9",
     ),
 )
@@ -126,7 +126,7 @@ MECHANISMS = (
         "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
         "large scale: patches appear, merge, split, vanish or pull off. Figures above the bars: "
         "share of the small scale. Error bars: 95 % interval of the mean of either part.",
-        losses.loss_by_mechanism,
+        loss_figures.loss_by_mechanism,
     ),
     Illustration(
         "jump_energies",
@@ -134,14 +134,14 @@ MECHANISMS = (
         "Jumps of one loop per decade of energy drop, mean over realisations. Drops more than "
         "eight decades below the largest are not shown. Shading: n jumps in a bin are known to "
         "sqrt(n).",
-        losses.jump_energies,
+        loss_figures.jump_energies,
     ),
     Illustration(
         "pull_off_stress",
         "Pull-off stress",
         "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
         "a little.",
-        losses.pull_off,
+        loss_figures.pull_off,
     ),
 )
 PENETRATIONS = (
@@ -151,7 +151,7 @@ PENETRATIONS = (
         "This campaign and those beside it that differ in max_penetration: means with 95 % "
         "intervals over the realisations that all of them have finished. The curves are moved "
         "apart a little.",
-        losses.loss_against_penetration,
+        loss_figures.loss_against_penetration,
     ),
 )
 

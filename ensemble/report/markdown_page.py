@@ -10,10 +10,10 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.escape import code_span, fence, markdown, printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.report import findings, paper
-from adhesis.ensemble.report.axes import shown_cells
 from adhesis.ensemble.report.figures.catalogue import Illustration
 from adhesis.ensemble.report.figures.style import left_out
-from adhesis.ensemble.report.tables import losses as loss_tables
+from adhesis.ensemble.report.further_axes import shown_cells
+from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.works import works
 
