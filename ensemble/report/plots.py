@@ -68,11 +68,11 @@ class Plots:
         return self._draw("loop_against_penetration")
 
     def loss_against_adhesion(self) -> list[Axes]:
-        """Loss against work of adhesion, with intervals."""
+        """Losses of the Hurst exponents, a panel for each work of adhesion, with intervals."""
         return self._draw("loss_against_adhesion")
 
     def loss_against_slope(self) -> list[Axes]:
-        """Loss against mean square slope, with intervals."""
+        """Loss against mean square slope, a panel for each work of adhesion, with intervals."""
         return self._draw("loss_against_slope")
 
     def loss_against_penetration(self) -> list[Axes]:
@@ -94,6 +94,10 @@ class Plots:
     def shapes(self) -> list[Axes]:
         """Rigid profile and deformed surface of one realisation."""
         return self._draw("shapes")
+
+    def spectra_of_branches(self) -> list[Axes]:
+        """Spectral density of profile and deformed surface on both branches at one state."""
+        return self._draw("spectra_of_branches")
 
     def spectra_on_loading(self) -> list[Axes]:
         """Spectral density of profile and deformed surface on loading."""
