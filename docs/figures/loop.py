@@ -24,15 +24,16 @@ from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, MM, TWO_COLUMN
 COLOURS = {"loading": "#0072B2", "unloading": "#D55E00"}
 BODY, RIGID, CONTACT = "#BFDDF0", "0.6", "#D55E00"
 # Points of the loop whose contact is drawn: branch and Δ/h_max.
-POINTS = {"a": ("loading", 0.3), "b": ("loading", 0.9), "c": ("unloading", -1.7)}
-_AREA = 250  # of a marker, in points², whose jump loses all
+POINTS = {"a": ("loading", 0.5), "b": ("unloading", 0.9), "c": ("unloading", -1.1)}
+_AREA = 500  # of a marker, in points², whose jump loses all
+_JUMPS_AT = {"loading": 0.87, "unloading": 0.95}  # heights in the panel of the stress
 
 
 def compute() -> LoopResult:
     """One rough profile, H = 0.8, the paper's material and γ = 0.04 J/m²."""
-    profile = self_affine_profile(0.8, period=6.283185e-3, n0=4, ratio=50, seed=5, h_rms=1e-6)
+    profile = self_affine_profile(0.8, period=6.283185e-3, n0=10, ratio=30, seed=1, h_rms=1e-6)
     problem = Problem(profile, HalfSpace(young=1e6, poisson=0.5), work_of_adhesion=0.04)
-    return run_loop(make_method("grid", problem), max_penetration=0.9, load_steps=40)
+    return run_loop(make_method("auto", problem), max_penetration=0.9, load_steps=40)
 
 
 def scene_at(scenes: Scenes, loop: LoopResult, branch: str, penetration: float) -> Scene:
@@ -51,11 +52,12 @@ def draw_curves(stress: Axes, contact: Axes, loop: LoopResult, points: dict[str,
         jumps = [jump for jump in loop.jumps if jump.branch == branch]
         stress.scatter(
             [loop.problem.penetration(jump.separation) for jump in jumps],
-            [0.9] * len(jumps) if branch == "loading" else [1.9] * len(jumps),
+            [_JUMPS_AT[branch]] * len(jumps),
             [_AREA * jump.energy_drop / loop.loss for jump in jumps],
             color=colour,
             alpha=0.55,
             lw=0,
+            transform=stress.get_xaxis_transform(),
         )
     stress.axhline(0, color="0.6", lw=0.6)
     for name, scene in points.items():
@@ -63,7 +65,12 @@ def draw_curves(stress: Axes, contact: Axes, loop: LoopResult, points: dict[str,
             place = loop.penetration[scene.state], values[scene.state]
             axes.plot(*place, "o", ms=9, mfc="white", mec="black", mew=0.7, zorder=4)
             axes.annotate(name, place, ha="center", va="center_baseline", fontsize=7, zorder=5)
-    stress.set(ylabel="mean stress $\\bar p$ (kPa)", ylim=(None, 2.7))
+    low = 1.06e-3 * float(loop.mean_stress.min())
+    high = max(1e-3 * float(loop.mean_stress.max()), 0.0)
+    # The jumps take the upper part, without numbers.
+    stress.set_ylim(low, high + 0.25 * (high - low))
+    stress.set_yticks([tick for tick in stress.get_yticks() if low <= tick <= high])
+    stress.set_ylabel("mean stress $\\bar p$ (kPa)")
     contact.set(ylabel="contact fraction $A/A_0$", ylim=(0, 1))
     for axes in (stress, contact):
         axes.set_xlabel("penetration $\\Delta/h_\\mathrm{max}$")
@@ -83,6 +90,7 @@ def draw_contact(axes: Axes, scenes: Scenes, scene: Scene, top: float) -> None:
     for left, right in 1e3 * scene.patches:
         inside = (x >= left) & (x <= right)
         axes.plot(x[inside], surface[inside], color=CONTACT, lw=1.6)
+    axes.grid(visible=False)
     axes.set(xlim=(x[0], x[-1]), ylim=(height.min() - 0.5, top), xlabel="position (mm)")
 
 
@@ -104,8 +112,7 @@ def draw(loop: LoopResult, path: Path) -> None:
             patches = len(loop.contact_states[scene.state].edges)
             several = "patch" if patches == 1 else "patches"
             axes.set_title(
-                f"{name}: {loop.branch[scene.state]}, $\\Delta/h_\\mathrm{{max}}$ = {depth:.2f}, "
-                f"{patches} {several}",
+                f"{name}: $\\Delta/h_\\mathrm{{max}} = {depth:.2f}$, {patches} {several}",
                 loc="left",
             )
             if first is None:
