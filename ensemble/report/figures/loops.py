@@ -121,7 +121,7 @@ def _stretch_loading(data: Aggregate, panels_of_penetration: list[Axes]) -> None
     for axes in panels_of_penetration:
         axes.set_xscale("function", functions=(stretched, as_they_were))
         axes.set_xlim(low - margin, top + margin / factor)
-        axes.set_xticks([*left, *right])
+        axes.set_xticks([*left, *right], [f"{x:g}" for x in (*left, *right)])
         axes.axvspan(start, top + margin / factor, color=_STRETCHED, zorder=0, label="_")
 
 
