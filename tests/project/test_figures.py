@@ -73,6 +73,23 @@ def test_a_stamp_is_read_again_and_leaves_the_picture_as_it_was(tmp_path):
     assert (imread(path) == imread(original)).all()
 
 
+def test_a_figure_that_is_no_longer_made_is_removed(tmp_path, monkeypatch):
+    figures = tool()
+    folder = tmp_path / "docs" / "paper"
+    folder.mkdir(parents=True)
+    for name in ("fig4.png", "fig5.png"):
+        shutil.copyfile(ROOT / "docs" / "figures" / "loop.png", folder / name)
+    (tmp_path / "draw.py").write_text(
+        "import shutil, sys; shutil.copyfile('docs/paper/fig5.png', sys.argv[1])"
+    )
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    part = figures.Part(("draw.py OUT/fig5a.png",), "*.png", "paper")
+    monkeypatch.setattr(figures, "PARTS", {"paper": part})
+    figures.make("paper", 1)
+    assert [path.name for path in folder.iterdir()] == ["fig5a.png"]
+    assert figures.stamped(folder / "fig5a.png").endswith("ARGS=paper")
+
+
 def test_the_picture_of_the_folders_shows_what_the_code_does():
     """Arrows join folders of which one imports the other; each folder but runtime has one."""
     picture = load("structure", "docs/figures/structure.py")
