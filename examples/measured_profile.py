@@ -21,7 +21,7 @@ from adhesis import (
     read_trace,
     self_affine_profile,
 )
-from adhesis.ensemble.trace.page import summary, write_page
+from adhesis.ensemble.trace.trace_page import summary, write_page
 
 MATERIAL = HalfSpace(young=1e6, poisson=0.5)  # a soft elastomer
 WORK_OF_ADHESION = 0.04  # J/m²

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, refused_as_input
-from adhesis.ensemble.loop.arguments import H_RMS, N0, PERIOD, RATIO
+from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of
 from adhesis.ensemble.loop.heights import closure_warning, read_heights
 from adhesis.ensemble.loop.record import (
@@ -305,7 +305,7 @@ def _document(
 
 
 def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
-    from adhesis.ensemble.loop.figure import draw_loops
+    from adhesis.ensemble.loop.loop_figure import draw_loops
 
     figure = draw_loops(results)
     with whole_file(path) as stream:

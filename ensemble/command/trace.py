@@ -11,7 +11,7 @@ from adhesis.ensemble.loop.record import write_json
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
-from adhesis.ensemble.trace.plan import Plan, clock, make_plan
+from adhesis.ensemble.trace.variants import Plan, clock, make_plan
 from adhesis.ensemble.trace.pool import Pool
 from adhesis.solver.model.half_space import HalfSpace
 
@@ -48,7 +48,7 @@ def execute(args: argparse.Namespace) -> int:
     except NoAnswer as error:
         print(f"adhesis trace: {error}", file=sys.stderr)
         return 1
-    from adhesis.ensemble.trace.page import summary, write_page
+    from adhesis.ensemble.trace.trace_page import summary, write_page
 
     writing = Writing()
     with writing.output("--to", args.to / "trace.json"):

@@ -26,7 +26,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.film_page import PAGE
-from adhesis.ensemble.loop.scenes import Scene, Scenes, jump_places, scenes_of
+from adhesis.ensemble.loop.film_scenes import Scene, Scenes, jump_places, scenes_of
 from adhesis.ensemble.outputs import whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.solver import checks

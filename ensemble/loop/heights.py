@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.containers import container
-from adhesis.ensemble.trace.read import holds_numbers, load_array
-from adhesis.ensemble.trace.text import Table, read_column
-from adhesis.ensemble.trace.units import METRES, length_text, parse_units, units_of_header
+from adhesis.ensemble.trace.reading.source import container
+from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
+from adhesis.ensemble.trace.reading.text_table import Table, read_column
+from adhesis.ensemble.length_units import METRES, length_text, parse_units, units_of_header
 from adhesis.solver.model.profile import Array
 
 # A word in brackets that may be a unit: "z [æm]" after a wrong conversion.

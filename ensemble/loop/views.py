@@ -27,7 +27,7 @@ Result = LoopResult | PathResult
 
 def plot(result: Result) -> Any:
     """Draw mean stress and contact fraction; see :meth:`adhesis.LoopResult.plot`."""
-    from adhesis.ensemble.loop.figure import draw_loops
+    from adhesis.ensemble.loop.loop_figure import draw_loops
 
     return draw_loops(result if isinstance(result, PathResult) else [result])
 
@@ -97,7 +97,7 @@ def page(result: Result) -> str:
 def trace_page(answer: Answer) -> str:
     """Return the summary of a trace's answer and the figure of its loop as HTML."""
     from adhesis.ensemble.trace.figures import draw_loop
-    from adhesis.ensemble.trace.page import summary
+    from adhesis.ensemble.trace.trace_page import summary
 
     rows = [line.split(maxsplit=1) for line in summary(answer).splitlines()]
     return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
+from adhesis.ensemble.trace.variants import Cycle, Plan, default_tables, make_plan
 from adhesis.ensemble.trace.pool import Pool, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.solver import views

@@ -8,9 +8,9 @@ from pathlib import Path
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.read import Trace, read_trace
-from adhesis.ensemble.trace.text import DELIMITERS
-from adhesis.ensemble.trace.units import length_text, parse_length
+from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.trace.reading.text_table import DELIMITERS
+from adhesis.ensemble.length_units import length_text, parse_length
 from adhesis.solver.checks import counted
 
 _NAMES = (

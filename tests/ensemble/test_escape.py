@@ -21,7 +21,7 @@ from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.lock import RunLock, holder
 from adhesis.ensemble.run.session import run_campaign
-from adhesis.ensemble.trace.page import _inline
+from adhesis.ensemble.trace.trace_page import _inline
 from tests.support.campaign_support import adhesis, campaign_text, write_campaign
 from tests.support.fake_run import fake_engine
 

@@ -32,7 +32,7 @@ from adhesis import (
 )
 from adhesis.ensemble.loop import saved
 from adhesis.ensemble.trace.prepare import prepare_trace
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import views
 from adhesis.solver.references.exact_wave import ExactWave
 

@@ -31,10 +31,10 @@ from adhesis.ensemble.trace.answer import (
     run_plan,
 )
 from adhesis.ensemble.trace.options import what_was_read
-from adhesis.ensemble.trace.plan import Plan, make_plan
+from adhesis.ensemble.trace.variants import Plan, make_plan
 from adhesis.ensemble.trace.pool import Pool
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from tests.support.scenes import HALF_SPACE
 from tools.interrupted import Interrupt, interrupted
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import adhesis.ensemble.trace.instrument as instrument
-import adhesis.ensemble.trace.read as read
+import adhesis.ensemble.trace.reading.instrument as instrument
+import adhesis.ensemble.trace.reading.measured_trace as read
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.read import read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support import instrument_files
 
 pytestmark = pytest.mark.skipif(
@@ -92,7 +92,7 @@ def test_reading_starts_no_mpi(tmp_path: Path) -> None:
 
     instrument_files.sdf(tmp_path / "a.sdf", STEP, Z)
     code = (
-        "import sys\nfrom adhesis.ensemble.trace.read import read_trace\n"
+        "import sys\nfrom adhesis.ensemble.trace.reading.measured_trace import read_trace\n"
         f"read_trace({str(tmp_path / 'a.sdf')!r})\nassert 'mpi4py.MPI' not in sys.modules\n"
         "assert 'SurfaceTopography' in sys.modules\nimport mpi4py"
     )

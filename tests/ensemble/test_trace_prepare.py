@@ -9,7 +9,7 @@ import pytest
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.model.profile import self_affine_profile
 
 N, STEP = 1600, 1e-6

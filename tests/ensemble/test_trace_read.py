@@ -11,8 +11,8 @@ import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.read import Trace, read_trace
-from adhesis.ensemble.trace.units import length_text, parse_length
+from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.length_units import length_text, parse_length
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)

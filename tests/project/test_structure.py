@@ -36,9 +36,9 @@ HDF5 = {
 }
 COMPILED = {"adhesis.solver.runtime.jit"}
 FIGURES = {
-    "adhesis.ensemble.loop.figure",
+    "adhesis.ensemble.loop.loop_figure",
     "adhesis.ensemble.loop.film",
-    "adhesis.ensemble.bench.figure",
+    "adhesis.ensemble.bench.bench_figure",
     "adhesis.ensemble.report.figures.along",
     "adhesis.ensemble.report.figures.catalogue",
     "adhesis.ensemble.report.figures.fields",

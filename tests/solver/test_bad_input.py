@@ -47,7 +47,7 @@ from adhesis import (
 from adhesis.ensemble.errors import naming_options
 from adhesis.ensemble.loop.record import loop_summary, path_summary
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.checks import Bounds, counted, plain, real, shown, whole
 from adhesis.solver.loading.loop import check_cycle
 from adhesis.solver.method import MethodReport

@@ -11,7 +11,7 @@ from pathlib import Path
 from adhesis.ensemble.escape import code_span, markdown, printable
 from adhesis.ensemble.trace.answer import _DOUBTS, COVERAGE, Answer, Quantity
 from adhesis.ensemble.trace.figures import Drawn, draw_all
-from adhesis.ensemble.trace.units import length_text
+from adhesis.ensemble.length_units import length_text
 from adhesis.solver.checks import counted
 
 _STYLE = """

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
-from adhesis.ensemble.trace.containers import beginning, container
-from adhesis.ensemble.trace.instrument import HINT, UnknownFormatError, available, read_scan
-from adhesis.ensemble.trace.text import Table, read_table
-from adhesis.ensemble.trace.units import (
+from adhesis.ensemble.trace.reading.source import beginning, container
+from adhesis.ensemble.trace.reading.instrument import HINT, UnknownFormatError, available, read_scan
+from adhesis.ensemble.trace.reading.text_table import Table, read_table
+from adhesis.ensemble.length_units import (
     METRES,
     length_text,
     parse_units,

@@ -12,7 +12,7 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.units import length_text
+from adhesis.ensemble.length_units import length_text
 from adhesis.ensemble.trace.worker import Job
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import Profile
