@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from adhesis.ensemble.loop.saved import load
     from adhesis.ensemble.trace.answer import loss_of_trace
     from adhesis.ensemble.trace.prepare import prepare_trace
-    from adhesis.ensemble.trace.reading.measured_trace import read_trace
+    from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.loading.loop_result import LoopResult
     from adhesis.solver.loading.path import MinorLoop, PathResult, run_path
@@ -60,6 +60,7 @@ _MODULES = {
     "PathResult": "solver.loading.path",
     "Problem": "solver.model.problem",
     "Profile": "solver.model.profile",
+    "Trace": "ensemble.trace.reading.measured_trace",
     "load": "ensemble.loop.saved",
     "loss_of_trace": "ensemble.trace.answer",
     "make_method": "solver.registry",
@@ -91,6 +92,7 @@ __all__ = [
     "PathResult",
     "Problem",
     "Profile",
+    "Trace",
     "load",
     "loss_of_trace",
     "make_method",

@@ -1,4 +1,4 @@
-"""Figures, films, tables and files of a result: declared here, made outside of the mechanics.
+"""Figures, films, tables and files of results, and displays: declared here, made elsewhere.
 
 ``adhesis`` names the module that makes them in :data:`maker` when it is imported; that module, and
 matplotlib with it, is loaded when a result is first shown.
@@ -19,12 +19,16 @@ maker: Callable[[], Any] = _unset
 """Return the module that makes them; ``adhesis/__init__.py`` sets it."""
 
 
-class Viewed:
-    """Figure, film, tables and file of a loop or path."""
+class Shown:
+    """Display in a notebook."""
 
     def _repr_html_(self) -> str:
-        """Return the main numbers and the figure, for notebooks."""
+        """Return the main numbers, and the figure if there is one, for notebooks."""
         return str(maker().page(self))
+
+
+class Viewed(Shown):
+    """Figure, film, tables and file of a loop or path."""
 
     def plot(self) -> Any:
         """Draw mean stress and contact fraction against penetration.

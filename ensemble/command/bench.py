@@ -57,7 +57,6 @@ def execute(args: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from adhesis.ensemble.bench.equal_error import FULL, QUICK, benchmark, exponents, growth, ratios
     from adhesis.ensemble.bench.bench_page import (
         GROWTH_COLUMNS,
         LINE_COLUMNS,
@@ -65,6 +64,7 @@ def execute(args: argparse.Namespace) -> int:
         line_cells,
         page,
     )
+    from adhesis.ensemble.bench.equal_error import FULL, QUICK, benchmark, exponents, growth, ratios
     from adhesis.ensemble.warm import warm_missing
     from adhesis.solver.precompile import COMPILED_METHODS
 
@@ -133,7 +133,9 @@ def _write_csv(path: Path, lines: list[Line]) -> None:
 
 
 def _draw(lines: list[Line], stem: Path) -> None:
-    from adhesis.ensemble.bench.bench_figure import draw  # matplotlib only when everything is measured
+    from adhesis.ensemble.bench.bench_figure import (
+        draw,  # matplotlib only when everything is measured
+    )
     from adhesis.ensemble.report.figures.style import save
 
     save(draw(lines), stem)

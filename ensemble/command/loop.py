@@ -13,19 +13,18 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, refused_as_input
-from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of
 from adhesis.ensemble.loop.heights import closure_warning, read_heights
+from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
     FieldStates,
     loop_summary,
     loops_document,
     path_document,
     path_summary,
-    write_json,
     write_npz,
 )
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.ticker import log, ticking
 from adhesis.ensemble.trace.options import (
     delimiter_of,

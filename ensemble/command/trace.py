@@ -7,12 +7,11 @@ import sys
 import time
 
 from adhesis.ensemble.errors import InputError, refused_as_input
-from adhesis.ensemble.loop.record import write_json
-from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
+from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
-from adhesis.ensemble.trace.variants import Plan, clock, make_plan
 from adhesis.ensemble.trace.pool import Pool
+from adhesis.ensemble.trace.variants import Plan, clock, make_plan
 from adhesis.solver.model.half_space import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
@@ -40,7 +39,7 @@ def execute(args: argparse.Namespace) -> int:
     print(what_was_read(prepared))
     for warning in prepared.warnings:
         print(f"WARNING     {warning}")
-    print(plan.said, flush=True)
+    print(plan.text, flush=True)
     if args.plan:
         return 0
     try:

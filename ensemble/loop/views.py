@@ -5,18 +5,21 @@ The mechanics find this module by :data:`adhesis.solver.views.maker`. A call loa
 
 from __future__ import annotations
 
-import base64
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from html import escape
+from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble.loop.quantities import UNITS
+from adhesis.solver import checks
 from adhesis.solver.loading.loop import Progress
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
-from adhesis.solver.method import Branch, ContactState
+from adhesis.solver.method import Branch, ContactState, Method
+from adhesis.solver.values import brief
 
 if TYPE_CHECKING:
     from adhesis.ensemble.loop.film import Film
@@ -71,50 +74,99 @@ def save(result: Result, path: str | os.PathLike[str]) -> None:
     save(result, path)
 
 
-def page(result: Result) -> str:
-    """Return the main numbers and the figure of a result as HTML, for notebooks."""
-    problem = result.problem
-    name = "loss"
-    if isinstance(result, PathResult):
-        name, value = "work", result.work
-    else:
-        value = result.loss
-    rows = [
-        (name, f"{value:.5g} ± {result.loss_error:.1g} J/m²"),
-        ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
-        ("jumps", str(len(result.jumps))),
-        ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),
-        ("h_max", f"{problem.profile.h_max:.4g} m"),
-        ("largest contact fraction A/A0", f"{result.contact_fraction.max():.4g}"),
-        ("method", result.method.name),
-    ]
-    if isinstance(result, LoopResult):
-        rows.insert(3, ("pull-off stress", f"{result.pull_off_stress:.4g} Pa"))
-        rows += [("warning", text) for text in result.warnings]
-    return table_of(rows) + picture_of(plot(result))
+# ---------------------------------------------------------------------- in notebooks
+
+
+def page(shown: Any) -> str:
+    """Return the numbers of an object with their units, and its figure if it has one, as HTML."""
+    from adhesis.ensemble.loop.loop_figure import draw_shape
+    from adhesis.ensemble.report.html import table_of
+
+    if isinstance(shown, LoopResult | PathResult):
+        return table_of(_rows_of_result(shown)) + picture_of(plot(shown))
+    figure = draw_shape(shown)
+    return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))
+
+
+def trace_summary(answer: Answer) -> str:
+    """Return the summary of an answer as text."""
+    from adhesis.ensemble.trace.trace_page import summary
+
+    return summary(answer)
 
 
 def trace_page(answer: Answer) -> str:
     """Return the summary of a trace's answer and the figure of its loop as HTML."""
+    from adhesis.ensemble.report.html import table_of
     from adhesis.ensemble.trace.figures import draw_loop
-    from adhesis.ensemble.trace.trace_page import summary
 
-    rows = [line.split(maxsplit=1) for line in summary(answer).splitlines()]
+    rows = [line.split(maxsplit=1) for line in str(answer).splitlines()]
     return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
 
 
-def table_of(rows: Iterable[tuple[str, str]]) -> str:
-    """Return rows of a name and a value as a table in HTML."""
-    cells = (f"<th>{escape(name)}</th><td>{escape(text)}</td>" for name, text in rows)
-    return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+def write_trace_page(answer: Answer, folder: str | os.PathLike[str]) -> Path:
+    """Write page, figures and numbers of an answer; see its method ``page``."""
+    from adhesis.ensemble.trace.trace_page import write_all
+
+    return write_all(answer, checks.path("folder", folder))
+
+
+def table_of_runs(answer: Answer) -> Any:
+    """Return the loops of an answer as a table; see its method ``to_dataframe``."""
+    import pandas as pd
+
+    from adhesis.ensemble.loop.saved import with_units
+    from adhesis.ensemble.trace.answer import run_rows
+
+    hidden = ("range_warnings", "failed")
+    rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
+    return with_units(pd.DataFrame(rows))
+
+
+def _rows_of_result(result: Result) -> list[tuple[str, str]]:
+    """Return the main numbers of a loop or path."""
+    problem = result.problem
+    is_loop = isinstance(result, LoopResult)
+    rows = [
+        ("loss" if is_loop else "work", f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²"),
+        ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
+        ("jumps", str(len(result.jumps))),
+        ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),
+        ("h_max", f"{problem.profile.h_max:.4g} m"),
+        ("largest contact fraction A/A0", f"{result.largest_contact_fraction:.4g}"),
+        ("method", result.method.name),
+    ]
+    if isinstance(result, LoopResult):
+        rows.insert(3, ("pull-off stress", f"{result.pull_off_stress:.4g} Pa"))
+    return rows + [("warning", text) for text in result.warnings]
+
+
+# Shown beside the fields, by class; a method is no dataclass.
+_ALSO_SHOWN = {
+    "Profile": ("h_max", "h_rms", "m2"),
+    "HalfSpace": ("modulus",),
+    "ContactState": ("patches", "energy"),
+    "Trace": ("points", "length", "height_range", "drop_outs"),
+}
+
+
+def _rows(shown: Any) -> list[tuple[str, str]]:
+    """Return the fields of an object with their units."""
+    names = [entry.name for entry in fields(shown) if entry.repr] if is_dataclass(shown) else []
+    if isinstance(shown, Method):
+        names = ["name", "problem", "chosen"]
+    values = {name: getattr(shown, name) for name in names}
+    values |= {name: getattr(shown, name) for name in _ALSO_SHOWN.get(type(shown).__name__, ())}
+    return [(name, f"{brief(v)} {UNITS.get(name, '')}".rstrip()) for name, v in values.items()]
 
 
 def picture_of(figure: Any) -> str:
     """Return a figure as a picture in HTML."""
+    from adhesis.ensemble.report.html import picture
+
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=110)
-    data = base64.b64encode(stream.getvalue()).decode()
-    return f'<img alt="loop" src="data:image/png;base64,{data}">'
+    return picture(stream.getvalue(), "figure")
 
 
 @contextmanager

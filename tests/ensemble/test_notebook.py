@@ -8,7 +8,6 @@ import html
 import multiprocessing
 import pickle
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -200,7 +199,7 @@ def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys):
     step = 1e-3 / 400
     x = step * np.arange(400)
     profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=2, h_rms=1e-6)
-    prepared = prepare_trace(Trace(Path("t.txt"), profile.at(x), step))
+    prepared = prepare_trace(Trace(profile.at(x), step, "t.txt"))
     seen = []
     answer = adhesis.loss_of_trace(
         *(prepared,),

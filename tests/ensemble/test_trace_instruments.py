@@ -33,7 +33,7 @@ def test_every_format_gives_the_same_heights(name: str, tmp_path: Path) -> None:
     assert trace.points == N
     assert trace.step == pytest.approx(STEP, rel=1e-6)
     np.testing.assert_allclose(trace.heights, Z, atol=1e-10)
-    assert trace.said
+    assert trace.notes
 
 
 @pytest.mark.parametrize("name", ["mahr.qep", "row.x3p", "row.sdf", "row.sur"])

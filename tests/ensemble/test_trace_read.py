@@ -11,8 +11,8 @@ import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.length_units import length_text, parse_length
+from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -151,12 +151,12 @@ def test_empty_lines_of_one_column_keep_their_place(tmp_path: Path) -> None:
 def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
     trace = read(tmp_path, [UM, *rows(";", ".")[::-1]])
     assert_right(trace)
-    assert any("backwards" in said for said in trace.said)
+    assert any("backwards" in note for note in trace.notes)
     uneven = X + 0.2 * STEP * np.sin(np.arange(N) / 20)  # a scanner that drifts
     slow = 1e-7 * np.sin(2 * np.pi * uneven / 20e-6)
     lines = [f"{a * 1e6:.6f} {b * 1e6:.6f}" for a, b in zip(uneven, slow, strict=True)]
     trace = read(tmp_path, lines, unit="um")
-    assert any("unequal steps" in said for said in trace.said)
+    assert any("unequal steps" in note for note in trace.notes)
     even = np.linspace(uneven[0], uneven[-1], N)
     np.testing.assert_allclose(trace.heights, 1e-7 * np.sin(2 * np.pi * even / 20e-6), atol=1e-9)
 

@@ -1,18 +1,14 @@
-"""Read a trace: equally spaced heights in m, and a description of how the file was read."""
+"""A measured trace: equally spaced heights in m, and notes on how they were read."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
-from adhesis.ensemble.trace.reading.source import beginning, container
-from adhesis.ensemble.trace.reading.instrument import HINT, UnknownFormatError, available, read_scan
-from adhesis.ensemble.trace.reading.text_table import Table, read_table
 from adhesis.ensemble.length_units import (
     METRES,
     length_text,
@@ -20,6 +16,9 @@ from adhesis.ensemble.length_units import (
     step_of_header,
     units_of_header,
 )
+from adhesis.ensemble.trace.reading.instrument import HINT, UnknownFormatError, available, read_scan
+from adhesis.ensemble.trace.reading.source import Source, source_of
+from adhesis.ensemble.trace.reading.text_table import Table, read_table
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
@@ -27,6 +26,7 @@ from adhesis.solver.values import ByValue
 
 MIN_POINTS = 32
 _COLUMN = checks.Bounds(1, 1_000_000, whole=True)
+_TIP_RADIUS = checks.Bounds(0.0, checks.LENGTH.high, unit="m")
 MAX_POINTS = 5_000_000
 TEXT = frozenset(("txt", "csv", "tsv", "dat", "asc", "prn", "xy", "xyz", "tab", "text", "prf"))
 
@@ -45,26 +45,78 @@ _SENTINELS = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 214
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trace(ByValue):
-    """Measured trace with equal steps.
+    """A measured trace with equal steps, of any source.
 
-    Attributes
+    Immutable; two traces are equal if all fields are. :func:`adhesis.read_trace` makes one of a
+    file, a stream, an array or a table; heights in m with a known step need no reading.
+
+    Parameters
     ----------
-    path : Path
     heights : array, shape (n,)
-        In m; NaN where not measured.
+        In m; NaN or masked where not measured. At least 32.
     step : float
-        In m.
-    said : tuple of str
-        How the file was read, line by line.
-    tip_radius : float or None
-        In m, if the file holds it.
+        Distance of two heights, in m.
+    source : str
+        Path or name of what was read.
+    notes : tuple of str
+        How it was read, line by line.
+    tip_radius : float, optional
+        Of the stylus or probe, in m, if it is known.
+
+    Raises
+    ------
+    InputError
+        If it is no trace of a rough surface in m: too few heights, all of them equal, a length
+        below 10 nm or above 1 m.
+    TypeError
+        If a value is of the wrong type.
+
+    References
+    ----------
+    docs/measured-profile.md, "Reading"
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from adhesis import Trace
+    >>> trace = Trace(1e-6 * np.sin(np.arange(200)), step=5e-6)
+    >>> trace
+    Trace(array: 200 points, step 5 µm, length 995 µm, range 2 µm, 0 drop-outs)
     """
 
-    path: Path
     heights: Array
     step: float
-    said: tuple[str, ...] = ()
+    source: str = "array"
+    notes: tuple[str, ...] = ()
     tip_radius: float | None = None
+
+    def __post_init__(self) -> None:
+        heights = _numbers(self.source, self.heights)
+        if heights.ndim != 1:
+            raise InputError(
+                f"{self.source} holds numbers of {heights.ndim} dimensions: heights are one row"
+            )
+        object.__setattr__(self, "heights", np.where(np.isfinite(heights), heights, np.nan))
+        with refused_as_input():
+            step = checks.real(parameter("step"), self.step, checks.LENGTH)
+            object.__setattr__(self, "step", step)
+            if self.tip_radius is not None:
+                checks.real(parameter("tip_radius"), self.tip_radius, _TIP_RADIUS)
+        self._check()
+        super().__post_init__()
+
+    def __repr__(self) -> str:
+        """Return one line with source, size and gaps."""
+        return f"Trace({self.source}: {self.summary})"
+
+    @property
+    def summary(self) -> str:
+        """Number of points, step, length, range of heights and number of drop-outs."""
+        return (
+            f"{self.points} points, step {length_text(self.step, 5)}, "
+            f"length {length_text(self.length, 5)}, range {length_text(self.height_range, 4)}, "
+            f"{counted(self.drop_outs, 'drop-out')}"
+        )
 
     @property
     def points(self) -> int:
@@ -86,32 +138,49 @@ class Trace(ByValue):
         """Highest less lowest height, in m."""
         return float(np.nanmax(self.heights) - np.nanmin(self.heights))
 
+    def _check(self) -> None:
+        """Raise unless it can be a trace of a rough surface, in m."""
+        good = self.heights[np.isfinite(self.heights)]
+        if good.size < MIN_POINTS:
+            raise InputError(f"{self.source} holds {good.size} heights: at least {MIN_POINTS}")
+        if np.ptp(good) == 0:
+            raise InputError(
+                f"{self.source}: every height is {good[0]:g} m: a flat trace has no loss"
+            )
+        if not _SHORTEST <= self.length <= _LONGEST:
+            raise InputError(
+                f"{self.source} would be {self.length:.3g} m long: is its unit right "
+                f"({parameter('unit')})?"
+            )
+
 
 def read_trace(
-    path: str | Path,
+    source: Any,
     *,
     unit: str | None = None,
     step: float | None = None,
-    columns: Sequence[int] | None = None,
+    columns: Sequence[int | str] | None = None,
     row: int | None = None,
     channel: int | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
 ) -> Trace:
-    """Read a measured trace from a text or an instrument file.
+    """Read a measured trace from a file, a stream, an array or a table.
 
     Parameters
     ----------
-    path : path
-        Text of two columns (positions, heights) or of one (heights), a .npy of that shape, or an
-        instrument's file (extra ``instruments``).
+    source : path, stream, array or DataFrame
+        A path, or an open file or other stream, of a text of two columns (positions, heights) or
+        of one (heights), of a .npy of that shape, or of an instrument's file (extra
+        ``instruments``). Or an array of that shape; or a pandas DataFrame or Series, whose columns
+        are named as those of a text ("x (mm)", "z (um)"), or have units in ``attrs["units"]``.
     unit : str, optional
-        Unit of both columns of a text ("um"), or of positions and heights ("mm,um"). Without it,
-        the header must have them, or the numbers can only be metres.
+        Unit of both columns ("um"), or of positions and heights ("mm,um"). Without it, the header
+        must have them, or the numbers can only be metres.
     step : float, optional
         Step in m, for heights without positions.
-    columns : sequence of two int, optional
-        Columns of positions and heights in a text, counted from 1; shape (2,).
+    columns : sequence of two int or str, optional
+        Columns of positions and heights, shape (2,): counted from 1, or names of a DataFrame.
     row, channel : int, optional
         Row of a map and channel of an instrument file, counted from 0.
     delimiter, decimal : str, optional
@@ -120,51 +189,78 @@ def read_trace(
     Raises
     ------
     InputError
-        If the file cannot be read, or can be understood in several ways.
+        If it cannot be read, or can be understood in several ways.
+    TypeError
+        If the source is none of them.
 
     References
     ----------
     docs/measured-profile.md, "Reading"
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from adhesis import read_trace
+    >>> x = np.arange(200)
+    >>> read_trace(np.column_stack([x, np.sin(x / 9)]), unit="um")
+    Trace(array: 200 points, step 1 µm, length 199 µm, range 2 µm, 0 drop-outs)
     """
-    path = checks.path("path", path)
     with refused_as_input():
         if step is not None:
             step = checks.real(parameter("step"), step, checks.LENGTH)
-        if columns is not None:
+        named = hasattr(source, "to_numpy") and _are_names(columns)
+        if columns is not None and not named:
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
-    is_text = holds_numbers(path)
+    in_memory = _table_of(source, columns if named else None)
+    if in_memory is not None:
+        _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
+        name, table = in_memory
+        form = f"columns {', '.join(table.header)}" if table.header else name
+        return _from_table(name, table, unit, step, None if named else columns, form)
+    source = source_of(source)
+    is_text = holds_numbers(source)
     for name, number in ((parameter("row"), row), (parameter("channel"), channel)):
         if is_text and number is not None:
             raise InputError(
-                f"{name} is {number}: {path} holds columns of numbers, no map and no channels "
+                f"{name} is {number}: {source} holds columns of numbers, no map and no channels "
                 f"({parameter('columns')} chooses columns)"
             )
-    if is_text and path.suffix.lower() == ".npy":
-        return _from_array(path, unit, step)
+    if is_text and source.suffix == ".npy":
+        table = _columns_of(source.name, load_array(source))
+        return _from_table(source.name, table, unit, step, columns, "npy")
     if is_text:
-        table = read_table(path, delimiter, decimal)
-        return _from_table(path, table, unit, step, columns)
-    for name, value in (("unit", unit), ("step", step), ("columns", columns)):
-        if value is not None:
-            raise InputError(
-                f"{parameter(name)} belongs to texts: an instrument's file states its own lengths"
-            )
+        table = read_table(source, delimiter, decimal)
+        return _from_table(source.name, table, unit, step, columns, f"text, {table.form}")
+    _refuse_options(
+        "texts: an instrument's file states its own lengths", unit=unit, step=step, columns=columns
+    )
     if not available():
         # Without the extra it is not known whether this is a file of an instrument.
         raise InputError(
-            container(path)
-            or f"{path} is no text: export the trace as text, or, if it is an instrument's file, "
+            source.container()
+            or f"{source} is no text: export the trace as text, or, if it is an instrument's file, "
             f"install the optional package SurfaceTopography, {HINT}"
         )
     try:
-        scan = read_scan(path, row, channel)
+        scan = read_scan(source, row, channel)
     except UnknownFormatError as error:
-        raise InputError(container(path) or str(error)) from None
-    heights, step, said = _even(path, scan.positions, scan.heights, None)
-    return _checked(Trace(path, heights, step, (scan.said, *said), scan.tip_radius))
+        raise InputError(source.container() or str(error)) from None
+    heights, step, notes = _even(source.name, scan.positions, scan.heights, None)
+    notes = [scan.description, *notes]
+    return _in_metres(Trace(heights, step, source.name, tuple(notes), scan.tip_radius))
 
 
-def holds_numbers(path: Path) -> bool:
+def _are_names(columns: Sequence[int | str] | None) -> bool:
+    return columns is not None and all(isinstance(name, str) for name in columns)
+
+
+def _refuse_options(to_what: str, **options: object) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(f"{parameter(name)} belongs to {to_what}")
+
+
+def holds_numbers(source: Source) -> bool:
     """Return whether a file is a text or a .npy, and no instrument's file.
 
     Raises
@@ -172,7 +268,7 @@ def holds_numbers(path: Path) -> bool:
     InputError
         If it cannot be read, or has to be unpacked or exported first.
     """
-    begin, suffix = beginning(path), path.suffix.lower()
+    begin, suffix = source.beginning(), source.suffix
     if suffix == ".npy" or begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return True
     # Text formats of instruments, whose numbers are not two columns.
@@ -186,7 +282,7 @@ def holds_numbers(path: Path) -> bool:
     return b"\0" not in begin and not begin.startswith((b"PK\x03\x04", b"\x89HDF", b"CDF"))
 
 
-def load_array(path: Path) -> Array:
+def load_array(source: Source) -> Array:
     """Load a .npy of real numbers, of one or two dimensions.
 
     Raises
@@ -195,91 +291,126 @@ def load_array(path: Path) -> Array:
         If it holds anything else.
     """
     try:
-        table: Any = np.load(path, allow_pickle=False)
+        with source.open() as stream:
+            table: Any = np.load(stream, allow_pickle=False)
+            is_array = isinstance(table, np.ndarray)
     except (OSError, ValueError, EOFError, MemoryError, SyntaxError, TypeError) as error:
         reason = " ".join(str(error).split())
-        raise InputError(f"{path} is no .npy of numbers: {reason}") from None
-    if not isinstance(table, np.ndarray):
-        raise InputError(f"{path} is an archive of arrays: save the one of the heights as .npy")
-    if table.dtype.kind not in "fiu" or table.ndim > 2:
+        raise InputError(f"{source} is no .npy of numbers: {reason}") from None
+    if not is_array:
+        raise InputError(f"{source} is an archive of arrays: save the one of the heights as .npy")
+    return _numbers(source.name, table)
+
+
+def _numbers(name: str, values: Any) -> Array:
+    """Return an array of real numbers as floats; masked ones are NaN."""
+    array = np.ma.asarray(values)
+    if array.dtype.kind not in "fiu" or array.ndim > 2:
         raise InputError(
-            f"{path} holds {table.dtype} of {table.ndim} dimensions: heights are real numbers in "
+            f"{name} holds {array.dtype} of {array.ndim} dimensions: heights are real numbers in "
             "one row or column"
         )
     with np.errstate(over="ignore"):  # a longer float that overflows is refused as not finite
-        return np.asarray(table, dtype=float)
+        return np.asarray(np.ma.filled(array.astype(float), np.nan))
 
 
-def _from_array(path: Path, unit: str | None, step: float | None) -> Trace:
-    table = np.atleast_1d(load_array(path))
-    if table.ndim == 2 and 2 in table.shape:
-        columns = table if table.shape[0] == 2 else table.T
-    elif table.ndim == 1 or 1 in table.shape:
-        columns = table.reshape(1, -1)
+def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Table] | None:
+    """Return name and columns of an array or a DataFrame; None for any other source."""
+    if isinstance(source, np.ndarray | list | tuple):
+        return "array", _columns_of("array", _numbers("array", source))
+    if not hasattr(source, "to_numpy"):
+        return None
+    if hasattr(source, "to_frame"):  # a Series is a column
+        source = source.to_frame()
+    if names is not None:
+        missing = [name for name in names if name not in source.columns]
+        if missing:
+            known = ", ".join(map(repr, source.columns))
+            raise InputError(f"{parameter('columns')} is {missing[0]!r}: the table has {known}")
+        source = source[list(names)]
+    units = source.attrs.get("units", {})
+    header = [f"{n} ({units[n]})" if units.get(n) else str(n) for n in source.columns]
+    try:
+        values = source.to_numpy(dtype=float, na_value=np.nan)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the table holds more than numbers: {error}") from None
+    table = _columns_of("the table", values, tuple(header))
+    return "the table", table
+
+
+def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table:
+    values = np.atleast_1d(values)
+    if header:
+        columns = values.T
+    elif values.ndim == 2 and 2 in values.shape:
+        columns = values if values.shape[0] == 2 else values.T
+    elif values.ndim == 1 or 1 in values.shape:
+        columns = values.reshape(1, -1)
     else:
-        shape = " × ".join(map(str, table.shape))
-        raise InputError(f"{path} holds {shape} numbers: a trace has one column or two")
+        shape = " × ".join(map(str, values.shape))
+        raise InputError(f"{name} holds {shape} numbers: a trace has one column or two")
     lines = np.arange(1, columns.shape[1] + 1)
-    return _from_table(path, Table(columns, (), (), lines, " ", "."), unit, step, None)
+    return Table(columns, header, (header,) if header else (), lines, " ", ".")
 
 
 def _from_table(
-    path: Path, table: Table, unit: str | None, step: float | None, wanted: Sequence[int] | None
+    name: str,
+    table: Table,
+    unit: str | None,
+    step: float | None,
+    wanted: Sequence[Any] | None,
+    form: str,
 ) -> Trace:
     columns, fields = table.columns, list(table.fields)
     if wanted is not None:
         if len(wanted) != 2 or not all(1 <= w <= len(columns) for w in wanted):
             raise InputError(
                 f"{parameter('columns')} is {','.join(map(str, wanted))}: positions and heights, "
-                f"two of the {len(columns)} columns of {path}"
+                f"two of the {len(columns)} columns of {name}"
             )
         columns = columns[[w - 1 for w in wanted]]
         fields = [tuple(row[w - 1] for w in wanted) for row in fields]
     elif len(columns) > 2:
         raise InputError(
-            f"{path} has {len(columns)} columns: {parameter('columns')} X,Z says which are "
+            f"{name} has {len(columns)} columns: {parameter('columns')} X,Z names those of "
             "positions and heights"
         )
     if columns.shape[1] < MIN_POINTS:
-        raise InputError(
-            f"{path} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS}"
-        )
+        raise InputError(f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS}")
     if columns.shape[1] > MAX_POINTS:
-        raise InputError(f"{path} holds {columns.shape[1]} rows of numbers: at most {MAX_POINTS}")
-    said = [
-        f"text, {table.said}" if table.fields or table.header or path.suffix != ".npy" else "npy"
-    ]
+        raise InputError(f"{name} holds {columns.shape[1]} rows of numbers: at most {MAX_POINTS}")
+    notes = [form]
     heights, gaps = _without_sentinels(columns[-1])
     columns = np.vstack([columns[:-1], heights])
-    (x_unit, z_unit), source = _units(path, table, fields, unit, columns, step)
+    (x_unit, z_unit), given_by = _units(name, table, fields, unit, columns, step)
     heights = heights * METRES[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
-    said.append(f"{positions}heights in {z_unit} ({source})")
+    notes.append(f"{positions}heights in {z_unit} ({given_by})")
     if gaps:
-        said.append(gaps)
+        notes.append(gaps)
     if len(columns) == 2:
         if step is not None:
             raise InputError(
-                f"{parameter('step')} belongs to heights without positions: {path} has positions"
+                f"{parameter('step')} belongs to heights without positions: {name} has positions"
             )
-        heights, step, more = _even(path, columns[0] * METRES[x_unit], heights, table.lines)
-        said.extend(more)
+        heights, step, more = _even(name, columns[0] * METRES[x_unit], heights, table.lines)
+        notes.extend(more)
     elif step is None:
         step = step_of_header(table.header, table.decimal)
         if step is None:
             raise InputError(
-                f"{path} has heights without positions, and its header states no step: "
+                f"{name} has heights without positions, and its header states no step: "
                 f"give {parameter('step')}"
             )
-        said.append(f"step {length_text(step, 6)} (header)")
-    return _checked(Trace(path, heights, float(step), tuple(said)))
+        notes.append(f"step {length_text(step, 6)} (header)")
+    return _in_metres(Trace(heights, float(step), name, tuple(notes)))
 
 
 # ---------------------------------------------------------------------- units
 
 
 def _units(
-    path: Path,
+    name: str,
     table: Table,
     fields: Sequence[Sequence[str]],
     unit: str | None,
@@ -290,11 +421,11 @@ def _units(
     found = [*found, *found][:2] if len(columns) == 1 else found
     if unit is not None:
         given = parse_units(unit)
-        for name, known, wanted in zip(("positions", "heights"), found, given, strict=True):
-            if known not in (None, wanted) and not (len(columns) == 1 and name == "positions"):
+        for kind, known, wanted in zip(("positions", "heights"), found, given, strict=True):
+            if known not in (None, wanted) and not (len(columns) == 1 and kind == "positions"):
                 raise InputError(
-                    f"{parameter('unit')} says {wanted} and the header of {path} {known} for the "
-                    f"{name}: take the wrong one out"
+                    f"{parameter('unit')} says {wanted} and the header of {name} {known} for the "
+                    f"{kind}: take the wrong one out"
                 )
         return given, parameter("unit")
     if found[0] is not None and found[1] is not None:
@@ -302,7 +433,7 @@ def _units(
     if found[0] is not None or found[1] is not None:
         known = "positions" if found[0] else "heights"
         raise InputError(
-            f"the header of {path} states the unit of the {known} alone: give {parameter('unit')} "
+            f"the header of {name} states the unit of the {known} alone: give {parameter('unit')} "
             "X,Z, as in mm,um"
         )
     if _sure_to_be_metres(columns, step):
@@ -314,7 +445,7 @@ def _units(
         else (f"heights from {np.nanmin(x):g} to {np.nanmax(x):g}")
     )
     raise InputError(
-        f"{path} states no unit, and {size} need not be metres: give {parameter('unit')}, as in um"
+        f"{name} states no unit, and {size} need not be metres: give {parameter('unit')}, as in um"
     )
 
 
@@ -362,21 +493,21 @@ def _is_sentinel(value: float) -> bool:
 
 
 def _even(
-    path: Path, x: Array, heights: Array, lines: Array | None
+    name: str, x: Array, heights: Array, lines: Array | None
 ) -> tuple[Array, float, list[str]]:
     """Return heights at equal steps, the step in m, and a description of what was done."""
-    said: list[str] = []
+    notes: list[str] = []
     where = "point {} of {}" if lines is None else "line {} of {}"
 
     def place(k: int) -> str:
-        return where.format(k if lines is None else int(lines[k]), path)
+        return where.format(k if lines is None else int(lines[k]), name)
 
     if not np.all(np.isfinite(x)):
         raise InputError(f"{place(int(np.argmin(np.isfinite(x))))} has no position")
     steps = np.diff(x)
     if np.all(steps < 0):
         x, heights, steps = x[::-1], heights[::-1], -steps[::-1]
-        said.append("positions ran backwards: turned round")
+        notes.append("positions ran backwards: turned round")
     elif np.any(steps <= 0):
         back = int(np.argmax(steps <= 0)) + 1
         word = "stand still" if steps[back - 1] == 0 else "turn back"
@@ -396,11 +527,11 @@ def _even(
         # Drift of the scanner: the number of steps is right, the positions are not.
         if np.all(apart == 1) and np.abs(steps / step - 1).max() <= _UNEVEN:
             even = np.linspace(x[0], x[-1], x.size)
-            said.append(
+            notes.append(
                 f"unequal steps ({100 * np.abs(steps / step - 1).max():.1f} %) put on equal "
                 "ones, linearly"
             )
-            return np.interp(even, x, heights), step, said
+            return np.interp(even, x, heights), step, notes
         far = int(np.argmax(off))
         raise InputError(
             f"the steps of the positions are unequal: {step:.4g} m on average, and "
@@ -409,28 +540,17 @@ def _even(
     if index[-1] + 1 > x.size:
         whole = np.full(index[-1] + 1, np.nan)
         whole[index] = heights
-        said.append(f"{counted(whole.size - x.size, 'position')} left out: taken as drop-outs")
+        notes.append(f"{counted(whole.size - x.size, 'position')} left out: taken as drop-outs")
         heights = whole
-    return heights, step, said
+    return heights, step, notes
 
 
-def _checked(trace: Trace) -> Trace:
-    """Check that the trace is one of a rough surface, in the units that were found."""
-    good = trace.heights[np.isfinite(trace.heights)]
-    if good.size < MIN_POINTS:
-        raise InputError(f"{trace.path} holds {good.size} heights: at least {MIN_POINTS}")
-    if np.ptp(good) == 0:
-        raise InputError(f"{trace.path}: every height is {good[0]:g} m: a flat trace has no loss")
-    if not _SHORTEST <= trace.length <= _LONGEST:
-        raise InputError(
-            f"{trace.path} would be {trace.length:.3g} m long: is its unit right "
-            f"({parameter('unit')})?"
-        )
-    steps = np.abs(np.diff(trace.heights))
-    slope = float(np.nanmedian(steps) / trace.step)
+def _in_metres(trace: Trace) -> Trace:
+    """Refuse a trace so steep that the unit of one of its columns must be another."""
+    slope = float(np.nanmedian(np.abs(np.diff(trace.heights))) / trace.step)
     if slope > _STEEPEST:
         raise InputError(
-            f"{trace.path} would rise by {slope:.3g} times its step from point to point: are "
+            f"{trace.source} would rise by {slope:.3g} times its step from point to point: are "
             f"positions and heights in the same unit ({parameter('unit')} X,Z)?"
         )
     return trace
