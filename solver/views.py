@@ -57,7 +57,7 @@ class Viewed(Shown):
         path: str | Path | None = None,
         *,
         frames: int = 120,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Callable[[int, int], None] | bool | None = None,
     ) -> Any:
         """Make a film: the deformed surface over the profile, and the point on the curve.
 
@@ -70,8 +70,9 @@ class Viewed(Shown):
             States that are evenly spaced along the path, from 2 to 1000. Beside them stand the
             states before and after each jump, those with the largest energy drops first, up to
             1000 frames in all.
-        progress : callable, optional
-            Called with the number of frames that are drawn and that of all.
+        progress : bool or callable, optional
+            True shows a bar; a callable is called with the number of frames that are drawn and
+            that of all.
 
         Returns
         -------
@@ -86,7 +87,7 @@ class Viewed(Shown):
         ValueError
             If ``frames`` is out of range, or the result holds no contact states.
         TypeError
-            If ``frames`` is no whole number, or ``path`` no path.
+            If ``frames`` is no whole number, ``path`` no path, or ``progress`` no function.
 
         References
         ----------

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
-from adhesis.ensemble.ticker import log, ticking
+from adhesis.ensemble.reporter import log, ticking
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -63,7 +63,7 @@ def read_heights(
             or f"{path} is neither text nor .npy: --trace reads files of instruments, as adhesis "
             "trace does"
         )
-    if source.suffix == ".npy":
+    if source.is_npy:
         array = load_array(source)
         if array.ndim == 2 and 1 not in array.shape:
             raise InputError(_not_one_column(source, *array.shape))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 _NAMES = {
     "m": (
         *("period", "h_max", "h_rms", "separation", "patch_length", "valid_range", "edge_range"),
@@ -26,3 +28,9 @@ _NAMES = {
 }
 UNITS: dict[str, str] = {name: unit for unit, names in _NAMES.items() for name in names}
 """Unit by name; a quantity that is not there has none."""
+
+
+def with_units(table: Any) -> Any:
+    """Return a DataFrame with the unit of every column in ``attrs["units"]``."""
+    table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
+    return table

@@ -15,7 +15,7 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.quantities import UNITS
+from adhesis.ensemble.loop.quantities import UNITS, with_units
 from adhesis.ensemble.outputs import whole_file
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
@@ -57,7 +57,7 @@ class SavedReport(MethodReport):
 # ---------------------------------------------------------------------- tables
 
 
-def to_dataframe(result: Result, of: str) -> pd.DataFrame:
+def to_dataframe(result: Result, of: str) -> Any:
     """Return states or jumps as a table; see :meth:`adhesis.LoopResult.to_dataframe`."""
     checks.choice("of", of, ("states", "jumps"))
     if of == "jumps":
@@ -65,12 +65,6 @@ def to_dataframe(result: Result, of: str) -> pd.DataFrame:
         names += ["leg"] if isinstance(result, PathResult) else []
         return with_units(pd.DataFrame(result.jump_rows(), columns=names))
     return with_units(pd.DataFrame(result.columns()))
-
-
-def with_units(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table with the unit of every column in ``attrs["units"]``."""
-    table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
-    return table
 
 
 def _columns(kind: type, parts: tuple[Any, ...]) -> dict[str, Any]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adhesis.ensemble.loop.quantities import UNITS
+from adhesis.ensemble.loop.quantities import UNITS, with_units
+from adhesis.ensemble.reporter import bar
 from adhesis.solver import checks
 from adhesis.solver.loading.loop import Progress
 from adhesis.solver.loading.loop_result import LoopResult
@@ -40,14 +41,18 @@ def film(
     path: str | os.PathLike[str] | None,
     *,
     frames: int,
-    progress: Callable[[int, int], None] | None,
+    progress: Callable[[int, int], None] | bool | None,
 ) -> Film:
     """Make a film, and write it where a path is given; see :meth:`adhesis.LoopResult.film`."""
     from adhesis.ensemble.loop.film import check_film, film_of
 
     if path is not None:
         path = check_film("path", path)
-    made = film_of(result, frames=frames, progress=progress)
+    if isinstance(progress, bool):
+        with bar("frames") if progress else nullcontext() as shown:
+            made = film_of(result, frames=frames, progress=shown)
+    else:
+        made = film_of(result, frames=frames, progress=progress)
     if path is not None:
         made.save(path)
     return made
@@ -115,7 +120,6 @@ def table_of_runs(answer: Answer) -> Any:
     """Return the loops of an answer as a table; see its method ``to_dataframe``."""
     import pandas as pd
 
-    from adhesis.ensemble.loop.saved import with_units
     from adhesis.ensemble.trace.answer import run_rows
 
     hidden = ("range_warnings", "failed")
@@ -175,23 +179,13 @@ def progress_bar(top: float) -> Iterator[Progress]:
 
     It is full at the turning point ``top``; unloading has no end that is known ahead.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("loading", total=1.0)
+    with bar("loading") as shown:
 
         def show(branch: Branch, drive: float, state: ContactState) -> None:
-            loading = branch == "loading"
-            done = drive / top if loading else None
-            over = not loading and not state.patches
             text = f"{branch:<9} {drive:+.3f} of {top:g}, {state.patches} patches"
-            bar.update(
-                task,
-                description=text,
-                completed=1.0 if over else done,
-                total=1.0 if loading or over else None,
-            )
+            if branch == "loading":
+                shown(drive / top, 1.0, text)
+            else:
+                shown(None if state.patches else 1.0, None if state.patches else 1.0, text)
 
         yield show

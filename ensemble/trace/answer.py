@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.pool import Pool, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Cycle, Plan, default_tables, make_plan
@@ -273,10 +274,15 @@ def loss_of_trace(
     plan = make_plan(prepared, cycle, quick=quick, processes=processes)
     if not flag("progress", progress):
         return run_plan(prepared, cycle, plan, watch)
-    from adhesis.ensemble.trace.progress_bar import bar_of
+    with bar("loops") as shown:
 
-    with bar_of(len(plan.runs), watch) as shown:
-        return run_plan(prepared, cycle, plan, shown)
+        def both(pool: Pool) -> None:
+            done, runs = len(pool.done), len(plan.runs)
+            shown(done, runs, f"{done}/{runs} loops")
+            if watch is not None:
+                watch(pool)
+
+        return run_plan(prepared, cycle, plan, both)
 
 
 def make_cycle(

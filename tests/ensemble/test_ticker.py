@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
+from adhesis.ensemble.reporter import ticking
 from adhesis.ensemble.run.progress import Counts, ProgressLine
-from adhesis.ensemble.ticker import ticking
 
 
 def test_what_takes_long_is_told_and_what_is_over_is_not() -> None:

@@ -34,6 +34,9 @@ def test_every_format_gives_the_same_heights(name: str, tmp_path: Path) -> None:
     assert trace.step == pytest.approx(STEP, rel=1e-6)
     np.testing.assert_allclose(trace.heights, Z, atol=1e-10)
     assert trace.notes
+    with path.open("rb") as stream:
+        again = read_trace(stream)
+    assert again == trace
 
 
 @pytest.mark.parametrize("name", ["mahr.qep", "row.x3p", "row.sdf", "row.sur"])

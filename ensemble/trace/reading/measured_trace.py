@@ -225,7 +225,7 @@ def read_trace(
                 f"{name} is {number}: {source} holds columns of numbers, no map and no channels "
                 f"({parameter('columns')} chooses columns)"
             )
-    if is_text and source.suffix == ".npy":
+    if is_text and source.is_npy:
         table = _columns_of(source.name, load_array(source))
         return _from_table(source.name, table, unit, step, columns, "npy")
     if is_text:
@@ -269,7 +269,7 @@ def holds_numbers(source: Source) -> bool:
         If it cannot be read, or has to be unpacked or exported first.
     """
     begin, suffix = source.beginning(), source.suffix
-    if suffix == ".npy" or begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if source.is_npy or begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return True
     # Text formats of instruments, whose numbers are not two columns.
     if begin[:8] in (b"aISO-1.0", b"aBCR-1.0", b"aISO-2.0") or begin[:7] in (

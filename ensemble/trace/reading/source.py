@@ -59,6 +59,11 @@ class Source:
         """Ending of the name, in lower case."""
         return Path(self.name).suffix.lower()
 
+    @property
+    def is_npy(self) -> bool:
+        """Whether it is an array of NumPy, by its name or its first bytes."""
+        return self.suffix == ".npy" or self.beginning().startswith(b"\x93NUMPY")
+
     def open(self) -> BinaryIO:
         """Open it to read (OSError)."""
         return Path(self.name).open("rb") if self.content is None else io.BytesIO(self.content)
