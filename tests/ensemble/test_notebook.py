@@ -33,6 +33,7 @@ from adhesis import (
 )
 from adhesis.ensemble.loop import saved
 from adhesis.ensemble.trace.prepare import prepare_trace
+from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import views
 from adhesis.solver.references.exact_wave import ExactWave
@@ -162,8 +163,8 @@ def test_other_files_are_refused(tmp_path, result):
 # ---------------------------------------------------------------------- copies and processes
 
 
-def same(result: LoopResult | PathResult) -> LoopResult | PathResult:
-    return result
+def same(thing: Any) -> Any:
+    return thing
 
 
 def test_results_are_copied_pickled_and_sent_to_spawned_processes():
@@ -172,7 +173,9 @@ def test_results_are_copied_pickled_and_sent_to_spawned_processes():
         assert copy.copy(result) == copy.deepcopy(result) == result
         assert pickle.loads(pickle.dumps(result)).contact_states == result.contact_states
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        assert pool.map(same, results) == results
+        trace = Trace(WAVE.heights(64), 1e-5)
+        things = [*results, trace, WAVE, wave_method().problem, results[0].contact_states[3]]
+        assert pool.map(same, things) == things
         method = wave_method()
         loop = pool.apply(run_loop, (method,), {"max_penetration": 0.5, "load_steps": 4})
     assert loop == results[0]
@@ -370,7 +373,9 @@ def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
         other.run(tmp_path / "2.h5", ranks=2)
 
 
-@pytest.mark.parametrize("module", [_campaign, saved, views], ids=lambda module: module.__name__)
+@pytest.mark.parametrize(
+    "module", [_campaign, saved, views, measured_trace], ids=lambda module: module.__name__
+)
 def test_the_examples_of_the_docstrings_are_right(module):
     done = doctest.testmod(module)
     assert done.failed == 0

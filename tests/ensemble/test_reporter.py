@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import time
 
-from adhesis.ensemble.reporter import ticking
+import pytest
+
+from adhesis.ensemble.reporter import StatusLine, ticking
 from adhesis.ensemble.run.progress import Counts, ProgressLine
 
 
@@ -46,3 +49,35 @@ def test_the_first_ten_minutes_of_a_run_know_no_silence_above_fifteen_seconds(mo
     assert max(gap for at, gap in gaps if at < 600.0) <= 15.5
     assert max(gap for _, gap in gaps) <= 60.5
     assert len(log.lines) < 800  # ten hours: a log that can be read
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "expected"),
+    [
+        (
+            _Terminal(),
+            ["", "\x1b[Kstep 0", "\x1b[Kstep 1", "\x1b[Kstep 2", "\x1b[K" + 79 * "x" + "\n"],
+        ),
+        (io.StringIO(), ["step 2\n" + 200 * "x" + "\n"]),
+    ],
+    ids=["terminal", "file"],
+)
+def test_a_line_is_rewritten_on_a_terminal_and_written_anew_elsewhere(
+    stream: io.StringIO, expected: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr("sys.stderr", stream)
+    monkeypatch.setenv("COLUMNS", "80")
+    line = StatusLine(every=5.0)
+    for step in range(3):
+        now[0] = 2.6 * step
+        line.show(lambda step=step: f"step {step}")  # type: ignore[misc]
+    line.show(lambda: 200 * "x", last=True)
+    assert line.seconds == 5.2
+    assert stream.getvalue().split("\r") == expected
