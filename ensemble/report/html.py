@@ -21,7 +21,7 @@ blockquote { background: #fff3d6; border-left: 4px solid #e69f00; margin: 1em 0;
   padding: .1rem .8rem; }
 h1 + p { font-size: 1.05rem; background: #f3f6f9; border-left: 4px solid #0072b2;
   padding: .7rem 1rem; }
-.table { overflow-x: auto; }
+.table { overflow-x: auto; } .table + .table { margin-top: 1rem; }
 table { border-collapse: collapse; font-size: .82rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .55rem; border-bottom: 1px solid #ddd; white-space: nowrap; }
 th { border-bottom: 1.5px solid #555; }
