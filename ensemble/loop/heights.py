@@ -8,7 +8,12 @@ import re
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.length_units import METRES, length_text, parse_units, units_of_header
+from adhesis.ensemble.trace.reading.header_units import (
+    METRES,
+    length_text,
+    parse_units,
+    units_of_header,
+)
 from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_column

@@ -15,8 +15,8 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.quantities import UNITS, with_units
 from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.quantities import UNITS, with_units
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult

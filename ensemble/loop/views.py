@@ -13,7 +13,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adhesis.ensemble.loop.quantities import UNITS, with_units
+from adhesis.ensemble.quantities import UNITS, with_units
 from adhesis.ensemble.reporter import bar
 from adhesis.solver import checks
 from adhesis.solver.loading.loop import Progress

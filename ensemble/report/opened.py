@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.loop.quantities import with_units
+from adhesis.ensemble.quantities import with_units
 from adhesis.ensemble.report.curves import curves_dataset
 from adhesis.ensemble.report.html import picture, table_of
 from adhesis.ensemble.report.plots import Plots

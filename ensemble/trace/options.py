@@ -7,8 +7,8 @@ from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.length_units import parse_length
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
+from adhesis.ensemble.trace.reading.header_units import parse_length
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.reading.text_table import DELIMITERS
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from adhesis._version import __version__
 from adhesis.ensemble.escape import code_span, markdown, printable
-from adhesis.ensemble.length_units import length_text
 from adhesis.ensemble.outputs import staged_folder, write_json
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, Answer, Quantity, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
+from adhesis.ensemble.trace.reading.header_units import length_text
 from adhesis.solver.checks import counted
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import parameter
-from adhesis.ensemble.length_units import length_text
 from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.ensemble.trace.reading.header_units import length_text
 from adhesis.ensemble.trace.worker import Job
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import Profile

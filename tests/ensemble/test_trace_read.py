@@ -16,7 +16,7 @@ import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.length_units import length_text, parse_length
+from adhesis.ensemble.trace.reading.header_units import length_text, parse_length
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 
 N, STEP = 200, 0.5e-6

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
-from adhesis.ensemble.length_units import (
+from adhesis.ensemble.trace.reading.header_units import (
     METRES,
     length_text,
     parse_units,
