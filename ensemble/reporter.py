@@ -8,9 +8,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any, Protocol, TextIO
 
 _EVERY = 10.0  # s
+_LIVE = 0.1  # s between two states of a line on a terminal
+_REWRITE = "\r\x1b[K"
 
 
 def log(text: str) -> None:
@@ -53,34 +55,66 @@ def ticking(
 
 
 class StatusLine:
-    """One line on stderr: rewritten on a terminal, else written anew at intervals.
+    """One line: rewritten on a terminal, elsewhere written anew at intervals.
 
     Parameters
     ----------
-    every : float
-        Time between lines where there is no terminal, in s.
+    every : float or callable
+        Time between lines where there is no terminal, in s; or the same as a function of the time
+        since the start.
+    stream : text stream, optional
+        Where to; stderr without it.
+    at_once : bool
+        Show the first text when it is given, not after the first interval.
     """
 
-    def __init__(self, every: float) -> None:
-        self.live = sys.stderr.isatty()
-        self.started = self._last = time.monotonic()
+    def __init__(
+        self,
+        every: float | Callable[[float], float],
+        stream: TextIO | None = None,
+        *,
+        at_once: bool = False,
+    ) -> None:
+        self._stream = stream or sys.stderr
+        self._live = self._stream.isatty()
         self._every = every
+        self._started = time.monotonic()
+        self._next = self._started + (0.0 if at_once or self._live else self._interval())
+        self._begun = False  # whether a line on the terminal has no end yet
 
     @property
     def seconds(self) -> float:
         """Time since the start, in s."""
-        return time.monotonic() - self.started
+        return time.monotonic() - self._started
 
     def show(self, text: Callable[[], str], *, last: bool = False) -> None:
-        """Show a text; ``last`` ends the line."""
+        """Show a text if it is time to; ``last`` shows it anyway and ends the line."""
         now = time.monotonic()
-        if not (self.live or last or now - self._last >= self._every):
+        if now < self._next and not last:
             return
-        self._last = now
-        line, end = text(), "\n" if last or not self.live else ""
-        if self.live:  # a line that wraps cannot be rewritten
-            line = "\r\x1b[K" + line[: shutil.get_terminal_size().columns - 1]
-        print(line, end=end, file=sys.stderr, flush=True)
+        self._next = now + self._interval()
+        if not self._live:
+            print(text(), file=self._stream, flush=True)
+            return
+        # A line that wraps cannot be rewritten.
+        line = text()[: shutil.get_terminal_size().columns - 1]
+        print(_REWRITE + line, end="\n" if last else "", file=self._stream, flush=True)
+        self._begun = not last
+
+    def say(self, text: str) -> None:
+        """Write a line of its own."""
+        print((_REWRITE if self._begun else "") + text, file=self._stream, flush=True)
+        self._begun = False
+
+    def close(self, text: Callable[[], str]) -> None:
+        """Show a last text where a line on the terminal has no end yet."""
+        if self._begun:
+            self.show(text, last=True)
+
+    def _interval(self) -> float:
+        if self._live:
+            return _LIVE
+        return self._every(self.seconds) if callable(self._every) else self._every
 
 
 class Bar(Protocol):

@@ -81,3 +81,20 @@ def test_a_line_is_rewritten_on_a_terminal_and_written_anew_elsewhere(
     line.show(lambda: 200 * "x", last=True)
     assert line.seconds == 5.2
     assert stream.getvalue().split("\r") == expected
+
+
+def test_a_run_on_a_terminal_has_one_line_and_failures_above_it(monkeypatch) -> None:
+    now, stream = [0.0], _Terminal()
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    counts = Counts(total=3, done_before=1)
+    progress = ProgressLine(counts, lambda: None, stream)
+    progress.tick()
+    progress.tick()  # too early
+    progress.failure("H = 0.8", "diverged")
+    counts.done, counts.failed, now[0] = 1, 1, 2.0
+    progress.tick()
+    progress.close()
+    progress.close()
+    first, last = "1 of 3 tasks done", "2 of 3 tasks done, 1 failed, 2.0 s so far"
+    shown = stream.getvalue().replace("\r\x1b[K", "|")
+    assert shown == f"|{first}|failed: H = 0.8: diverged\n|{last}|{last}\n"
