@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import re
-from pathlib import Path
 
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.containers import container
-from adhesis.ensemble.trace.read import holds_numbers, load_array
-from adhesis.ensemble.trace.text import Table, read_column
-from adhesis.ensemble.trace.units import METRES, length_text, parse_units, units_of_header
+from adhesis.ensemble.trace.reading.header_units import (
+    METRES,
+    length_text,
+    parse_units,
+    units_of_header,
+)
+from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
+from adhesis.ensemble.trace.reading.source import Source, source_of
+from adhesis.ensemble.trace.reading.text_table import Table, read_column
 from adhesis.solver.model.profile import Array
 
 # A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
@@ -28,7 +33,7 @@ _STRAIGHT = 1e-3
 
 
 def read_heights(
-    path: Path,
+    path: str | os.PathLike[str],
     *,
     unit: str | None = None,
     delimiter: str | None = None,
@@ -38,7 +43,7 @@ def read_heights(
 
     Parameters
     ----------
-    path : Path
+    path : path
     unit : str, optional
         Unit of the heights; without it that of the header, and without that metres.
     delimiter, decimal : str, optional
@@ -56,21 +61,22 @@ def read_heights(
         unclear.
     """
     given = None if unit is None else _unit(unit)
-    if not holds_numbers(path):
+    source = source_of(path)
+    if not holds_numbers(source):
         raise InputError(
-            container(path)
+            source.container()
             or f"{path} is neither text nor .npy: --trace reads files of instruments, as adhesis "
             "trace does"
         )
-    if path.suffix.lower() == ".npy":
-        array = load_array(path)
+    if source.is_npy:
+        array = load_array(source)
         if array.ndim == 2 and 1 not in array.shape:
-            raise InputError(_not_one_column(path, *array.shape))
+            raise InputError(_not_one_column(source, *array.shape))
         return np.asarray(array.reshape(-1) * METRES[given or "m"])
-    table = read_column(path, delimiter, decimal)
+    table = read_column(source, delimiter, decimal)
     if len(table.columns) > 1:
-        raise InputError(_not_one_column(path, table.columns.shape[1], len(table.columns)))
-    heights: Array = table.columns[0] * METRES[_unit_of(path, table, given)]
+        raise InputError(_not_one_column(source, table.columns.shape[1], len(table.columns)))
+    heights: Array = table.columns[0] * METRES[_unit_of(source, table, given)]
     missing = np.flatnonzero(~np.isfinite(heights))
     if missing.size:
         raise InputError(
@@ -80,9 +86,9 @@ def read_heights(
     return heights
 
 
-def _not_one_column(path: Path, rows: int, columns: int) -> str:
+def _not_one_column(source: Source, rows: int, columns: int) -> str:
     return (
-        f"{path} holds {rows} × {columns} numbers: --heights takes one column (or one row), the "
+        f"{source} holds {rows} × {columns} numbers: --heights takes one column (or one row), the "
         "heights of one period; adhesis trace reads positions and heights"
     )
 
@@ -93,13 +99,13 @@ def _unit(text: str) -> str:
     return parse_units(text)[1]
 
 
-def _unit_of(path: Path, table: Table, given: str | None) -> str:
+def _unit_of(source: Source, table: Table, given: str | None) -> str:
     """Return the unit of the heights: of the option, of the header, or metres without either."""
     found = units_of_header(table.header, table.fields)[-1]
     if given is not None:
         if found not in (None, given):
             raise InputError(
-                f"--unit is {given} and the header of {path} has heights in {found}: take the "
+                f"--unit is {given} and the header of {source} has heights in {found}: take the "
                 "wrong one out"
             )
         return given
@@ -109,8 +115,8 @@ def _unit_of(path: Path, table: Table, given: str | None) -> str:
         word = _POSSIBLE_UNIT.search(line)
         if word is not None:
             raise InputError(
-                f"the header of {path} has {word[0]!r}, from which the unit of the heights is not "
-                "clear: give --unit, as in --unit um"
+                f"the header of {source} has {word[0]!r}, from which the unit of the heights is "
+                "not clear: give --unit, as in --unit um"
             )
     return "m"
 
