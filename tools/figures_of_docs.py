@@ -125,7 +125,7 @@ def source(name: str) -> str:
 def make(name: str, ranks: int) -> None:
     """Run the commands of a part and put what they made into docs/, stamped."""
     part = PARTS[name]
-    made = set()
+    made: set[Path] = set()
     with tempfile.TemporaryDirectory() as folder:
         for command in part.commands:
             words = command.replace("OUT", folder).split()
