@@ -161,7 +161,8 @@ def _rows(shown: Any) -> list[tuple[str, str]]:
         names = ["name", "problem", "chosen"]
     values = {name: getattr(shown, name) for name in names}
     values |= {name: getattr(shown, name) for name in _ALSO_SHOWN.get(type(shown).__name__, ())}
-    return [(name, f"{brief(v)} {UNITS.get(name, '')}".rstrip()) for name, v in values.items()]
+    texts = {name: v if isinstance(v, str) else brief(v) for name, v in values.items()}
+    return [(name, f"{text} {UNITS.get(name, '')}".rstrip()) for name, text in texts.items()]
 
 
 def picture_of(figure: Any) -> str:

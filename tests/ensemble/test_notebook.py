@@ -209,7 +209,7 @@ def test_a_bar_on_stderr_follows_the_path_and_changes_nothing(run, capsys):
 @pytest.mark.parametrize("thing", [HalfSpace(1e6, 0.5), wave_method()], ids=["solid", "method"])
 def test_numbers_are_shown_with_their_units(thing):
     shown = html.unescape(thing._repr_html_())
-    expected = {"young": "1e+06 Pa", "modulus": "1.33333e+06 Pa", "name": "wave"}
+    expected = {"young": "1e+06 Pa", "modulus": "1.33333e+06 Pa", "name": "exact wave"}
     for name, value in expected.items():
         if hasattr(thing, name):
             assert f"<th>{name}</th><td>{value}</td>" in shown
