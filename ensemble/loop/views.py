@@ -124,7 +124,7 @@ def table_of_runs(answer: Answer) -> Any:
 
     hidden = ("range_warnings", "failed")
     rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
-    return with_units(pd.DataFrame(rows))
+    return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
 
 
 def _rows_of_result(result: Result) -> list[tuple[str, str]]:
@@ -145,7 +145,8 @@ def _rows_of_result(result: Result) -> list[tuple[str, str]]:
     return rows + [("warning", text) for text in result.warnings]
 
 
-# Shown beside the fields, by class; a method is no dataclass.
+# By class: what the figure shows, and what is shown beside the fields.
+_DRAWN = {"Profile": ("coefficients",), "Trace": ("heights",)}
 _ALSO_SHOWN = {
     "Profile": ("h_max", "h_rms", "m2"),
     "HalfSpace": ("modulus",),
@@ -155,13 +156,24 @@ _ALSO_SHOWN = {
 
 
 def _rows(shown: Any) -> list[tuple[str, str]]:
-    """Return the fields of an object with their units."""
+    """Return the fields of an object with their units, without what is drawn, unknown or empty."""
+    from adhesis.ensemble.trace.prepare import Prepared
+
+    if isinstance(shown, Prepared):
+        steps = ((step.name, step.description) for step in shown.steps)
+        return [("trace", repr(shown.trace)), *steps, *(("warning", w) for w in shown.warnings)]
     names = [entry.name for entry in fields(shown) if entry.repr] if is_dataclass(shown) else []
     if isinstance(shown, Method):
         names = ["name", "problem", "chosen"]
+    names += _ALSO_SHOWN.get(type(shown).__name__, ())
     values = {name: getattr(shown, name) for name in names}
-    values |= {name: getattr(shown, name) for name in _ALSO_SHOWN.get(type(shown).__name__, ())}
-    return [(name, f"{brief(v)} {UNITS.get(name, '')}".rstrip()) for name, v in values.items()]
+    drawn = _DRAWN.get(type(shown).__name__, ())
+    texts = {
+        name: value if isinstance(value, str) else brief(value)
+        for name, value in values.items()
+        if not (value is None or (isinstance(value, tuple) and not value) or name in drawn)
+    }
+    return [(name, f"{text} {UNITS.get(name, '')}".rstrip()) for name, text in texts.items()]
 
 
 def picture_of(figure: Any) -> str:

@@ -209,7 +209,7 @@ def test_a_bar_on_stderr_follows_the_path_and_changes_nothing(run, capsys):
 @pytest.mark.parametrize("thing", [HalfSpace(1e6, 0.5), wave_method()], ids=["solid", "method"])
 def test_numbers_are_shown_with_their_units(thing):
     shown = html.unescape(thing._repr_html_())
-    expected = {"young": "1e+06 Pa", "modulus": "1.33333e+06 Pa", "name": "wave"}
+    expected = {"young": "1e+06 Pa", "modulus": "1.33333e+06 Pa", "name": "exact wave"}
     for name, value in expected.items():
         if hasattr(thing, name):
             assert f"<th>{name}</th><td>{value}</td>" in shown
@@ -270,6 +270,7 @@ def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_p
     table = answer.to_dataframe()
     assert table.loss[0] == answer.loss.value
     assert len(table) == runs
+    assert table.description[0] == "the loop"
     assert table.attrs["units"]["loss"] == "J/m²"
     path = answer.page(tmp_path / "new" / "folder")
     assert path == tmp_path / "new" / "folder" / "trace.html"
