@@ -13,7 +13,7 @@ import matplotlib as mpl
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
-from adhesis.ensemble.loop.scenes import Scene, Scenes, scenes_of
+from adhesis.ensemble.loop.film_scenes import Scene, Scenes, scenes_of
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
