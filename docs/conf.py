@@ -33,6 +33,7 @@ extensions = [
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["README.md", "paper/README.md"]
 language = "en"
+smartquotes = False  # options begin with two hyphens
 
 # Anchors as the pages use them where they are read as plain Markdown.
 myst_heading_anchors = 4
@@ -112,7 +113,7 @@ class Command(SphinxDirective):
             shown = [a for a in group._group_actions if "--help" not in a.option_strings]
             if not shown:
                 continue
-            made.append(nodes.rubric(text=(group.title or "").capitalize()))
+            made.append(nodes.rubric(text=(group.title or "").removeprefix("positional ").capitalize()))
             entries = nodes.definition_list(classes=["options"])
             for action in shown:
                 term = nodes.term()
