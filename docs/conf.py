@@ -136,7 +136,8 @@ class Command(SphinxDirective):
         names = ", ".join(action.option_strings)
         if action.nargs == 0:
             return names
-        value = action.metavar or ("|".join(action.choices or ()) or action.dest.upper())
+        choices = "|".join(action.choices or ())
+        value = action.metavar or choices or action.dest.upper()
         return f"{names} {value}"
 
 

@@ -39,7 +39,9 @@ _TOKEN = re.compile(
     re.MULTILINE,
 )
 # Lines that report progress: how many there are depends on the machine.
-_PROGRESS = re.compile(r"^(loading|unloading) +step +-?\d.*\n|^film: .*\n|^compil.*\n", re.MULTILINE)
+_PROGRESS = re.compile(
+    r"^(loading|unloading) +step +-?\d.*\n|^film: .*\n|^compil.*\n", re.MULTILINE
+)
 _FACTOR = 3.0
 
 
@@ -112,7 +114,8 @@ def run(piece: Piece, names: dict[str, object]) -> str:
             if name is not None:
                 Path(name[1]).write_text(piece.typed, encoding="utf-8")
         else:
-            exec(compile(piece.typed, "page", "exec" if piece.kind == "python" else "single"), names)
+            mode = "exec" if piece.kind == "python" else "single"
+            exec(compile(piece.typed, "page", mode), names)
     return _PROGRESS.sub("", out.getvalue() + err.getvalue())
 
 

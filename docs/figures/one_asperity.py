@@ -26,10 +26,9 @@ def draw_bodies(axes: Axes, half_width: float, separation: float, title: str) ->
     """Draw the elastic body above the rigid wave; a half-width of 0 is no contact."""
     x = np.linspace(-0.5, 0.5, 801) * WAVE.period
     height = WAVE.amplitude * np.cos(2 * np.pi * x / WAVE.period)
+    surface = np.full(x.size, separation)
     if half_width:
         surface = height + WAVE.gap(x, half_width)
-    else:
-        surface = np.full(x.size, separation)
     top = 4.2e-6
     axes.fill_between(1e6 * x, 1e6 * surface, 1e6 * top, color=BODY, lw=0)
     axes.plot(1e6 * x, 1e6 * surface, color="#51667d", lw=1)

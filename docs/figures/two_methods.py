@@ -46,7 +46,13 @@ def draw_gap(axes: Axes) -> None:
     surface = (fine.height + fine.gap)[order]
     axes.fill_between(1e6 * place[order], 1e6 * surface, 3.4, color=BODY, lw=0)
     axes.fill_between(1e6 * x, -1.3, 1e6 * PROBLEM.profile.at(x), color=RIGID, lw=0)
-    axes.plot(1e6 * place[order], 1e6 * surface, color=SHARP, lw=1.2, label="sharp: a crack between edges")
+    axes.plot(
+        1e6 * place[order],
+        1e6 * surface,
+        color=SHARP,
+        lw=1.2,
+        label="sharp: a crack between edges",
+    )
     spot = ((nodes.x + 0.5 * PERIOD) % PERIOD) - 0.5 * PERIOD
     inside = nodes.gap <= 0
     axes.plot(
@@ -59,7 +65,8 @@ def draw_gap(axes: Axes) -> None:
     )
     for edge in np.ravel(exact.edges):
         at = ((edge + 0.5 * PERIOD) % PERIOD) - 0.5 * PERIOD
-        axes.plot(1e6 * at, 1e6 * PROBLEM.profile.at(np.array([at]))[0], "|", ms=16, mew=2, color="k")
+        height = PROBLEM.profile.at(np.array([at]))[0]
+        axes.plot(1e6 * at, 1e6 * height, "|", ms=16, mew=2, color="k")
     axes.set(xlim=(-50, 50), ylim=(-1.3, 3.4), xlabel="position (µm)", ylabel="height (µm)")
     axes.set_title("what is known of a contact", fontsize=10)
     axes.legend(frameon=False, fontsize=8, loc="upper center")

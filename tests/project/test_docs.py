@@ -324,9 +324,12 @@ def test_outputs_are_compared_number_by_number(shown: str, printed: str, same: b
     assert (transcripts.differences(shown, printed) == []) == same
 
 
-def test_a_page_with_old_outputs_is_renewed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_with_old_outputs_is_renewed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page = tmp_path / "page.md"
-    text = "```pycon\n>>> k = 3\n>>> for j in range(2):\n...     print(j + k)\nOLD>>> 2 * k\n6\n```\n"
+    loop = ">>> for j in range(2):\n...     print(j + k)\n"
+    text = f"```pycon\n>>> k = 3\n{loop}OLD>>> 2 * k\n6\n```\n"
     page.write_text(text.replace("OLD", "3\n5\n"))
     monkeypatch.chdir(tmp_path)
     done = transcripts.lesson(page)
@@ -378,7 +381,8 @@ def yaml_lines(text: str) -> list[str]:
     """Return what of the citation file an entry has to hold."""
     folded = re.sub(r"title: >-\n +", "title: ", text)
     names = "title|family-names|given-names|journal|volume|year|doi"
-    return [value.strip('"') for value in re.findall(rf"^ +(?:- )?(?:{names}): (.*)$", folded, re.M)]
+    found = re.findall(rf"^ +(?:- )?(?:{names}): (.*)$", folded, re.MULTILINE)
+    return [value.strip('"') for value in found]
 
 
 def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:

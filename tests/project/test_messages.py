@@ -45,7 +45,7 @@ def text_of(node: ast.expr) -> str:
         return text_of(node.left) + text_of(node.right)
     if isinstance(node, ast.BoolOp):
         return text_of(node.values[-1])
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "_sentence":
+    if isinstance(node, ast.Call) and ast.unparse(node.func) == "_sentence":
         return "… is …: it must be …"
     return "…"
 
