@@ -113,7 +113,8 @@ class Command(SphinxDirective):
             shown = [a for a in group._group_actions if "--help" not in a.option_strings]
             if not shown:
                 continue
-            made.append(nodes.rubric(text=(group.title or "").removeprefix("positional ").capitalize()))
+            title = (group.title or "").removeprefix("positional ").capitalize()
+            made.append(nodes.rubric(text=title))
             entries = nodes.definition_list(classes=["options"])
             for action in shown:
                 term = nodes.term()
