@@ -31,7 +31,7 @@ sys.path.insert(0, str(ROOT))
 
 _NUMBER = r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\d)"
 # Numbers that differ from run to run: they are not compared.
-_MEASURED = rf"{_NUMBER}(?= ?(?:s|min|h|MB|kB|core hours?)\b)|\d\d:\d\d:\d\d"
+_MEASURED = rf"(?:{_NUMBER} (?:s|min|h|MB|kB|core hours?)\b ?)+|\d\d:\d\d:\d\d"
 # Estimated errors: small differences of large numbers, in which the last bits show.
 _ESTIMATE = rf"(?:(?<=residual )|(?<=\nerror       )){_NUMBER}"
 _TOKEN = re.compile(
@@ -164,7 +164,7 @@ def _pattern(shown: str) -> tuple[str, list[tuple[str, bool]]]:
         elif found["bit"]:
             parts.append(r"[^\n]*?")
         elif found["measured"]:
-            parts.append(r"[-+]?[\d.,:]+(?:e[-+]?\d+)?")
+            parts.append(rf"(?:{_MEASURED})")
         else:
             parts.append(f"({_NUMBER})")
             wanted.append((found[0], found["estimate"] is not None))

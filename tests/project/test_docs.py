@@ -307,6 +307,8 @@ SHOWN = "loss        0.0354151 J/m² in 28 jumps, residual 4.29e-06\nmethod     
     [
         (SHOWN, SHOWN, True),
         (SHOWN, SHOWN.replace("1.2 s", "71.0 s"), True),
+        (SHOWN, SHOWN.replace("1.2 s", "1 min 12 s"), True),
+        ("done in 2 s\n", "done in 1 h 2 min\n", True),
         (SHOWN, SHOWN.replace("4.29e-06", "6.1e-06"), True),
         (SHOWN, SHOWN.replace("4.29e-06", "6.1e-05"), False),
         (SHOWN, SHOWN.replace("0.0354151", "0.0354152"), True),
