@@ -72,7 +72,7 @@ class Piece:
 def pieces(text: str) -> Iterator[Piece]:
     """Find what a page runs, in order."""
     fences = r"^```(?P<language>console|python|pycon|toml)\n(?P<fenced>.*?)^```$"
-    indented = r"(?<=\n\n)(?P<indented>    \$ .*\n(?:    .*\n)*)"
+    indented = r"(?<=\n\n)(?P<indented>    \$ [^\n]*\n(?:    [^\n]*\n)*)"
     for found in re.finditer(f"{fences}|{indented}", text, re.MULTILINE | re.DOTALL):
         language = found["language"]
         if language in ("python", "toml"):
