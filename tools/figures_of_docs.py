@@ -72,6 +72,18 @@ PARTS = {
     "zero-range": Part(
         ("docs/figures/zero_range.py OUT/zero_range.png",), "zero_range.png", "figures"
     ),
+    "one-asperity": Part(
+        ("docs/figures/one_asperity.py OUT/one_asperity.png",), "one_asperity.png", "figures"
+    ),
+    "two-scales": Part(
+        ("docs/figures/two_scales.py OUT/two_scales.png",), "two_scales.png", "figures"
+    ),
+    "two-methods": Part(
+        ("docs/figures/two_methods.py OUT/two_methods.png",), "two_methods.png", "figures"
+    ),
+    "tutorial": Part(
+        ("-m tools.transcripts docs/tutorial.md --keep OUT",), "first_*.png", "figures"
+    ),
     "measured": Part(
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),
