@@ -64,7 +64,6 @@ def test_the_right_reading_is_compatible_and_one_of_other_losses_is_excluded(mon
     assert sum(reading.verdict == "compatible" for reading in right) >= 17
     assert sum(reading.verdict == "excluded" for reading in wrong) >= 17
     assert all(reading.worst == (0.8, 0.07) for reading in wrong)
-    assert np.mean([r.log_likelihood for r in right]) > np.mean([r.log_likelihood for r in wrong])
 
 
 def test_the_probability_of_a_reading_is_that_of_its_draws(monkeypatch):
@@ -125,13 +124,14 @@ def test_a_power_law_with_a_cut_off_is_found():
 def test_verdicts_on_monotony_are_those_decided():
     def row(*steps):
         made = [
-            monotone.Step((0.9, 0.8), (1.0, 2.0), 0.1, 0.0, 0.2, rise, fall, 9)
+            monotone.Step((0.9, 0.8), 0.1, 0.0, 0.2, rise, fall, 9)
             for rise, fall in steps
         ]
         return monotone.Row(0.04, 0.8, "loss", tuple(made)).verdict
 
     assert row((0.01, 1.0), (0.02, 1.0)) == "rises"
-    assert row((1.0, 0.01), (1.0, 0.04)) == "falls"
+    assert row((1.0, 0.01), (1.0, 0.02)) == "falls"
+    assert row((1.0, 0.01), (1.0, 0.04)) == "open"
     assert row((0.01, 1.0), (1.0, 0.01)) == "not monotone"
     assert row((0.01, 1.0), (0.2, 0.8)) == "open"
     assert monotone._holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
