@@ -1,7 +1,8 @@
 """Loss against the amplitude of the profiles, at fixed H and γ; docs/study/plan.md.
 
-A profile c times as high at γ has the W~ of the profile at γ/c². Every cell is therefore placed at
-the height h = h_rms √(0.04/γ) of γ = 0.04 J/m², and its loss in J/m² is multiplied by 0.04/γ.
+A profile c times as high at γ has the W~ of the profile at γ/c², for small slopes: adhesion acts on
+the length sqrt(1 + h'²), so that the relative error is of the order of m2/2. Every cell is placed
+at the height h = h_rms √(0.04/γ) of γ = 0.04 J/m², and its loss in J/m² is multiplied by 0.04/γ.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.ensemble.interval import interval
 from tools.study import monotone
@@ -21,7 +23,8 @@ HURSTS, TURNS = (0.7, 0.8, 0.9), (0.6, 0.8, 0.9)
 # The campaigns of the plan in which amplitudes differ, and those that were known before it.
 NEW = ("amplitude", "amplitude_deep", "amplitude_large", "amplitude_largest")
 KNOWN = ("cells", "cells001")
-CHECK = "amplitude_same"
+# Loops at another γ, compared with those of NEW at the same height.
+CHECKS = ("amplitude_same", "weak")
 # Height of h_rms = 1 µm at the paper's three γ.
 OF_PAPER = {0.01: 2.0, 0.04: 1.0, 0.07: 0.7559}
 RESAMPLES, SEED = 2000, 1511
@@ -109,15 +112,25 @@ class Maximum:
     at_end: float
 
 
-def vertex(heights: Array, losses: Array) -> tuple[float, float, bool]:
-    """Return height and loss at the vertex of ln(loss) over ln(height), and if it is at an end."""
-    k = int(np.argmax(losses))
-    if k in (0, len(losses) - 1):
-        return float(heights[k]), float(losses[k]), True
-    x, y = np.log(heights[k - 1 : k + 2]), np.log(losses[k - 1 : k + 2])
-    curve = np.polyfit(x - x[1], y, 2)
-    place = -curve[1] / (2 * curve[0])
-    return float(np.exp(x[1] + place)), float(np.exp(np.polyval(curve, place))), False
+def vertices(heights: Array, losses: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Locate the vertex of ln(loss) over ln(height) at the largest loss of each row.
+
+    Returns height, loss, and whether the largest loss is at an end, where the vertex is that end.
+    """
+    place = np.argmax(losses, axis=1)
+    at_end = (place == 0) | (place == heights.size - 1)
+    middle = np.clip(place, 1, heights.size - 2)
+    each = np.arange(len(losses))
+    x, y = np.log(heights), np.log(losses)
+    before, after = x[middle] - x[middle - 1], x[middle + 1] - x[middle]
+    rise = (y[each, middle] - y[each, middle - 1]) / before
+    fall = (y[each, middle + 1] - y[each, middle]) / after
+    curvature = (fall - rise) / (before + after)
+    slope = (rise * after + fall * before) / (before + after)
+    curved = np.where(at_end, -1.0, curvature)
+    aside = np.where(at_end, 0.0, -slope / (2 * curved))
+    top = np.where(at_end, y[each, place], y[each, middle] + slope * aside / 2)
+    return np.exp(np.where(at_end, x[place], x[middle] + aside)), np.exp(top), at_end
 
 
 @cache
@@ -141,45 +154,83 @@ def maximum(study: Study, hurst: float, turn: float) -> Maximum | None:
         table = np.array([[one.get(r, 0.0) for one in losses.values()] for r in members])
         drawn = rng.multinomial(len(members), np.full(len(members), 1 / len(members)), RESAMPLES)
         sums += (drawn @ table) * np.array(held)
-    found = [vertex(heights, means) for means in sums / counts]
-    means = np.array([np.mean(list(one.values())) for one in losses.values()])
-    height, loss, _ = vertex(heights, means)
-    low, high = np.quantile([one[0] for one in found], [0.025, 0.975])
-    loss_low, loss_high = np.quantile([one[1] for one in found], [0.025, 0.975])
-    at_end = float(np.mean([one[2] for one in found]))
+    means = np.array([[np.mean(list(one.values())) for one in losses.values()]])
+    height, loss, _ = (float(one[0]) for one in vertices(heights, means))
+    places, tops, ends = vertices(heights, sums / counts)
+    low, high = np.quantile(places, [0.025, 0.975])
+    loss_low, loss_high = np.quantile(tops, [0.025, 0.975])
+    at_end = float(np.mean(ends))
     return Maximum(
         *(height, float(low), float(high)),
         *(loss / GAMMA, float(loss_low) / GAMMA, float(loss_high) / GAMMA, at_end),
     )
 
 
-def scaling(study: Study) -> Iterator[tuple[float, float, float, float, float, int]]:
-    """Loops at an equivalent work of adhesion against those computed directly.
+@dataclass(frozen=True)
+class Comparison:
+    """Loops at one γ against those of higher or lower profiles at γ = 0.04 J/m².
 
-    Yields height, turning point, largest relative difference of W~, largest ratio of a difference
-    to the sum of both estimated errors, largest such sum, and number of pairs.
+    Attributes
+    ----------
+    height, gamma, turn : float
+    pairs : int
+    slope : float
+        Half of the largest difference of m2 between the two.
+    mean, largest : float
+        Relative difference of W~, the higher γ over the lower one: its mean and its largest size.
+    error : float
+        Largest sum of both estimated relative errors.
     """
-    check = study.loops.where(campaign=CHECK)
-    heights = height_of(check["h_rms"], check["work_of_adhesion"])
-    for height in sorted(set(heights.tolist())):
-        for turn in TURNS:
-            differences, ratios, errors = [], [], []
-            keep = (heights == height) & np.isclose(check["max_penetration"], turn)
-            for k in np.flatnonzero(keep).tolist():
-                hurst, realisation = float(check["hurst"][k]), int(check["realisation"][k])
-                direct = series(study, hurst, turn, "loss_dimensionless").get(height, {})
-                error = series(study, hurst, turn, "loss_error").get(height, {})
-                loss = series(study, hurst, turn, "loss").get(height, {})
-                if realisation not in direct:
-                    continue
-                here = check["loss_error"][k] / check["loss"][k]
-                both = here + error[realisation] / loss[realisation]
-                difference = abs(direct[realisation] / check["loss_dimensionless"][k] - 1)
-                differences.append(difference)
-                errors.append(both)
-                ratios.append(difference / both)
-            if differences:
-                yield height, turn, max(differences), max(ratios), max(errors), len(differences)
+
+    height: float
+    gamma: float
+    turn: float
+    pairs: int
+    slope: float
+    mean: float
+    largest: float
+    error: float
+
+
+def scaling(study: Study) -> Iterator[Comparison]:
+    """Check the law of scaling loop by loop."""
+    for campaign in CHECKS:
+        rows = study.loops.where(campaign=campaign)
+        for gamma in rows.values("work_of_adhesion"):
+            for turn in TURNS:
+                here = rows.where(work_of_adhesion=gamma, max_penetration=turn)
+                if len(here):
+                    found = _compare(study, gamma, turn, here)
+                    if found is not None:
+                        yield found
+
+
+def _compare(study: Study, gamma: float, turn: float, here: Rows) -> Comparison | None:
+    height = float(height_of(here["h_rms"], here["work_of_adhesion"])[0])
+    differences, errors, slopes = [], [], []
+    for k in range(len(here)):
+        hurst, realisation = float(here["hurst"][k]), int(here["realisation"][k])
+        direct = {}
+        for campaign in NEW:
+            rows = _cells(study, hurst, turn).get((campaign, height))
+            if rows is not None:
+                direct = {int(r): i for i, r in enumerate(rows["realisation"])}
+                break
+        if rows is None or realisation not in direct:
+            continue
+        one = {n: rows[n][direct[realisation]] for n in rows.columns}
+        other = {n: here[n][k] for n in here.columns}
+        ratio = one["loss_dimensionless"] / other["loss_dimensionless"]
+        differences.append(ratio - 1 if gamma < GAMMA else 1 / ratio - 1)
+        slopes.append(abs(one["m2"] - other["m2"]) / 2)
+        errors.append(sum(r["loss_error"] / r["loss"] for r in (one, other)))
+    if not differences:
+        return None
+    largest = float(np.abs(differences).max())
+    return Comparison(
+        *(height, gamma, turn, len(differences), float(max(slopes))),
+        *(float(np.mean(differences)), largest, float(max(errors))),
+    )
 
 
 def largest_error(study: Study) -> float:

@@ -76,9 +76,8 @@ def of_amplitude(study: Study) -> Figure:
     """Loss in J/m² against the amplitude, with the maxima."""
     figure = new_figure(1, 3, TWO_COLUMNS, 72 * MM, sharex=True)
     for axes, turn in zip(figure.axes, amplitude.TURNS, strict=True):
-        _along_amplitude(axes, study, turn, "loss", 1e-3, turn == amplitude.TURNS[0])
-        axes.set_ylim(bottom=0)
-        top = axes.get_ylim()[1]
+        _along_amplitude(axes, study, turn, "loss", 1e-3, turn == amplitude.TURNS[-1])
+        top = 1.06 * axes.get_ylim()[1]
         for k, (hurst, (colour, marker)) in enumerate(OF_HURST.items()):
             found = amplitude.maximum(study, hurst, turn)
             if found is not None:
@@ -96,11 +95,11 @@ def of_amplitude(study: Study) -> Figure:
         above.set_xlabel(r"$m_2$ at $H$ = 0.8", fontsize="small", labelpad=2)
         above.tick_params(labelsize="x-small", pad=1)
         axes.text(
-            *(0.97, 0.97), rf"$\Delta_\mathrm{{max}} = {turn:g}\,h_\mathrm{{max}}$",
-            transform=axes.transAxes, ha="right", va="top",
+            *(0.03, 0.97), rf"$\Delta_\mathrm{{max}} = {turn:g}\,h_\mathrm{{max}}$",
+            transform=axes.transAxes, ha="left", va="top",
         )  # fmt: skip
     figure.axes[0].set_ylabel("loss (mJ/m²)")
-    figure.axes[0].legend(fontsize="small", loc="lower right", bbox_to_anchor=(1, 0.14))
+    figure.axes[2].legend(fontsize="small", loc="upper left", bbox_to_anchor=(0, 0.9))
     return figure
 
 
@@ -125,9 +124,9 @@ def of_amplitude_state(study: Study) -> Figure:
             _along_amplitude(axes, study, turn, name, unit, name == "loss_dimensionless")
             if name in ("loss_dimensionless", "patches_at_turn"):
                 axes.set_yscale("log")
-            else:
-                axes.set_ylim(bottom=0)
             _heights(axes)
+        if name not in ("loss_dimensionless", "patches_at_turn"):
+            line[0].set_ylim(0, 1.05 * line[0].get_ylim()[1])
     for axes, turn in zip(grid[0], amplitude.TURNS, strict=True):
         _label(axes, rf"$\Delta_\mathrm{{max}} = {turn:g}\,h_\mathrm{{max}}$")
     for axes in grid[-1]:

@@ -161,6 +161,9 @@ def steps_of(losses: dict[float, dict[int, float]]) -> tuple[Step, ...]:
 def _one_sided(differences: Array) -> tuple[float, float]:
     """Error probabilities of a rise and of a fall, by Student's t."""
     n = differences.size
+    if np.ptp(differences) == 0:
+        mean = float(differences.mean())
+        return (0.0 if mean > 0 else 1.0), (0.0 if mean < 0 else 1.0)
     t = differences.mean() / (differences.std(ddof=1) / np.sqrt(n))
     return float(stdtr(n - 1, -t)), float(stdtr(n - 1, t))
 

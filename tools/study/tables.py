@@ -215,11 +215,13 @@ def answer(study: Study) -> Table:
 def scaling(study: Study) -> Table:
     """Loops at an equivalent work of adhesion against those of higher or lower profiles."""
     rows = []
-    for height, turn, difference, ratio, error, pairs in amplitude.scaling(study):
-        numbers = f"{difference:.1e}", f"{error:.1e}", f"{ratio:.2f}"
-        rows.append([f"{height:.3g}", f"{turn:g}", f"{pairs}", *numbers])
-    header = ["h at γ = 0.04 (µm)", "Δ~max", "pairs of loops", "largest difference of W~"]
-    return [*header, "largest sum of both estimated errors", "largest ratio of the two"], rows
+    for one in amplitude.scaling(study):
+        place = f"{one.height:.3g}", f"{one.gamma:g}", f"{one.turn:g}", f"{one.pairs}"
+        differences = f"{100 * one.mean:+.2f} %", f"{100 * one.largest:.2f} %"
+        rows.append([*place, *differences, f"{100 * one.slope:.2f} %", f"{100 * one.error:.2f} %"])
+    header = ["h_rms at γ = 0.04 J/m² (µm)", "compared with 1 µm at γ =", "Δ~max", "pairs of loops"]
+    header += ["mean difference of W~", "largest", "half the difference of m2 (largest)"]
+    return [*header, "sum of the estimated errors (largest)"], rows
 
 
 def mechanisms(study: Study) -> Table:
