@@ -51,10 +51,10 @@ def _along_amplitude(
         series = amplitude.series(study, hurst, turn, name)
         if not series:
             continue
-        means = [np.mean(list(one.values())) / unit for one in series.values()]
-        axes.plot(list(series), means, color=colour, linewidth=0.7, alpha=0.6)
+        means = {h: np.mean(list(one.values())) / unit for h, one in series.items() if len(one) > 2}
+        axes.plot(list(means), list(means.values()), color=colour, linewidth=0.7, alpha=0.6)
         for k, (height, values) in enumerate(series.items()):
-            if len(values) > 1:
+            if len(values) > 2:
                 _points(
                     *(axes, height, list(values.values()), unit),
                     color=colour,
