@@ -17,6 +17,14 @@ class _Printable(Exception):
         return printable(super().__str__())
 
 
+_LONGEST = 80  # characters of a value that a message shows
+
+
+def quoted(text: str) -> str:
+    """Return the repr of a text, shortened for a message."""
+    return repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…")
+
+
 class InputError(_Printable, ValueError):
     """A bad value, file or option. The text names the value and the rule in one sentence.
 

@@ -84,7 +84,7 @@ class ProfileTable:
         number_in(NORMALISATIONS["m2"]), "mean square slope", None, axis="1"
     )
     c0: float | None = _key(
-        number_in(NORMALISATIONS["c0"]), "C0 = |a_n0|² in m²", None, axis="m2"
+        number_in(NORMALISATIONS["c0"]), "|a_n0|² in m², the same for every H (C0 of the spectrum)", None, axis="m2"
     )
     amplitudes: Amplitudes = _key(  # noqa: RUF009  # a field
         choice(*get_args(Amplitudes)),

@@ -26,6 +26,7 @@ from adhesis.ensemble.loop.record import (
     write_npz,
 )
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.ticker import log, ticking
 from adhesis.ensemble.trace.options import (
     delimiter_of,
@@ -59,6 +60,7 @@ def execute(args: argparse.Namespace) -> int:
     _check_files(args)
     with refused_as_input(vars(args)):
         profile, warnings = _profile(args)
+        source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
         problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control)
@@ -81,7 +83,15 @@ def execute(args: argparse.Namespace) -> int:
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
-            write_json(args.json, _document(results, warnings))
+            document = _document(results, warnings)
+            seed = (args.seed or 0) if source is None else None
+            document["provenance"] = provenance(args.words, source, seed, document)
+            write_json(args.json, document)
+    if args.csv is not None:
+        from adhesis.ensemble.loop.saved import write_csv  # loads pandas
+
+        with writing.output("--csv", args.csv):
+            write_csv(args.csv, results)
     if fields:
         with writing.output("--fields", args.fields):
             write_npz(args.fields, fields)
@@ -140,13 +150,14 @@ def _run(
 
 
 def _set_material(args: argparse.Namespace) -> None:
-    """Set the material's defaults; with heights of one's own there are none."""
+    """Set the material's defaults; with heights or a trace of one's own there are none."""
     missing = [name for name in _MATERIAL if getattr(args, name) is None]
-    if args.heights is not None and missing:
+    given_source = "--heights" if args.heights else "--trace" if args.trace else ""
+    if given_source and missing:
         options = ", ".join("--" + name.replace("_", "-") for name in missing)
         verb = "is" if len(missing) == 1 else "are"
         raise InputError(
-            f"{options} {verb} missing: with --heights the material has to be given "
+            f"{options} {verb} missing: with {given_source} the material has to be given "
             "(--work-of-adhesion in J/m², --young in Pa, --poisson)"
         )
     for name in missing:
@@ -166,7 +177,7 @@ def _check_files(args: argparse.Namespace) -> None:
         paths = {f"--{name}": getattr(args, name) for name in names}
         return {option: path for option, path in paths.items() if path is not None}
 
-    check_outputs(named("json", "fields", "figure", "film"), named("heights", "trace"))
+    check_outputs(named("json", "csv", "fields", "figure", "film"), named("heights", "trace"))
 
 
 def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:

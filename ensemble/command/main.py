@@ -25,6 +25,7 @@ from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
 from adhesis.ensemble.run.ranks import launched
 
 COMMANDS: dict[str, str] = {
+    "new": "write a commented campaign file to start from",
     "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
     "status": "what of a results file is pending, done and failed",
     "verify": "whether a results file is damaged, and which of its rows",
@@ -32,15 +33,18 @@ COMMANDS: dict[str, str] = {
     "report": "tables, curves and figures of a results file",
     "loop": "one loop of one profile",
     "trace": "a measured trace to its loss, with what is doubtful about it",
+    "sample": "write a sample trace, to try `trace` with",
     "validate": "the exact references: error against bound",
     "bench": "speed against error of each method",
     "warm": "compile both methods now, for all users of this installation",
     "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",
+    "completion": "write what lets a shell complete commands and options",
 }
 EXAMPLES = (
     "adhesis loop --hurst 0.8 --seed 1",
     "adhesis run jobs/example.toml --ranks 3",
 )
+_CAMPAIGNS = ("new", "run", "status", "verify", "merge", "report")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
 _OPTIONS = {"loop": "adhesis.ensemble.loop.arguments", "trace": "adhesis.ensemble.trace.arguments"}
 # What several processes of a launcher do with a command: the ranks of `run` share its work, and
@@ -83,9 +87,15 @@ def main(argv: list[str] | None = None) -> int:
     return 0 if code and hand_over(code) else code
 
 
+def module_of(name: str) -> str:
+    """Return the name of a command's module."""
+    folder = "campaigns." if name in _CAMPAIGNS else ""
+    return f"adhesis.ensemble.command.{folder}{name}"
+
+
 def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
-    module = importlib.import_module(_OPTIONS.get(name, f"adhesis.ensemble.command.{name}"))
+    module = importlib.import_module(_OPTIONS.get(name, module_of(name)))
     parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
     module.add_arguments(parser)
     return parser
@@ -134,7 +144,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
         return 0
     args.words = list(words)
     with naming_options():
-        code: int = importlib.import_module(f"adhesis.ensemble.command.{name}").execute(args)
+        code: int = importlib.import_module(module_of(name)).execute(args)
     return code
 
 

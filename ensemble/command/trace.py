@@ -7,8 +7,10 @@ import sys
 import time
 
 from adhesis.ensemble.errors import InputError, refused_as_input
+from adhesis.ensemble.loop.cycle import control_of, turning_points_of
 from adhesis.ensemble.loop.record import write_json
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
+from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
 from adhesis.ensemble.trace.plan import Plan, clock, make_plan
@@ -16,8 +18,11 @@ from adhesis.ensemble.trace.pool import Pool
 from adhesis.solver.model.half_space import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
-_FIGURES = ("trace.png", "spectrum.png", "loop.png", "cut-off.png", "tables.png")
-_FILES = ("trace.json", "trace.html", "trace.md", *_FIGURES)
+_FIGURES = ("trace", "spectrum", "loop", "cut-off", "tables")
+_FILES = (
+    *("trace.json", "trace.html", "trace.md"),
+    *(f"{name}.{suffix}" for name in _FIGURES for suffix in ("png", "pdf")),
+)
 
 
 def execute(args: argparse.Namespace) -> int:
@@ -27,13 +32,17 @@ def execute(args: argparse.Namespace) -> int:
     if args.processes is not None and args.processes < 1:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
     gammas = _numbers(args.work_of_adhesion, "--work-of-adhesion")
-    depths = _numbers(args.max_penetration, "--max-penetration")
     with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
-        cycle = make_cycle(half_space, gammas, depths, args.load_steps, args.method, args.accuracy)
+        control = control_of(args, half_space)
+        turns = turning_points_of(args, control)
+        cycle = make_cycle(
+            half_space, gammas, turns, args.load_steps, args.method, args.accuracy, control
+        )
     if args.to is not None:
         check_output_folder("--to", args.to, _FILES, {"the command": args.file})
     prepared = prepared_of(args, trace_of(args, args.file))
+    source = input_record(args.file)
     with refused_as_input(vars(args)):
         check(prepared, cycle)
     plan = make_plan(prepared, cycle, quick=args.quick, processes=args.processes)
@@ -53,7 +62,9 @@ def execute(args: argparse.Namespace) -> int:
     writing = Writing()
     with writing.output("--to", args.to / "trace.json"):
         args.to.mkdir(parents=True, exist_ok=True)
-        write_json(args.to / "trace.json", document(answer))
+        numbers = document(answer)
+        numbers["provenance"] = provenance(args.words, source, None, numbers)
+        write_json(args.to / "trace.json", numbers)
     with writing.output("--to", args.to / "trace.html"), staged_folder(args.to) as folder:
         write_page(answer, folder)
     print(summary(answer))
@@ -88,8 +99,7 @@ class _Progress:
             return
         self.last = now
         running = ", ".join(
-            f"{name} ({branch} {penetration:+.2f})"
-            for name, (_, branch, penetration) in pool.running.items()
+            f"{name} ({branch} {drive:+.3g})" for name, (_, branch, drive) in pool.running.items()
         )
         left = self._left(pool, now)
         line = f"{len(pool.done)} of {len(self.plan.runs)} loops"

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.quantities import in_works_of_adhesion, loss_over_work_of_adhesion
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
@@ -44,6 +45,7 @@ def loop_document(result: LoopResult) -> dict[str, Any]:
         "max_penetration": result.max_penetration,
         "load_steps": result.load_steps,
         "loss": result.loss,
+        **_relative(result.loss, result.problem),
         "loss_dimensionless": result.loss_dimensionless,
         "loss_from_drops": result.loss_from_drops,
         "audit_residual": result.audit_residual,
@@ -94,6 +96,7 @@ def path_document(result: PathResult, warnings: Sequence[str] = ()) -> dict[str,
         "out": result.ends_out,
         "load_steps": result.load_steps,
         "loss": result.work,
+        **_relative(result.work, result.problem),
         "loss_dimensionless": result.work / result.problem.loss_scale,
         "loss_from_drops": result.loss_from_drops,
         "energy_change": result.energy_change,
@@ -131,6 +134,11 @@ def _scene(problem: Problem) -> dict[str, Any]:
         "poisson": problem.half_space.poisson,
         "work_of_adhesion": problem.work_of_adhesion,
     }
+
+
+def _relative(loss: float, problem: Problem) -> dict[str, Any]:
+    ratio = loss_over_work_of_adhesion(loss, problem.work_of_adhesion)
+    return {"loss_over_work_of_adhesion": ratio}
 
 
 def _ranges(result: LoopResult | PathResult) -> dict[str, Any]:
@@ -178,7 +186,9 @@ def path_summary(result: PathResult) -> str:
     lines = [
         f"path        {way}{', out' if result.ends_out else ''} in {result.load_steps} load steps "
         "to the largest",
-        f"work        {result.work:.6g} J/m², of which {result.energy_change:.6g} J/m² are stored",
+        f"work        {result.work:.6g} J/m²"
+        f"{in_works_of_adhesion(result.work, result.problem.work_of_adhesion)}, of which "
+        f"{result.energy_change:.6g} J/m² are stored",
         _audit(result),
         _range(result),
     ]
@@ -212,7 +222,9 @@ def loop_summary(result: LoopResult) -> str:
             f"detached by {result.pull_off_penetration:.4g} h_max; "
             f"largest contact fraction {result.contact_fraction.max():.4g}, "
             f"most patches {result.patches.max()}",
-            f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
+            f"loss        {result.loss:.6g} J/m²"
+            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)} "
+            f"(dimensionless {result.loss_dimensionless:.6g})",
             _range(result),
             _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import xarray as xr
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.quantities import UNITS
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult
@@ -32,23 +34,6 @@ _KINDS: dict[str, type[Result]] = {"loop": LoopResult, "path": PathResult}
 _KIND = "adhesis_result"
 _NOT_KEPT = {"problem", "method", "contact_states", "new_method"}
 _PARTS: dict[str, tuple[str, type]] = {"jumps": ("jump", Jump), "minor_loops": ("minor", MinorLoop)}
-_UNITS = {
-    "separation": "m",
-    "mean_stress": "Pa",
-    "elastic_energy": "J/m",
-    "adhesion_energy": "J/m",
-    "potential": "J/m",
-    "energy": "J/m",
-    "energy_drop": "J/m²",
-    "at_stake": "J/m²",
-    "patch_length": "m",
-    "loss": "J/m²",
-    "loss_from_drops": "J/m²",
-    "energy_change": "J/m²",
-    "stress_change": "Pa",
-    "coefficient_real": "m",
-    "coefficient_imag": "m",
-}
 _COLUMNS = ("penetration", "separation", "mean_stress", "contact_fraction", "patches")
 
 
@@ -89,7 +74,7 @@ def to_dataframe(result: Result, of: str) -> pd.DataFrame:
         if isinstance(result, PathResult):
             columns |= {"potential": result.potential, "leg": result.leg}
     table = pd.DataFrame(columns)
-    table.attrs["units"] = {name: _UNITS.get(name, "") for name in columns}
+    table.attrs["units"] = {name: UNITS.get(name, "") for name in columns}
     return table
 
 
@@ -142,10 +127,29 @@ def _typed(values: list[Any], part: type, name: str) -> Any:
 
 
 def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str]]:
-    return dim, values, {"units": _UNITS.get(name, "1")}
+    return dim, values, {"units": UNITS.get(name, "1")}
 
 
 # ---------------------------------------------------------------------- files
+
+
+def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
+    """Write the states as a CSV, one row each, with units in the header (OSError).
+
+    Of several loops the first column is the turning point.
+    """
+    several = [results] if isinstance(results, PathResult) else results
+    tables = [to_dataframe(result, "states") for result in several]
+    units = tables[0].attrs["units"] | {"penetration": "h_max"}
+    if not isinstance(results, PathResult) and len(results) > 1:
+        units["turning_point"] = "Pa" if results[0].problem.control.is_load else "h_max"
+        for table, result in zip(tables, results, strict=True):
+            table.insert(0, "turning_point", result.turning_point)
+    for table in tables:
+        table.attrs.clear()  # pandas compares them when it joins tables
+    names = {name: f"{name} ({unit})" if unit else name for name, unit in units.items()}
+    with whole_file(path) as stream:
+        pd.concat(tables).rename(columns=names).to_csv(stream, index=False)
 
 
 def save(result: Result, path: str | os.PathLike[str]) -> None:

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.solver.loading.loop import Progress
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
@@ -80,7 +81,11 @@ def page(result: Result) -> str:
     else:
         value = result.loss
     rows = [
-        (name, f"{value:.5g} ± {result.loss_error:.1g} J/m²"),
+        (
+            name,
+            f"{value:.5g} ± {result.loss_error:.1g} J/m²"
+            f"{in_works_of_adhesion(value, problem.work_of_adhesion)}",
+        ),
         ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
         ("jumps", str(len(result.jumps))),
         ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),

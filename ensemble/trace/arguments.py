@@ -10,6 +10,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from adhesis.ensemble.lengths import length
+
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
     "adhesis trace trace.csv --work-of-adhesion 0.02,0.04 --young 1e6 --poisson 0.5 --plan",
@@ -24,14 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--work-of-adhesion",
         required=True,
         metavar="G",
-        help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others a table",
+        help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others make a "
+        "table, as of several turning points",
     )
     contact.add_argument("--young", type=float, required=True, metavar="E", help="Pa")
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
-    contact.add_argument(
-        "--max-penetration", default="0.9", metavar="D", help="Δ/h_max, or several (default 0.9)"
-    )
-    contact.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+    add_cycle_arguments(contact)
     contact.add_argument(
         "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
     )
@@ -47,13 +47,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
 
+def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
+    """Declare turning points and control, which ``adhesis loop`` shares."""
+    group.add_argument(
+        "--max-penetration",
+        metavar="D[,D…]",
+        help="turning points in h_max (default 0.9); with --stiffness those of the far side, "
+        "u_tot/h_max",
+    )
+    group.add_argument(
+        "--max-stress",
+        metavar="P[,P…]",
+        help="instead, under a load (--stiffness 0): turning points in Pa",
+    )
+    group.add_argument(
+        "--stiffness",
+        type=float,
+        metavar="K",
+        help="Pa/m of nominal area of what holds the solid; 0 is load control "
+        "(default: fixed separation)",
+    )
+    group.add_argument(
+        "--layer",
+        type=length,
+        metavar="D",
+        help="instead: the stiffness of a layer of this thickness, 1mm",
+    )
+    group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+
+
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare how a trace is read and prepared; ``adhesis loop --trace`` shares them."""
     reading = parser.add_argument_group("reading a trace")
     reading.add_argument(
         "--unit", metavar="U", help="unit of a text: um, or mm,um for positions and heights"
     )
-    reading.add_argument("--step", metavar="S", help="step, for heights without positions: 0.5um")
+    reading.add_argument(
+        "--step", type=length, metavar="S", help="step, for heights without positions: 0.5um"
+    )
     reading.add_argument("--columns", metavar="X,Z", help="columns of a text, from 1")
     reading.add_argument("--delimiter", metavar="C", help="of a text, if it is not found out")
     reading.add_argument("--decimal", choices=[",", "."], help="decimal sign, if not found out")
@@ -64,11 +95,19 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--degree", type=int, metavar="N", help="polynomial taken off (default 1, or as is seen)"
     )
     making.add_argument(
-        "--cut-off", metavar="W", help="shortest wave kept (default from step, noise and tip)"
+        "--cut-off",
+        type=length,
+        metavar="W",
+        help="shortest wave kept: 5um (default from step, noise and tip)",
     )
-    making.add_argument("--tip-radius", metavar="R", help="of the stylus or probe: 2um")
     making.add_argument(
-        "--longest-gap", metavar="G", help="drop-outs up to this length are interpolated"
+        "--tip-radius", type=length, metavar="R", help="of the stylus or probe: 2um"
+    )
+    making.add_argument(
+        "--longest-gap",
+        type=length,
+        metavar="G",
+        help="drop-outs up to this length are interpolated: 20um",
     )
     making.add_argument("--keep-outliers", action="store_true", help="leave spikes in")
     making.add_argument("--invert", action="store_true", help="z points into the sample: turn it")

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.trace.units import METRES, unit_named
+from adhesis.ensemble.lengths import METRES, unit_named
 from adhesis.solver.model.profile import Array
 
 HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"

@@ -10,16 +10,11 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
+from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
 from adhesis.ensemble.trace.containers import beginning, container
 from adhesis.ensemble.trace.instrument import HINT, UnknownFormatError, available, read_scan
 from adhesis.ensemble.trace.text import Table, read_table
-from adhesis.ensemble.trace.units import (
-    METRES,
-    length_text,
-    parse_units,
-    step_of_header,
-    units_of_header,
-)
+from adhesis.ensemble.trace.units import parse_units, step_of_header, units_of_header
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
@@ -32,8 +27,8 @@ TEXT = frozenset(("txt", "csv", "tsv", "dat", "asc", "prn", "xy", "xyz", "tab", 
 
 # Positions may scatter about equal steps by this share of a step; heights are then interpolated.
 _UNEVEN = 0.10
-# Without a unit, numbers are taken as metres only up to these lengths, steps and heights (m).
-_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES, _HIGHEST_IN_METRES = 0.02, 2e-5, 1e-3
+# Without a unit, numbers are taken as metres only up to these lengths and steps (m).
+_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES = 0.02, 2e-5
 # Beyond these limits (m, m, median slope) the unit is wrong.
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
 # A repeated height that lies this many ranges of the other heights outside them stands for a
@@ -322,7 +317,7 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     heights = columns[-1][np.isfinite(columns[-1])]
     if (
         heights.size == 0
-        or np.percentile(heights, 99) - np.percentile(heights, 1) > _HIGHEST_IN_METRES
+        or np.percentile(heights, 99) - np.percentile(heights, 1) > HIGHEST_IN_METRES
     ):
         return False
     if len(columns) == 1:

@@ -6,6 +6,7 @@ script, so it works from a notebook as well as from the command line.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import signal
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.ensemble.quantities import loss_over_work_of_adhesion
 from adhesis.ensemble.run.launch import end_with_parent
 from adhesis.solver.values import ByValue
 
@@ -44,10 +46,11 @@ class Job(ByValue):
     young: float
     poisson: float
     work_of_adhesion: float
-    max_penetration: float
+    turning_point: float
     load_steps: int
     method: MethodName
     accuracy: float
+    stiffness: float = math.inf
 
 
 def main() -> None:
@@ -76,6 +79,7 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.loading.zero_range import range_warnings
     from adhesis.solver.method import Branch, ContactState
+    from adhesis.solver.model.control import Control
     from adhesis.solver.model.half_space import HalfSpace
     from adhesis.solver.model.problem import Problem
     from adhesis.solver.model.profile import Profile
@@ -91,17 +95,16 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
             report(branch, penetration)
 
     profile = Profile(job.period, job.coefficients)
-    problem = Problem(profile, HalfSpace(job.young, job.poisson), job.work_of_adhesion)
+    half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
+    problem = Problem(profile, half_space, job.work_of_adhesion, control)
     method = make_method(job.method, problem, accuracy=job.accuracy)
-    loop = run_loop(
-        method,
-        max_penetration=job.max_penetration,
-        load_steps=job.load_steps,
-        progress=progress,
-    )
+    name = "max_stress" if control.is_load else "max_penetration"
+    turn: Any = {name: job.turning_point}
+    loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
     return {
         "loss": loop.loss,
+        "loss_over_work_of_adhesion": loss_over_work_of_adhesion(loop.loss, job.work_of_adhesion),
         "loss_dimensionless": loop.loss_dimensionless,
         "loss_from_drops": loop.loss_from_drops,
         "audit_residual": loop.audit_residual,

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
+import re
+import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import adhesis
 import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.provenance import provenance
+from adhesis.ensemble.quantities import units_of
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
 MODULUS = 1e6 / 0.75
@@ -76,9 +84,118 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
     assert data["loss"] == pytest.approx(loss, rel=1e-12)
     assert set(data["branch"]) == {"loading", "unloading"}
     text = capsys.readouterr()
-    assert f"{data['loss']:.6g} J/m²" in text.out
+    assert data["loss_over_work_of_adhesion"] == data["loss"] / GAMMA
+    assert f"{data['loss']:.6g} J/m², {data['loss'] / GAMMA:.4g} γ (dimensionless" in text.out
     assert str(out) in text.out
     assert "unloading" in text.err
+
+
+# Units of what a JSON document may hold; a number that is none of these is dimensionless.
+DIMENSIONAL = {
+    "m": {"h_max", "h_rms", "period", "separation", "patch_length", "valid_range", "edge_range"},
+    "m²": {"m0"},
+    "1/m²": {"m4"},
+    "Pa": {"young", "mean_stress", "pull_off_stress", "largest_interior_tension"},
+    "J/m": {"energy", "elastic_energy", "adhesion_energy"},
+    "J/m²": {
+        *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),
+        *("energy_at_stake", "work_gained", "work_spent", "full_contact_energy"),
+        *("effective_work_of_approach", "effective_work_of_separation"),
+    },
+    "Pa/m": {"stiffness"},
+    "s": {"seconds"},
+}
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_provenance_is_that_of_program_command_and_input(wave_file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = wave_words(wave_file, "--load-steps", 3, "--json", "o.json", "--quiet")
+    assert run(*words) == 0
+    data = json.loads(Path("o.json").read_text())
+    found = data["provenance"]
+    assert found["command"] == shlex.join(["adhesis", "loop", *map(str, words)])
+    assert found["input"] == {
+        "file": str(wave_file),
+        "bytes": wave_file.stat().st_size,
+        "sha256": hashlib.sha256(wave_file.read_bytes()).hexdigest(),
+    }
+    assert found["seed"] is None
+    assert found["adhesis_version"] == adhesis.__version__
+    assert {"commit", "python", "numpy", "numba", "processor", "date"} <= found.keys()
+    units = found["units"]
+    assert units["states.mean_stress"] == units["mean_stress"] == "Pa"
+    assert units["jumps.energy_drop"] == units["loss"] == "J/m²"
+    assert units["turning_point"] == units["penetration"] == units["m2"] == "1"
+    by_unit: dict[str, set[str]] = {}
+    for name, unit in units.items():
+        by_unit.setdefault(unit, set()).add(name.rpartition(".")[2])
+    dimensionless = by_unit.pop("1")
+    assert {unit: names - DIMENSIONAL[unit] for unit, names in by_unit.items()} == {
+        unit: set() for unit in by_unit
+    }
+    assert dimensionless & set().union(*DIMENSIONAL.values()) == set()
+    numbers = {name for name, value in data.items() if isinstance(value, int | float)}
+    assert numbers - units.keys() == set()
+
+
+def test_the_seed_is_kept_and_turning_points_of_a_load_are_in_pa():
+    document = {"stiffness": 0.0, "turning_point": 500.0, "minor_loops": [{"start": 1.0}]}
+    units = units_of(document)
+    assert units == {"stiffness": "Pa/m", "turning_point": "Pa", "minor_loops.start": "Pa"}
+    assert provenance(["loop"], None, 3, document)["seed"] == 3
+    assert provenance(["loop"], None, 3, document)["input"] is None
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_the_curve_as_csv_has_units_in_its_header(wave_file, tmp_path):
+    out, table = tmp_path / "o.json", tmp_path / "o.csv"
+    words = ("--load-steps", 4, "--json", out, "--csv", table, "--quiet")
+    assert run(*wave_words(wave_file, *words)) == 0
+    data = json.loads(out.read_text())
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0])[:5] == [
+        *("branch", "load_step", "penetration (h_max)", "separation (m)", "mean_stress (Pa)")
+    ]
+    for column, key in (("mean_stress (Pa)", "mean_stress"), ("energy (J/m)", "energy")):
+        assert [float(row[column]) for row in rows] == data[key]
+    assert [row["branch"] for row in rows] == data["branch"]
+    assert run(*wave_words(wave_file, *words, "--max-penetration", "0.3,0.6")) == 0
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["turning_point (h_max)"] for row in rows} == {"0.3", "0.6"}
+    assert run(*wave_words(wave_file, *words, "--path", "0.5,0.2,out")) == 0
+    with table.open(newline="") as stream:
+        assert {row["leg"] for row in csv.DictReader(stream)} == {"0", "1"}
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_a_figure_as_pdf_has_truetype_fonts_and_mathematics(wave_file, tmp_path):
+    figure = tmp_path / "loop.pdf"
+    assert run(*wave_words(wave_file, "--load-steps", 3, "--figure", figure, "--quiet")) == 0
+    assert "Type3" not in fonts_of(figure)
+    loop = adhesis.run_loop(
+        ExactWave(adhesis.Problem(adhesis.single_wave(1e-9, 1e-3), HALF_SPACE, GAMMA)),
+        max_penetration=0.5,
+        load_steps=2,
+    )
+    drawn = loop.plot()
+    drawn.savefig(tmp_path / "plot.pdf")  # as a user of the library does, without the style
+    assert "Type3" not in fonts_of(tmp_path / "plot.pdf")
+    labels = {axes.get_xlabel() for axes in drawn.axes} | {axes.get_ylabel() for axes in drawn.axes}
+    assert labels == {
+        r"penetration $\Delta/h_{\max}$",
+        r"mean stress $\bar p$ (kPa)",
+        "contact fraction $A/A_0$",
+    }
+
+
+def fonts_of(path):
+    """Return the types of the fonts of a PDF."""
+    fonts = re.findall(rb"/Subtype\s*/(Type0|Type1|Type3|TrueType|CIDFontType2)", path.read_bytes())
+    assert fonts
+    return {name.decode() for name in fonts}
 
 
 @pytest.mark.usefixtures("exact_method")
@@ -122,7 +239,7 @@ def test_a_csv_is_the_same_as_a_npy(wave_file, tmp_path):
         out = tmp_path / f"{i}.json"
         assert run(*wave_words(path, "--load-steps", 5, "--json", out, "--quiet")) == 0
         documents.append(json.loads(out.read_text()))
-        del documents[-1]["seconds"]
+        del documents[-1]["seconds"], documents[-1]["provenance"]
     assert documents[0] == documents[1] == documents[2]
 
 

@@ -12,7 +12,6 @@ import pytest
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.read import Trace, read_trace
-from adhesis.ensemble.trace.units import length_text, parse_length
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -236,16 +235,6 @@ def test_refusals_of_files(tmp_path: Path) -> None:
         read_trace(tmp_path / "c.txt")
 
 
-def test_lengths_of_options() -> None:
-    assert parse_length("2.5um", "--x") == pytest.approx(2.5e-6)
-    assert parse_length("1e-6", "--x") == 1e-6
-    assert length_text(5e-6) == "5 µm"
-    assert length_text(2e-3) == "2 mm"
-    for text in ("-1um", "5 parsec", "um", "nan", "0"):
-        with pytest.raises(InputError):
-            parse_length(text, "--x")
-
-
 CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
 
 
@@ -255,7 +244,18 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
         (["--plan"], "states no unit"),
         (["--plan", "--unit", "um", "--columns", "1"], "--columns"),
         (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
-        (["--plan", "--unit", "um", "--tip-radius", "5"], "trusted from 50 µm on (what a tip of"),
+        (["--plan", "--unit", "um", "--tip-radius", "5"], "--tip-radius is 5, which would be 5 m"),
+        (["--plan", "--unit", "um", "--tip-radius", "5m"], "trusted from 50 µm on (what a tip of"),
+        (["--plan", "--unit", "um", "--tip-radius=-1um"], "--tip-radius is -1e-06: it must be"),
+        (["--plan", "--unit", "um", "--cut-off", "nan"], "--cut-off is nan: it must be"),
+        (["--plan", "--unit", "um", "--longest-gap", "5 parsec"], "'parsec' is no unit of length"),
+        (["--plan", "--unit", "um", "--max-stress", "5"], "give --stiffness 0 with it"),
+        (["--plan", "--unit", "um", "--stiffness", "0"], "(--stiffness 0) needs --max-stress"),
+        (["--plan", "--unit", "um", "--stiffness", "0", "--max-stress", "0"], "--max-stress is 0"),
+        (
+            ["--plan", "--unit", "um", "--stiffness", "1", "--layer", "1mm"],
+            "--stiffness and --layer are given: give one of them",
+        ),
         (["--plan", "--unit", "um", "--degree", "9"], "--degree is 9"),
         (["--plan", "--unit", "um", "--max-penetration", "1.5"], "--max-penetration is 1.5"),
         (["--plan", "--unit", "um", "--max-penetration", "deep"], "--max-penetration is 'deep'"),

@@ -1,0 +1,81 @@
+"""Units of the numbers that commands write, and the loss in units of the work of adhesion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+_NAMES = {
+    "m": "h_max h_rms period separation patch_length valid_range edge_range position step length "
+    "height_range tip_radius cut_off noise longest highest rise form_height rms_level noise_rms "
+    "limit_step limit_noise limit_tip coefficient_real coefficient_imag",
+    "m²": "m0",
+    "1/m²": "m4",
+    "m³": "power floor",
+    "rad/m": "wave_number",
+    "Pa": "young mean_stress pull_off_stress stress_change max_stress tension "
+    "largest_interior_tension",
+    "Pa/m": "stiffness",
+    "J/m": "energy elastic_energy adhesion_energy potential",
+    "J/m²": "work_of_adhesion loss loss_from_drops loss_error energy_drop at_stake energy_at_stake "
+    "energy_change work_gained work_spent effective_work_of_approach effective_work_of_separation "
+    "full_contact_energy",
+    "s": "seconds expected_seconds wall",
+}
+UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
+"""Unit by the name of a quantity; others are dimensionless (penetrations are in units of h_max)."""
+
+# Of the turning points: in Pa under a load, else dimensionless.
+_TURNING = ("turning_point", "turning_points", "start", "turn")
+# Not listed: settings of a method, which its documentation describes, and loops with the keys of
+# the whole document.
+_LEFT_OUT = ("method_details", "turns", "provenance")
+
+
+def units_of(document: Mapping[str, Any]) -> dict[str, str]:
+    """Return the unit of every number of a JSON document; "1" if it is dimensionless.
+
+    The keys are paths ("jumps.energy_drop"), entries of a list have one of them.
+    """
+    found: dict[str, str] = {}
+    turning = "Pa" if document.get("stiffness") == 0 else "1"
+
+    def visit(path: tuple[str, ...], value: Any) -> None:
+        if isinstance(value, Mapping):
+            for name, part in value.items():
+                visit((*path, name), part)
+        elif isinstance(value, list | tuple):
+            parts = [part for part in value if isinstance(part, Mapping | list | tuple)]
+            for part in parts or value[:1]:
+                visit(path, part)
+        elif value is None and path[-1] not in UNITS:
+            pass  # unknown whether it would be a number
+        elif value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
+            found[".".join(path)] = turning if path[-1] in _TURNING else _unit(path)
+
+    for name, value in document.items():
+        if name not in _LEFT_OUT:
+            visit((name,), value)
+    return found
+
+
+def _unit(path: tuple[str, ...]) -> str:
+    name, parent = path[-1], path[-2] if len(path) > 1 else ""
+    if parent == "doubts":
+        return "1"
+    if parent == "cut_off_limits":
+        return UNITS["cut_off"]
+    if name in ("value", "uncertainty"):
+        return UNITS.get(parent, "1")
+    return UNITS.get(name, "1")
+
+
+def loss_over_work_of_adhesion(loss: float, work_of_adhesion: float) -> float | None:
+    """Return W/γ; None without adhesion."""
+    return loss / work_of_adhesion if work_of_adhesion > 0 else None
+
+
+def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
+    """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
+    ratio = loss_over_work_of_adhesion(loss, work_of_adhesion)
+    return "" if ratio is None else f", {ratio:.4g} γ"
