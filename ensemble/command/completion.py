@@ -1,4 +1,4 @@
-"""Write what lets a shell complete commands and options of adhesis with the tab key.
+"""Print the code with which a shell completes commands and options at the tab key.
 
 For bash add ``source <(adhesis completion bash)`` to ~/.bashrc, for zsh
 ``source <(adhesis completion zsh)`` to ~/.zshrc, after compinit.

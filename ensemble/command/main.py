@@ -27,18 +27,18 @@ from adhesis.ensemble.run.ranks import launched
 COMMANDS: dict[str, str] = {
     "new": "write a commented campaign file to start from",
     "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
-    "status": "what of a results file is pending, done and failed",
-    "verify": "whether a results file is damaged, and which of its rows",
+    "status": "report which tasks of a results file are pending, done and failed",
+    "verify": "check whether a results file is damaged, and which of its rows",
     "merge": "join the results files of parts, as --part has made them, into one",
-    "report": "tables, curves and figures of a results file",
-    "loop": "one loop of one profile",
-    "trace": "a measured trace to its loss, with what is doubtful about it",
+    "report": "write tables, curves and figures of a results file",
+    "loop": "compute one loop of one profile",
+    "trace": "compute the loss of a measured trace, and its uncertainty",
     "sample": "write a sample trace, to try `trace` with",
-    "validate": "the exact references: error against bound",
-    "bench": "speed against error of each method",
+    "validate": "compare the methods with exact references: error against bound",
+    "bench": "measure the speed of each method against its error",
     "warm": "compile both methods now, for all users of this installation",
-    "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",
-    "completion": "write what lets a shell complete commands and options",
+    "doctor": "report which MPI, HDF5, FFTW and writer this installation uses, and why",
+    "completion": "print the code with which a shell completes commands and options",
 }
 EXAMPLES = (
     "adhesis loop --hurst 0.8 --seed 1",
@@ -167,7 +167,7 @@ def _termination(*, enabled: bool) -> Iterator[None]:
 
 
 def _overview() -> Parser:
-    listing = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
+    listing = "\n".join(f"  {name:<12}{text}" for name, text in COMMANDS.items())
     parser = Parser(
         "adhesis",
         "Hysteresis loops of rough contacts with zero-range (JKR) adhesion.\n\n"

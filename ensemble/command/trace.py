@@ -28,7 +28,7 @@ _FILES = (
 def execute(args: argparse.Namespace) -> int:
     """Read, plan, run, write; returns the exit code."""
     if args.to is None and not args.plan:
-        raise InputError("give --to, the directory for the page, or --plan")
+        raise InputError("--to is missing: give the directory for the page, or --plan for none")
     if args.processes is not None and args.processes < 1:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
     gammas = _numbers(args.work_of_adhesion, "--work-of-adhesion")
@@ -78,9 +78,11 @@ def _numbers(text: str, option: str) -> list[float]:
     try:
         values = [float(word) for word in str(text).split(",")]
     except ValueError:
-        raise InputError(f"{option} is {text!r}: one number, or several with commas") from None
+        raise InputError(
+            f"{option} is {text!r}: it must be one number, or several with commas"
+        ) from None
     if len(set(values)) < len(values):
-        raise InputError(f"{option} is {text!r}: it names a value twice")
+        raise InputError(f"{option} is {text!r}: its values must differ")
     return values
 
 

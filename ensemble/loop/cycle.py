@@ -53,7 +53,7 @@ class Cycle:
             If it breaks a rule, which the message gives.
         """
         if self.is_path:
-            check_path(self.turning_points, self.load_steps, problem)
+            check_path(self.turning_points, self.load_steps, problem, self.out)
         for turn in () if self.is_path else self.turning_points:
             check_cycle(turn, self.load_steps, self.control)
 

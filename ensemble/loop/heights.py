@@ -114,8 +114,8 @@ def _unit_of(path: Path, table: Table, given: str | None) -> str | None:
     if given is not None:
         if found not in (None, given):
             raise InputError(
-                f"--unit is {given} and the header of {path} has heights in {found}: take the "
-                "wrong one out"
+                f"--unit is {given} and the header of {path} has heights in {found}: correct the "
+                "wrong one"
             )
         return given
     if found is not None:

@@ -1,7 +1,7 @@
-"""A measured trace to its loss, with what is doubtful about it.
+"""Compute the loss of a measured trace, and its uncertainty.
 
-Reads a text of one or two columns, or an instrument's file, says what it read, makes one period of
-it step by step, runs the loop and what could have been decided otherwise, and writes one page.
+The trace is a text of one or two columns, or an instrument's file. One period of a profile is made
+of it, its loop is run and those that other decisions would have given, and one page is written.
 Lengths are in m unless they carry a unit (5um), stresses in Pa.
 """
 
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_reading_arguments(parser)
     output = parser.add_argument_group("output")
     output.add_argument("--to", type=Path, metavar="DIR", help="for the page, its figures and JSON")
-    output.add_argument("--plan", action="store_true", help="say what would be done, do nothing")
+    output.add_argument("--plan", action="store_true", help="print the plan, and stop")
     output.add_argument(
         "--quick", action="store_true", help="without tables of γ and turning point"
     )

@@ -27,7 +27,7 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
             columns = [int(word) for word in args.columns.split(",")]
         except ValueError:
             raise InputError(
-                f"--columns is {args.columns!r}: two whole numbers, as in 1,3"
+                f"--columns is {args.columns!r}: it must be two whole numbers, as in 1,3"
             ) from None
     return read_trace(
         path,

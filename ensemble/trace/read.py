@@ -225,14 +225,14 @@ def _from_table(
     if wanted is not None:
         if len(wanted) != 2 or not all(1 <= w <= len(columns) for w in wanted):
             raise InputError(
-                f"{parameter('columns')} is {','.join(map(str, wanted))}: positions and heights, "
-                f"two of the {len(columns)} columns of {path}"
+                f"{parameter('columns')} is {','.join(map(str, wanted))}: it must name two of the "
+                f"{len(columns)} columns of {path}, those of positions and heights, as in 1,2"
             )
         columns = columns[[w - 1 for w in wanted]]
         fields = [tuple(row[w - 1] for w in wanted) for row in fields]
     elif len(columns) > 2:
         raise InputError(
-            f"{path} has {len(columns)} columns: {parameter('columns')} X,Z says which are "
+            f"{path} has {len(columns)} columns: give {parameter('columns')} X,Z, those of "
             "positions and heights"
         )
     if columns.shape[1] < MIN_POINTS:
@@ -264,7 +264,7 @@ def _from_table(
         if step is None:
             raise InputError(
                 f"{path} has heights without positions, and its header states no step: "
-                f"give {parameter('step')}"
+                f"give {parameter('step')}, as in 0.5um"
             )
         said.append(f"step {length_text(step, 6)} (header)")
     return _checked(Trace(path, heights, float(step), tuple(said)))
@@ -288,8 +288,8 @@ def _units(
         for name, known, wanted in zip(("positions", "heights"), found, given, strict=True):
             if known not in (None, wanted) and not (len(columns) == 1 and name == "positions"):
                 raise InputError(
-                    f"{parameter('unit')} says {wanted} and the header of {path} {known} for the "
-                    f"{name}: take the wrong one out"
+                    f"{parameter('unit')} is {wanted} for the {name}, and the header of {path} "
+                    f"has {known}: correct the wrong one"
                 )
         return given, parameter("unit")
     if found[0] is not None and found[1] is not None:
@@ -375,7 +375,9 @@ def _even(
     elif np.any(steps <= 0):
         back = int(np.argmax(steps <= 0)) + 1
         word = "stand still" if steps[back - 1] == 0 else "turn back"
-        raise InputError(f"the positions {word} at {place(back)}: a trace goes one way")
+        raise InputError(
+            f"the positions {word} at {place(back)}: they must rise or fall throughout"
+        )
     middle = float(np.median(steps))
     apart = np.rint(steps / middle).astype(int)
     if apart.sum() > 4 * heights.size or apart.min() < 1:
@@ -415,7 +417,9 @@ def _checked(trace: Trace) -> Trace:
     if good.size < MIN_POINTS:
         raise InputError(f"{trace.path} holds {good.size} heights: at least {MIN_POINTS}")
     if np.ptp(good) == 0:
-        raise InputError(f"{trace.path}: every height is {good[0]:g} m: a flat trace has no loss")
+        raise InputError(
+            f"every height of {trace.path} is {good[0]:g} m: a flat trace has no loss"
+        )
     if not _SHORTEST <= trace.length <= _LONGEST:
         raise InputError(
             f"{trace.path} would be {trace.length:.3g} m long: is its unit right "

@@ -73,16 +73,23 @@ BAD = {
         ("c.toml --out text", "is not a results file"),
         ("c.toml --ranks 100000", f"at most {launch.largest_number_of_ranks()} are started here"),
         *((f"c.toml --ranks {bad}", f"--ranks is '{bad}'") for bad in ("x", "0", "-1", "nan")),
-        *((f"c.toml --walltime {bad}", f"walltime is '{bad}'") for bad in ("x", "0", "-1", "nan")),
+        *(
+            (f"c.toml --walltime {bad}", f"--walltime is '{bad}': it must")
+            for bad in ("x", "0", "-1", "nan")
+        ),
         *(
             (f"c.toml {option} {bad}", f"{option} is '{bad}'")
             for option in ("--max-failures", "--patience")
             for bad in ("x", "-1", "nan", "1e99", "inf")
         ),
-        *((f"c.toml --out p.h5 --part {bad}", bad) for bad in ("x", "0/3", "4/3", "1/0")),
+        *(
+            (f"c.toml --out p.h5 --part {bad}", f"--part is '{bad}': it must be K/N")
+            for bad in ("x", "0/3", "4/3", "1/0")
+        ),
         ("c.toml --part 1/2", "--part needs --out"),
         ("c.toml --redo some", "--redo is 'some'"),
-        ("c.toml --hurst 0.7", "choose among --redo"),
+        ("c.toml --hurst 0.7", "--hurst needs --redo: it chooses the tasks to compute again"),
+        ("c.toml --realisation 1", "--realisation needs --redo"),
         *(
             (f"c.toml --redo all {option} {bad}", f"{option} is '{bad}'")
             for option in ("--hurst", "--work-of-adhesion", "--realisation")
@@ -135,7 +142,11 @@ BAD = {
         ("--to text/below", "--to is text/below: "),
     ],
     "warm": [("--own 3", "unrecognized arguments: 3")],
-    "doctor": [("--in none", "--in none"), ("--in text", "--in text"), ("--in ''", "--in is ''")],
+    "doctor": [
+        ("--in none", "--in is none: it must be a folder that can be written"),
+        ("--in text", "--in is text: it must be a folder"),
+        ("--in ''", "--in is ''"),
+    ],
 }
 
 

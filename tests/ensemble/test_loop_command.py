@@ -165,9 +165,9 @@ def test_the_curve_as_csv_has_units_in_its_header(wave_file, tmp_path):
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert {row["turning_point (h_max)"] for row in rows} == {"0.3", "0.6"}
-    assert run(*wave_words(wave_file, *words, "--path", "0.5,0.2,out")) == 0
+    assert run(*wave_words(wave_file, *words, "--path", "0.5,0.2,0.4,out")) == 0
     with table.open(newline="") as stream:
-        assert {row["leg"] for row in csv.DictReader(stream)} == {"0", "1"}
+        assert {row["leg"] for row in csv.DictReader(stream)} == {"0", "1", "2", "3"}
 
 
 @pytest.mark.usefixtures("exact_method")
@@ -358,7 +358,7 @@ def no_computing(monkeypatch):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((), "give either --heights or --hurst: neither is given"),
+        ((), "no profile is given: give one of --hurst, --heights and --trace"),
         (("--hurst", 1.0), "--hurst is 1.0: it must be a number between 0 and 1"),
         (("--hurst", -0.2), "--hurst is -0.2: it must be a number between"),
         (("--hurst", "nan"), "--hurst is nan: it must be a number between"),
@@ -367,7 +367,7 @@ def no_computing(monkeypatch):
         ((*OK, "--n0", 0), "--n0 is 0: it must be a whole number from 1 to"),
         ((*OK, "--ratio", -2), "--ratio is -2: it must be"),
         ((*OK, "--seed", -1), "--seed is -1: it must be"),
-        ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "give exactly one of h_rms, m2 and c0"),
+        ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "--h-rms and --m2 are given: give one of"),
         ((*OK, "--h-rms=-1e-6"), "--h-rms is -1e-06: it must be a positive number"),
         ((*OK, "--h-rms", 0), "--h-rms is 0.0: it must be a positive number"),
         ((*OK, "--amplitudes", "gauss"), "--amplitudes is 'gauss': it must be one of"),
@@ -381,7 +381,7 @@ def no_computing(monkeypatch):
         ((*OK, "--method", "magic"), "--method is 'magic': it must be one of grid"),
         ((*OK, "--accuracy", 0), "--accuracy is 0.0: it must be a number of at least 1e-10"),
         ((*OK, "--nodes-per-wave", 1), "--nodes-per-wave is 1: it must be"),
-        ((*OK, "--field-penetrations", 0.5), "--field-penetrations needs --fields"),
+        ((*OK, "--field-penetrations", 0.5), "--field-penetrations needs --fields, the file"),
     ],
 )
 def test_bad_values_are_refused_with_value_and_rule(words, sentence, capsys):
@@ -398,7 +398,8 @@ def test_fields_too_coarse_for_the_shortest_wave_name_it(capsys):
 def test_heights_take_a_period_and_no_spectrum(wave_file, capsys):
     assert "--heights needs --period" in refused(capsys, "--heights", wave_file, *MATERIAL)
     words = ("--heights", wave_file, "--period", 1, *MATERIAL)
-    assert "both are given" in refused(capsys, *OK, *words)
+    line = refused(capsys, *OK, *words)
+    assert line == "--hurst and --heights are given: give one of --hurst, --heights and --trace"
     line = refused(capsys, *wave_words(wave_file, "--seed", 4))
     assert line.startswith("--seed belongs to --hurst")
     line = refused(capsys, *wave_words(wave_file), "--period", -1)

@@ -164,29 +164,59 @@ def test_the_document_carries_its_provenance(folder: Path, document: dict[str, A
     assert document["loss_over_work_of_adhesion"] == document["loss"]["value"] / 0.04
 
 
-def test_a_preload_is_the_turning_point_of_a_trace(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_preload_is_the_turning_point_of_a_trace() -> None:
     """Under a load to 300 Pa, with the table of a third and two thirds of it."""
-    path = tmp_path / "t.txt"
-    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
-    words = ["trace", str(path), "--unit", "um", *CONTACT, "--cut-off", "80um", "--load-steps", "4"]
-    load = ["--stiffness", "0", "--max-stress", "300", "--work-of-adhesion", "0.005"]
-    assert main([*words, *load, "--to", str(tmp_path / "out"), "--quiet"]) == 0
-    said = capsys.readouterr().out
-    assert "to p̄ = 300 Pa with h_max" in said
-    document = json.loads((tmp_path / "out" / "trace.json").read_text())
+    cycle = make_cycle(HALF_SPACE, 0.005, 300.0, 4, "auto", 1e-2, Control(0.0))
+    plan = make_plan(prepared(), cycle, processes=0)
+    kept = {"answer", "p̄ 100", "p̄ 200"}
+    plan = dataclasses.replace(
+        plan,
+        runs=tuple(run for run in plan.runs if run.name in kept),
+        jobs=tuple(job for job in plan.jobs if job.name in kept),
+    )
+    answer = run_plan(prepared(), cycle, plan)
+    for name, stress in (("answer", 300), ("p̄ 100", 100), ("p̄ 200", 200)):
+        found = answer.result(name)
+        assert found is not None
+        assert max(found["states"]["mean_stress"]) == pytest.approx(stress)
+    document = answers.document(answer)
     assert (document["stiffness"], document["max_stress"]) == (0.0, 300.0)
     assert document["max_penetration"] is None
-    assert document["provenance"]["units"]["max_stress"] == "Pa"
-    assert max(document["loop"]["states"]["mean_stress"]) == pytest.approx(300)
-    assert f"{document['loss']['value'] / 0.005:.4g} γ" in said
-    turns = {r["name"]: r for r in document["runs"] if r["group"] == "turning point"}
-    assert set(turns) == {"p̄ 100", "p̄ 200"}
-    assert turns["p̄ 100"]["loss"] < turns["p̄ 200"]["loss"] < document["loss"]["value"]
-    page = (tmp_path / "out" / "trace.md").read_text()
-    assert "one loop to p̄ = 300 Pa" in page
-    assert "| γ, J/m² | p̄, Pa |" in page
+    said = page.summary(answer)
+    assert "to p̄ = 300 Pa with h_max" in said
+    assert f"{answer.loss.value / 0.005:.4g} γ" in said
+    text = page._markdown(page._blocks(answer), [])
+    assert "one loop to p̄ = 300 Pa" in text
+    assert "| γ, J/m² | p̄, Pa |" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "control", "turns"),
+    [
+        (["--stiffness", "0", "--max-stress", "300,100"], Control(0.0), (300.0, 100.0)),
+        (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3)),
+        (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4)),
+    ],
+)
+def test_the_command_passes_control_and_turning_points(
+    words: list[str],
+    control: Control,
+    turns: tuple[float, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "t.txt"
+    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
+    given: list[Any] = []
+
+    def stop(prepared: Prepared, cycle: Any, plan: Plan, watch: object) -> Answer:
+        given.append(cycle)
+        raise NoAnswer("stopped")
+
+    monkeypatch.setattr("adhesis.ensemble.command.trace.run_plan", stop)
+    rest = ["--unit", "um", "--to", str(tmp_path / "out"), "--quiet"]
+    assert main(["trace", str(path), *CONTACT, *rest, *words]) == 1
+    assert (given[0].control, given[0].turning_points) == (control, turns)
 
 
 def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
@@ -374,7 +404,7 @@ def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     for more, reported in (
         (["--seed", "1"], "--seed belongs to --hurst"),
         (["--period", "1"], "--period belongs to --hurst"),
-        (["--hurst", "0.8"], "several are given"),
+        (["--hurst", "0.8"], "--hurst and --trace are given: give one of"),
         (["--degree", "8"], "--degree is 8"),
     ):
         assert main([*words, *more]) == 2
