@@ -170,7 +170,7 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         ("[profile\n", "is not valid TOML"),
         ("x = " + "[" * 5000, "is not valid TOML"),
         (campaign_text(ratio="90000", n0="2"), "n0 · ratio is 180000"),
-        (campaign_text(realisations="2000000000"), "tasks: at most"),
+        (campaign_text(realisations="2000000000"), "tasks: it must make at most"),
         (campaign_text(load_steps="100000", unloading_until="-1000"), "unloading curve has"),
         ("# " + "x" * 70_000, "bytes"),
         ("", "[profile] period is missing"),

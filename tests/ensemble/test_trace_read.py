@@ -109,7 +109,7 @@ def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path)
 
 def test_columns_are_chosen_where_there_are_more(tmp_path: Path) -> None:
     lines = [f"{k},{row}" for k, row in enumerate(rows(",", "."))]
-    with pytest.raises(InputError, match=r"3 columns: columns"):
+    with pytest.raises(InputError, match=r"3 columns: give columns X,Z"):
         read(tmp_path, ["n,x (um),z (um)", *lines])
     assert_right(read(tmp_path, ["n,x (um),z (um)", *lines], columns=(2, 3)))
 
@@ -165,7 +165,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "no unit": (rows(" ", "."), {}, "states no unit.*give unit, as in um"),
     "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "states no unit"),
     "a unit of one column": (["x (mm),z", *rows(",", ".")], {}, "of the positions alone"),
-    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit says mm and the hea"),
+    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit is mm for the pos"),
     "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* no map and no channels"),
     "two rows": ([UM, "1;2", "2;3"], {}, "holds 2 rows of numbers"),
     "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
