@@ -125,6 +125,7 @@ def source(name: str) -> str:
 def make(name: str, ranks: int) -> None:
     """Run the commands of a part and put what they made into docs/, stamped."""
     part = PARTS[name]
+    made = set()
     with tempfile.TemporaryDirectory() as folder:
         for command in part.commands:
             words = command.replace("OUT", folder).split()
@@ -141,7 +142,11 @@ def make(name: str, ranks: int) -> None:
                 to.write_text(re.sub(r" \(\[PDF\]\([^)]*\)\)", "", to.read_text("utf-8")), "utf-8")
             if to.suffix == ".png":
                 stamp(to, source(name))
+            made.add(to)
             print(to.relative_to(ROOT), flush=True)
+    for path in set(figures(part)) - made if made else ():  # of a figure that has another name now
+        path.unlink()
+        print(f"{path.relative_to(ROOT)} removed", flush=True)
 
 
 def stamps() -> dict[str, str | None]:

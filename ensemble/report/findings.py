@@ -13,8 +13,8 @@ from adhesis.ensemble.aggregate.fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.precision import as_percent
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.axes import cell_name, lines_along, place, together
-from adhesis.ensemble.report.tables.losses import least
+from adhesis.ensemble.report.further_axes import cell_name, lines_along, place, together
+from adhesis.ensemble.report.tables.loss_tables import least
 from adhesis.ensemble.task.doubt import BEYOND_LIMIT, bound, doubtful
 from adhesis.solver.loading.zero_range import beyond_limit
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.report.curves import curves_dataset
+from adhesis.ensemble.report.curves_dataset import curves_dataset
 from adhesis.ensemble.report.plots import Plots
-from adhesis.ensemble.report.tables import losses, mechanisms
+from adhesis.ensemble.report.tables import loss_tables, mechanisms
 from adhesis.ensemble.report.tables.table import Table
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import (
@@ -161,12 +161,12 @@ class CampaignResults:
     @cached_property
     def losses(self) -> pd.DataFrame:
         """``losses.csv``: mean losses with 95 % intervals and errors, one row for each cell."""
-        return _frame(losses.losses(self.averages), self._cell)
+        return _frame(loss_tables.losses(self.averages), self._cell)
 
     @cached_property
     def growth(self) -> pd.DataFrame:
         """``growth.csv``: growth of the loss from one γ to the next, on the same profiles."""
-        return _frame(losses.paired(self.averages), ())
+        return _frame(loss_tables.paired(self.averages), ())
 
     @cached_property
     def mechanisms(self) -> pd.DataFrame:

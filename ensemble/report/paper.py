@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.tables import Campaign
@@ -32,6 +33,30 @@ TABLE_1: dict[tuple[float, float], float] = {
 
 # H -> mean square slope that the paper quotes.
 M2: dict[float, float] = {0.7: 5.1e-3, 0.8: 2.7e-3, 0.9: 1.5e-3}
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """What a figure of the paper shows, by its caption.
+
+    Attributes
+    ----------
+    hurst : float
+    works_of_adhesion : tuple of float
+        γ in J/m², one for each panel.
+    penetration : float, optional
+        Δ/h_max of its states, where there is one.
+    """
+
+    hurst: float
+    works_of_adhesion: tuple[float, ...]
+    penetration: float | None = None
+
+
+FIGURE_3 = PaperFigure(0.8, (0.01,))
+FIGURE_4 = PaperFigure(0.8, (0.01, 0.04), 0.4)
+FIGURE_5 = PaperFigure(0.8, (0.04,))
+FIGURE_8 = PaperFigure(0.7, (0.04,), 0.7)
 
 _PERIOD, _N0, _H_RMS, _C0 = 2e-3 * math.pi, 10, 1e-6, 1e-13
 _RATIOS = (100, 200)

@@ -23,12 +23,13 @@ class Plots:
         self._averages = averages
 
     def _draw(self, name: str) -> list[Axes]:
-        from adhesis.ensemble.report.axes import common, place
-        from adhesis.ensemble.report.figures import fields, loops, losses
+        from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
         from adhesis.ensemble.report.figures.style import say_below, style
+        from adhesis.ensemble.report.further_axes import common, place
 
+        modules = (loops, loss_figures, shapes_and_spectra)
         draw: Callable[[Aggregate], Figure] = next(
-            getattr(room, name) for room in (loops, losses, fields) if hasattr(room, name)
+            getattr(module, name) for module in modules if hasattr(module, name)
         )
         with style():
             shown = self._averages().shown
@@ -67,11 +68,11 @@ class Plots:
         return self._draw("loop_against_penetration")
 
     def loss_against_adhesion(self) -> list[Axes]:
-        """Loss against work of adhesion, with intervals."""
+        """Losses of the Hurst exponents, a panel for each work of adhesion, with intervals."""
         return self._draw("loss_against_adhesion")
 
     def loss_against_slope(self) -> list[Axes]:
-        """Loss against mean square slope, with intervals."""
+        """Loss against mean square slope, a panel for each work of adhesion, with intervals."""
         return self._draw("loss_against_slope")
 
     def loss_against_penetration(self) -> list[Axes]:
@@ -93,6 +94,10 @@ class Plots:
     def shapes(self) -> list[Axes]:
         """Rigid profile and deformed surface of one realisation."""
         return self._draw("shapes")
+
+    def spectra_of_branches(self) -> list[Axes]:
+        """Spectral density of profile and deformed surface on both branches at one state."""
+        return self._draw("spectra_of_branches")
 
     def spectra_on_loading(self) -> list[Axes]:
         """Spectral density of profile and deformed surface on loading."""

@@ -21,7 +21,7 @@ from adhesis.ensemble.report.figures.catalogue import (
     SHAPES,
 )
 from adhesis.ensemble.report.plots import Plots
-from adhesis.ensemble.report.tables.losses import losses
+from adhesis.ensemble.report.tables.loss_tables import losses
 from adhesis.ensemble.results.layout import create
 from tests.support.synthetic_results import campaign, rows, sign, write
 

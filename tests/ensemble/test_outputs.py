@@ -56,7 +56,7 @@ def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(loop_command, name, no_work)
     monkeypatch.setattr(trace_command, "run_plan", no_work)
     monkeypatch.setattr("adhesis.ensemble.bench.compare.benchmark", no_work)
-    monkeypatch.setattr("adhesis.ensemble.report.write.write_report", no_work)
+    monkeypatch.setattr("adhesis.ensemble.report.write_report.write_report", no_work)
 
 
 # ---------------------------------------------------------------------- adhesis loop
@@ -268,7 +268,7 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("adhesis.ensemble.report.write._write_files", full)
+    monkeypatch.setattr("adhesis.ensemble.report.write_report._write_files", full)
     code, _, error = ask("report", "r.h5", "--to", "out")
     assert code == 74
     assert error.splitlines()[-1] == (

@@ -24,7 +24,7 @@ from adhesis.ensemble.campaign.precision import (
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.interval import interval
 from adhesis.ensemble.report import findings
-from adhesis.ensemble.report.write import write_report
+from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING
 from adhesis.ensemble.results.status import as_text, read_status

@@ -27,18 +27,23 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.companions import differing_keys, kind_of
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report import findings, paper
-from adhesis.ensemble.report.figures import fields as field_figures
-from adhesis.ensemble.report.figures import loops, losses
+from adhesis.ensemble.report.figures import (
+    loops,
+    loss_figures,
+    selection,
+    shapes_and_spectra,
+)
 from adhesis.ensemble.report.figures.catalogue import HEIGHTS, LOOPS, LOSSES, MECHANISMS, SHAPES
 from adhesis.ensemble.report.figures.style import save, spread_out, style
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.report.page import write_page
-from adhesis.ensemble.report.tables import losses as loss_tables
+from adhesis.ensemble.report.markdown_page import write_page
+from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.table import number
-from adhesis.ensemble.report.write import write_report
+from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
 from tests.support.synthetic_results import campaign, rows, write
@@ -166,7 +171,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path, drawn):
     assert "aper" not in page.replace("paper.h5", "")
     assert "19.36" not in (tmp_path / "out" / "losses.csv").read_text()
     with style():
-        assert "H = 0.8, paper" not in lines_of(losses.loss_against_adhesion(data).axes[0])
+        assert "paper" not in lines_of(loss_figures.loss_against_adhesion(data).axes[0])
 
 
 def test_numbers_are_written_as_people_write_them():
@@ -261,24 +266,78 @@ def test_loops_are_drawn_with_one_standard_deviation(data):
     assert "sigma" in axes.get_ylabel()
 
 
+def test_the_loading_branch_takes_half_of_the_panel(data, tmp_path):
+    """Though unloading reaches further; an axis that needs no stretching is left alone."""
+    plan = campaign(gamma=(0.04,), realisations=2)
+    values = rows(plan)
+    values["unloading_contact_fraction"][:, plan.unloading_penetration < 0.5] = 0.0
+    short = aggregate(write(tmp_path / "short.h5", plan, values))
+    for averages, stretched in ((data, True), (short, False)):
+        with style():
+            figure = loops.loop_against_penetration(averages)
+            figure.draw_without_rendering()
+        for axes in figure.axes:
+            ends = axes.transLimits.transform(
+                axes.transScale.transform([(0.0, 0.5), (0.9, 0.5)])
+            )[:, 0]
+            low = min(line.get_xdata().min() for line in axes.lines if line.get_label()[0] == "$")
+            assert (axes.get_xscale() == "function") is stretched
+            if stretched:
+                assert low < -1
+                assert ends[1] - ends[0] == pytest.approx(0.48, abs=0.02)
+                ticks = axes.get_xticks()
+                assert np.sum(ticks >= 0) > 3
+                assert np.sum(ticks < 0) > 1
+
+
 def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
+    """A panel for each γ; few points are not joined by a line."""
     with style():
-        axes = losses.loss_against_adhesion(data).axes[0]
-    for container, hurst in zip(axes.containers, (0.7, 0.8), strict=True):
-        found = [data.cell(hurst, g).estimates["loss_dimensionless"] for g in GAMMAS]
+        figure = loss_figures.loss_against_adhesion(data)
+    for axes, gamma in zip(figure.axes, GAMMAS, strict=True):
+        assert f"= {gamma:g} J" in axes.get_title(loc="left")
+        found = [data.cell(h, gamma).estimates["loss_dimensionless"] for h in (0.7, 0.8)]
+        (container,) = axes.containers
         line, _, (bars,) = container.lines
+        np.testing.assert_array_equal(line.get_xdata(), [0.7, 0.8])
         np.testing.assert_allclose(line.get_ydata(), [e.mean for e in found])
+        assert line.get_linestyle() == "None"
         ends = np.array(bars.get_segments())[:, :, 1]
         np.testing.assert_allclose(ends, [[e.low, e.high] for e in found], rtol=1e-12)
-    stars = [[0.01, 3.44], [0.04, 19.36], [0.07, 49.25]]
-    assert lines_of(axes)["H = 0.8, paper"].tolist() == stars
-    assert len(lines_of(axes)["H = 0.7, paper"]) == 2
-    assert "J/m²" in axes.get_xlabel()
+        stars = [line.get_xydata()[0] for line in axes.lines if line.get_label() == "paper"]
+        quoted = [(h, paper.table_1(h, gamma)) for h in (0.7, 0.8)]
+        assert [y for _, y in stars] == [value for _, value in quoted if value is not None]
+        for (x, _), (hurst, _) in zip(stars, quoted[-len(stars) :], strict=True):
+            assert hurst < x < hurst + 0.05
+    assert "H" in figure.axes[0].get_xlabel()
+
+
+def test_losses_against_slope_have_a_panel_for_each_gamma(data):
+    with style():
+        figure = loss_figures.loss_against_slope(data)
+    for axes, gamma in zip(figure.axes, GAMMAS, strict=True):
+        for container, hurst in zip(axes.containers, (0.7, 0.8), strict=True):
+            cell = data.cell(hurst, gamma)
+            ((x, y),) = container.lines[0].get_xydata()
+            assert x == pytest.approx(cell.values["m2"].mean())
+            assert y == pytest.approx(cell.values["loss_dimensionless"].mean())
+        stars = [tuple(line.get_xydata()[0]) for line in axes.lines if line.get_label() == "paper"]
+        known = [(paper.m2(h), paper.table_1(h, gamma)) for h in (0.7, 0.8)]
+        assert stars == [star for star in known if star[1] is not None]
+
+
+def test_many_points_are_joined_by_a_line_and_few_are_not(tmp_path):
+    for count, style_of_line in ((4, "None"), (6, "-")):
+        plan = campaign(hurst=(0.8,), gamma=tuple(0.01 * k for k in range(1, count + 1)))
+        data = aggregate(write(tmp_path / f"{count}.h5", plan, rows(plan)))
+        with style():
+            (curve,) = loss_figures.pull_off(data).axes[0].containers
+        assert curve.lines[0].get_linestyle() == style_of_line
 
 
 def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
     with style():
-        axes = losses.loss_by_mechanism(data).axes[0]
+        axes = loss_figures.loss_by_mechanism(data).axes[0]
     large, small = (c for c in axes.containers if isinstance(c, BarContainer))
     for k, cell in enumerate(data.cells):
         top = small[k].get_y() + small[k].get_height()
@@ -293,7 +352,7 @@ def test_bars_stack_both_mechanisms_to_the_sum_of_the_drops(data):
 
 def test_jump_densities_integrate_to_the_number_of_jumps(data):
     with style():
-        figure = losses.jump_energies(data)
+        figure = loss_figures.jump_energies(data)
     cell = data.cell(0.7, 0.01)
     total = 0.0
     for axes in figure.axes[:2]:
@@ -306,11 +365,64 @@ def test_jump_densities_integrate_to_the_number_of_jumps(data):
     assert BINS_PER_DECADE * np.log10(edges[1] / edges[0]) == pytest.approx(1)
 
 
+def states(*penetrations: float) -> Campaign:
+    """Return the campaign of ``file``, with fields at these Δ/h_max."""
+    text = campaign(hurst=(0.7, 0.8), gamma=GAMMAS, realisations=2, ratio=100).text
+    listed = f"field_nodes = 256\nfield_penetrations = {list(penetrations)}"
+    return parse_campaign(text.replace("field_nodes = 256", listed))
+
+
+def test_figures_of_fields_are_at_the_papers_values_or_say_at_which_they_are(tmp_path, drawn):
+    """The paper's captions: Fig. 3 γ = 0.01, Fig. 4 Δ~ = 0.4, Fig. 8 H = 0.7 and Δ~ = 0.7."""
+    for kept, drawn_at, said in (
+        ((0.3, 0.4, 0.7, 0.9), 9 * 0.045, ("", "")),  # the nearest of 20 load steps
+        ((0.36, 0.54, 0.9), 0.36, ("Δ/h_max = 0.36", "Δ/h_max = 0.54")),
+    ):
+        plan = states(*kept)
+        path = write(tmp_path / f"{len(kept)}.h5", plan, rows(plan))
+        data = write_report(path, tmp_path / str(len(kept)), io.StringIO())
+        page = (tmp_path / str(len(kept)) / "report.md").read_text(encoding="utf-8")
+        caption = dict(re.findall(r"\*\*.*\(paper's (.*)\)\.\*\* (.*) \(\[PDF", page))
+        with style():
+            shapes = shapes_and_spectra.shapes(data)
+            both = shapes_and_spectra.spectra_of_branches(data)
+        assert "H = 0.8, $\\gamma$ = 0.01 J/m²" in shapes.axes[0].get_title(loc="left")
+        assert "is at H = 0.8, γ = 0.01 J/m². Its separations" in caption["Fig. 3"]
+        for axes, gamma in zip(both.axes, (0.01, 0.04), strict=True):
+            title = axes.get_title(loc="left")
+            assert f"H = 0.8, $\\gamma$ = {gamma} J/m²" in title
+            assert title.endswith(f"= {drawn_at:.2f}")
+            branches = lines_of(axes)
+            cell = data.cell(0.8, gamma)
+            state = int(np.argmin(np.abs(cell.plan.penetration - drawn_at)))
+            for b, branch in enumerate(("loading", "unloading")):
+                spectrum = data.fields.psd_displacement[data.cells.index(cell), b, state]
+                np.testing.assert_array_equal(branches[branch][:, 1], spectrum)
+        places = {
+            "Fig. 4": "H = 0.8, γ = 0.01 and 0.04 J/m²",
+            "Fig. 8": "H = 0.7, γ = 0.04 J/m²",
+        }
+        for (name, place), nearest, at in zip(places.items(), said, (0.4, 0.7), strict=True):
+            end = f"; the nearest to it here is {place}, {nearest}." if nearest else "."
+            assert caption[name].endswith(f"is at {place}, Δ/h_max = {at:g}{end}")
+        for name in ("Fig. 5(a)", "Fig. 5(b)"):
+            assert caption[name].endswith("figure is at H = 0.8, γ = 0.04 J/m².")
+
+
+def test_a_campaign_without_the_papers_values_draws_what_it_has(tmp_path):
+    plan = campaign(hurst=(0.5, 0.6), gamma=(0.02, 0.05), realisations=2)
+    data = aggregate(write(tmp_path / "r.h5", plan, rows(plan)))
+    cells = selection.cells_of(data, paper.FIGURE_4)
+    assert [(c.hurst, c.work_of_adhesion) for c in cells] == [(0.5, 0.02), (0.5, 0.05)]
+    said = selection.beside_paper(data, paper.FIGURE_3)
+    assert said.endswith("; the nearest to it here is H = 0.5, γ = 0.02 and 0.05 J/m².")
+
+
 def test_shapes_show_profile_and_surface_at_the_same_separation(data):
     with style():
-        figure = field_figures.shapes(data)
+        figure = shapes_and_spectra.shapes(data)
     assert len(figure.axes) == 6
-    cell = findings.typical_cell(data)
+    cell = data.cell(0.8, 0.01)
     shape = data.fields.shapes[data.cells.index(cell)]
     drawn = lines_of(figure.axes[0])
     separation = shape.h_max * (1 - data.fields.penetration[-1])
@@ -330,13 +442,14 @@ def test_the_detail_of_the_shapes_goes_on_across_the_end_of_the_period(data):
         higher[-1] = 2 * higher.max()  # the highest point, half a wave from a crest
         turned.append(replace(shape, height=higher))
     with style():
-        figure = field_figures.shapes(replace(data, fields=replace(fields, shapes=tuple(turned))))
+        other = replace(data, fields=replace(fields, shapes=tuple(turned)))
+        figure = shapes_and_spectra.shapes(other)
     x, y = lines_of(figure.axes[1])["rigid"].T
     period = 1e3 * data.campaign.profile.period
     assert x[0] < period < x[-1]
     assert np.allclose(np.diff(x), x[1] - x[0])
     assert abs(x[np.argmax(y)] - (x[0] + x[-1]) / 2) < 2 * (x[1] - x[0])
-    assert "H = 0.7, $\\gamma$ = 0.04" in figure.axes[0].get_title(loc="left")
+    assert "H = 0.8, $\\gamma$ = 0.01" in figure.axes[0].get_title(loc="left")
 
 
 def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, drawn):
@@ -354,7 +467,7 @@ def test_every_gamma_is_drawn_or_said_to_be_left_out(tmp_path, drawn):
 
 def test_spectra_carry_both_reference_slopes(data):
     with style():
-        axes = field_figures.spectra_on_loading(data).axes[1]
+        axes = shapes_and_spectra.spectra_on_loading(data).axes[1]
     drawn = lines_of(axes)
     for label, slope in (("slope -2.6", -2.6), ("slope -2.8", -2.8), ("rigid", -2.6)):
         x, y = np.log(drawn[label]).T
@@ -367,14 +480,15 @@ def test_spectra_carry_both_reference_slopes(data):
 
 def test_densities_are_drawn_as_they_are(data):
     with style():
-        heights = lines_of(field_figures.height_density(data).axes[0])
-        gaps = lines_of(field_figures.gap_density(data).axes[0])
+        heights = lines_of(shapes_and_spectra.height_density(data).axes[0])
+        loading, unloading, *_ = map(lines_of, shapes_and_spectra.gap_density(data).axes)
     near_zero = heights["H = 0.8"][np.abs(heights["H = 0.8"][:, 0]).argmin()]
     assert near_zero[1] == pytest.approx(heights["Gaussian"][:, 1].max(), rel=0.02)
-    assert len(gaps) == 6
-    np.testing.assert_allclose(
-        gaps["0.90, loading"][:, 1], 0.7 * np.exp(-gaps["0.90, loading"][:, 0]), rtol=1e-4
-    )
+    assert len(loading) == len(unloading) == 3
+    for gaps in (loading["0.90"], unloading["0.90"]):
+        np.testing.assert_allclose(gaps[:, 1], 0.7 * np.exp(-gaps[:, 0]), rtol=1e-4)
+        # The outermost bins hold all smaller and larger gaps, too.
+        np.testing.assert_array_equal(gaps[:, 0], data.fields.gap_bin[1:-1])
 
 
 def test_every_figure_is_legible_at_column_width_in_colour_and_grey(data):
@@ -409,7 +523,7 @@ def test_drawing_leaves_the_style_of_the_caller_alone(data):
 
 
 def test_nothing_is_cut_off_at_the_edges_of_a_figure(report, margins):
-    assert len(margins) == len(list(report.glob("*.png"))) == 12
+    assert len(margins) == len(list(report.glob("*.png"))) == 13
     assert min(margins.values()) >= 0, margins
 
 
@@ -422,7 +536,7 @@ def test_nothing_is_cut_off_whatever_the_ticks(data, stretched):
         for shape in fields.shapes
     )
     with style():
-        figure = field_figures.shapes(replace(data, fields=replace(fields, shapes=shapes)))
+        figure = shapes_and_spectra.shapes(replace(data, fields=replace(fields, shapes=shapes)))
         figure.set_dpi(300)
         figure.draw_without_rendering()
     assert margin(figure) >= 0
@@ -434,7 +548,7 @@ def test_nothing_is_cut_off_whatever_the_ticks(data, stretched):
 def test_the_page_embeds_every_figure_that_exists(report):
     page = (report / "report.md").read_text(encoding="utf-8")
     shown = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page)
-    assert len(shown) == len(set(shown)) == 12
+    assert len(shown) == len(set(shown)) == 13
     assert set(shown) == {path.name for path in report.glob("*.png")}
     for name in shown:
         image = imread(report / name)
@@ -479,7 +593,7 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, c
         assert "No task is finished yet for H = 0.8, γ = 0.01 J/m²" in text
         assert "Only one realisation" in text
     assert "row 5: the sum diverged" in page
-    assert len(laid_out) == 12
+    assert len(laid_out) == 13
 
 
 def test_one_finished_task_of_one_cell_is_enough(tmp_path, laid_out):
@@ -488,8 +602,8 @@ def test_one_finished_task_of_one_cell_is_enough(tmp_path, laid_out):
     parts: list[str] = []
     data = write_report(path, tmp_path / "out", io.StringIO(), progress=parts.append)
     assert data.done == 1
-    assert len(laid_out) == 12
-    figures = [f"figure {k} of 12, {name}" for k, name in enumerate(laid_out, 1)]
+    assert len(laid_out) == 13
+    figures = [f"figure {k} of 13, {name}" for k, name in enumerate(laid_out, 1)]
     assert parts == ["averages", "tables", *figures, "pages"]
 
 
@@ -637,7 +751,7 @@ def test_the_loss_is_drawn_against_the_largest_penetration(file, tmp_path, drawn
     data = write_report(file, tmp_path / "out", io.StringIO(), beside=[lower])
     assert "loss_against_max_penetration" in drawn
     with style():
-        axes = losses.loss_against_penetration(data).axes[0]
+        axes = loss_figures.loss_against_penetration(data).axes[0]
     assert len(axes.containers) == len(GAMMAS)
     for curve in axes.containers:
         x, y = curve.lines[0].get_data()
@@ -655,7 +769,7 @@ def test_campaigns_with_one_gamma_in_common_are_drawn_for_each_hurst(file, tmp_p
     values = {name: row for name, row in rows(plan).items() if row.ndim == 1}
     data = aggregate(file, [write(tmp_path / "lower.h5", lower, values)])
     with style():
-        axes = losses.loss_against_penetration(data).axes[0]
+        axes = loss_figures.loss_against_penetration(data).axes[0]
     assert axes.get_title(loc="left") == r"$\gamma$ = 0.04 J/m²"
     assert [curve.get_label() for curve in axes.containers] == ["H = 0.7", "H = 0.8"]
     # Only the realisations that both have.
@@ -777,7 +891,7 @@ def test_the_html_page_needs_no_other_file(report):
     assert {base64.b64decode(text) for text in images} == {
         path.read_bytes() for path in report.glob("*.png")
     }
-    assert len(images) == 12
+    assert len(images) == 13
     markdown = (report / "report.md").read_text(encoding="utf-8")
     cells = re.findall(r"<td[^>]*>([^<]*)</td>", page)
     assert len(cells) == sum(

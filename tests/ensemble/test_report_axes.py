@@ -16,7 +16,7 @@ from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.catalogue import along_axes
 from adhesis.ensemble.report.figures.style import style
 from adhesis.ensemble.report.tables.works import works
-from adhesis.ensemble.report.write import write_report
+from adhesis.ensemble.report.write_report import write_report
 from tests.support.synthetic_results import campaign, rows, write
 
 TOPS = (0.5, 0.7, 0.9)

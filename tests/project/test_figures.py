@@ -2,31 +2,58 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import shutil
 import sys
 from pathlib import Path
 
+import numpy as np
+import pytest
 from matplotlib.image import imread
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+# Folders that exchange data without one importing the other: through Method, and EdgeSystem.
+THROUGH_AN_INTERFACE = {("loading", "sharp"), ("grid", "loading"), ("continuation", "system")}
+
+
+def load(name: str, path: str):
+    spec = importlib.util.spec_from_file_location(name, ROOT / path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def kept() -> list[Path]:
+    """Return the figures of docs/; what `make docs` leaves there is made anew each time."""
+    site = {ROOT / "docs" / "_build", ROOT / "docs" / "gallery"}
+    return sorted(p for p in (ROOT / "docs").rglob("*.png") if not site & set(p.parents))
 
 
 def tool():
-    spec = importlib.util.spec_from_file_location("figures", ROOT / "tools" / "figures_of_docs.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["figures"] = module
-    spec.loader.exec_module(module)
-    return module
+    return load("figures", "tools/figures_of_docs.py")
+
+
+def imported_folders(top: str) -> set[tuple[str, str]]:
+    """Return pairs of folders, by name, of which one imports the other."""
+    pairs = set()
+    for path in (ROOT / top).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            module = getattr(node, "module", None) or ""
+            if isinstance(node, ast.ImportFrom) and module.startswith(f"adhesis.{top}."):
+                place = ROOT.joinpath(*module.split(".")[1:])
+                other = place if place.is_dir() else place.parent
+                # A folder stands for those inside it, but for those of sharp, which are drawn.
+                for one in (path.parent, *path.parent.parents):
+                    pairs |= {tuple(sorted((one.name, o.name))) for o in (other, other.parent)}
+    return pairs
 
 
 def test_every_figure_of_the_documentation_has_a_command():
     figures = tool()
     made = {path for part in figures.PARTS.values() for path in figures.figures(part)}
-    # What `make docs` leaves there is made anew each time.
-    site = {ROOT / "docs" / "_build", ROOT / "docs" / "gallery"}
-    kept = {path for path in (ROOT / "docs").rglob("*.png") if not site & set(path.parents)}
-    assert made == kept
+    assert made == set(kept())
     for part in figures.PARTS.values():
         for command in part.commands:
             modules = ("-m adhesis ", "-m tools.study ")
@@ -44,3 +71,41 @@ def test_a_stamp_is_read_again_and_leaves_the_picture_as_it_was(tmp_path):
         assert figures.stamped(path) == text != before
     assert path.read_bytes().count(b"tEXtSource") == 1
     assert (imread(path) == imread(original)).all()
+
+
+def test_a_figure_that_is_no_longer_made_is_removed(tmp_path, monkeypatch):
+    figures = tool()
+    folder = tmp_path / "docs" / "paper"
+    folder.mkdir(parents=True)
+    for name in ("fig4.png", "fig5.png"):
+        shutil.copyfile(ROOT / "docs" / "figures" / "loop.png", folder / name)
+    (tmp_path / "draw.py").write_text(
+        "import shutil, sys; shutil.copyfile('docs/paper/fig5.png', sys.argv[1])"
+    )
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    part = figures.Part(("draw.py OUT/fig5a.png",), "*.png", "paper")
+    monkeypatch.setattr(figures, "PARTS", {"paper": part})
+    figures.make("paper", 1)
+    assert [path.name for path in folder.iterdir()] == ["fig5a.png"]
+    assert figures.stamped(folder / "fig5a.png").endswith("ARGS=paper")
+
+
+def test_the_picture_of_the_folders_shows_what_the_code_does():
+    """Arrows join folders of which one imports the other; each folder but runtime has one."""
+    picture = load("structure", "docs/figures/structure.py")
+    for top, boxes, arrows in (
+        ("ensemble", picture.CAMPAIGN, picture.CAMPAIGN_ARROWS),
+        ("solver", picture.LOOP, picture.LOOP_ARROWS),
+    ):
+        known = imported_folders(top) | THROUGH_AN_INTERFACE
+        assert {tuple(sorted(arrow[:2])) for arrow in arrows} - known == set()
+        joined = {name for arrow in arrows for name in arrow[:2]}
+        assert set(boxes) - joined - {"runtime"} == set()
+
+
+@pytest.mark.parametrize("path", kept(), ids=lambda path: path.stem)
+def test_figures_have_a_white_ground_so_that_a_dark_page_shows_them(path):
+    image = imread(path)
+    edge = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+    assert (image[..., 3:] == 1).all()
+    assert np.median(edge[:, :3]) == 1

@@ -42,7 +42,7 @@ def execute(args: argparse.Namespace) -> int:
     inputs = {"the command": args.file}
     inputs |= {f"--beside (number {k})": path for k, path in enumerate(args.beside, 1)}
     check_output_folder("--to", args.to, _FILES, inputs)
-    from adhesis.ensemble.report.write import write_report
+    from adhesis.ensemble.report.write_report import write_report
 
     under_way = ""
 

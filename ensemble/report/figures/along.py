@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.report.axes import axis_label, lines_along, place, together
-from adhesis.ensemble.report.figures.losses import errorbar
+from adhesis.ensemble.report.figures.loss_figures import errorbar
 from adhesis.ensemble.report.figures.style import (
     MM,
     MOST_PANELS,
@@ -26,6 +25,7 @@ from adhesis.ensemble.report.figures.style import (
     shown_gammas,
     spread_out,
 )
+from adhesis.ensemble.report.further_axes import axis_label, lines_along, place, together
 
 TURNING_POINTS = ("max_penetration", "max_stress")
 _LOG_FROM = 20  # an axis that spans more is logarithmic

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.report.axes import together
-from adhesis.ensemble.report.figures import fields, loops, losses
+from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
 from adhesis.ensemble.report.figures.along import TURNING_POINTS, along, with_figure
+from adhesis.ensemble.report.figures.selection import beside_paper
+from adhesis.ensemble.report.further_axes import together
+from adhesis.ensemble.report.paper import PaperFigure
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,9 @@ class Illustration:
     draw : callable
     of_paper : str
         The figure or table of the paper that shows the same, if there is one.
+    beside_paper : callable, optional
+        Returns a sentence for the caption on what the paper shows there and the figure does not;
+        used where the campaign is the paper's.
     whole : bool
         Whether it draws all cells, and not those of :attr:`Aggregate.shown`.
     """
@@ -36,7 +42,13 @@ class Illustration:
     caption: str
     draw: Callable[[Aggregate], Figure]
     of_paper: str = ""
+    beside_paper: Callable[[Aggregate], str] | None = None
     whole: bool = False
+
+
+def _compared_with(figure: PaperFigure, addition: str = "") -> Callable[[Aggregate], str]:
+    """Return the function that compares what is drawn with a figure of the paper."""
+    return lambda data: f"{beside_paper(data, figure)}{addition}"
 
 
 LOOPS = (
@@ -53,7 +65,8 @@ LOOPS = (
         "fig7_loop_against_penetration",
         "Mean stress and contact fraction against penetration",
         "Lines: means over realisations; shading: one standard deviation of a single realisation. "
-        "A realisation that has detached counts with zero.",
+        "A realisation that has detached counts with zero. Grey ground: the penetrations of the "
+        "loading branch, stretched to half of the panel where unloading takes more of it.",
         loops.loop_against_penetration,
         "Fig. 7",
     ),
@@ -61,53 +74,74 @@ LOOPS = (
 LOSSES = (
     Illustration(
         "table1_losses",
-        "Loss against work of adhesion",
-        "Means with 95 % intervals. The curves are moved apart a little so that the intervals can "
-        "be distinguished.",
-        losses.loss_against_adhesion,
+        "Loss of each H and work of adhesion",
+        "Means with 95 % intervals, a panel for each γ.",
+        loss_figures.loss_against_adhesion,
         "Table 1",
+        lambda data: "Stars: the paper's values, which have no error.",
     ),
     Illustration(
         "loss_against_m2",
         "Loss against mean square slope",
-        "Means with 95 % intervals. The curves are moved apart a little.",
-        losses.loss_against_slope,
+        "Means with 95 % intervals, a panel for each γ, a point for each H.",
+        loss_figures.loss_against_slope,
+        beside_paper=lambda data: "Stars: the paper's values, at the m2 that it quotes.",
     ),
 )
 SHAPES = (
     Illustration(
         "fig3_shapes",
         "Deformed shapes",
-        "The first realisation that kept its fields, middle H and γ: rigid profile h - s and "
+        "The first realisation that kept its fields: rigid profile h - s and "
         "elastic surface v on both branches, at the same separation. In contact the two coincide. "
         "Right: one and a half of the longest waves around the highest point, carried on across "
         "the end of the period where it lies near one.",
-        fields.shapes,
+        shapes_and_spectra.shapes,
         "Fig. 3",
+        _compared_with(
+            paper.FIGURE_3,
+            " Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
+            "h_rms = 1 µm, so the states here are those that the campaign kept.",
+        ),
     ),
     Illustration(
-        "fig4_spectra_loading",
-        "Spectral density on loading",
-        "Two-sided, mean over the realisations in contact, middle γ. Thin lines: slopes of a "
-        "self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the profile's "
+        "fig4_spectra_of_branches",
+        "Spectral density on both branches",
+        "Two-sided, mean over the realisations in contact, at one penetration. Thin lines: slopes "
+        "of a self-affine profile, q^-(2H+1), and of Persson's law, q^-(2+H). Beyond the profile's "
         "highest wave number only the edges of contact have power.",
-        fields.spectra_on_loading,
+        shapes_and_spectra.spectra_of_branches,
         "Fig. 4",
+        _compared_with(paper.FIGURE_4),
     ),
     Illustration(
-        "fig5_spectra_unloading",
+        "fig5a_spectra_loading",
+        "Spectral density on loading",
+        "As before, at several penetrations.",
+        shapes_and_spectra.spectra_on_loading,
+        "Fig. 5(a)",
+        _compared_with(paper.FIGURE_5),
+    ),
+    Illustration(
+        "fig5b_spectra_unloading",
         "Spectral density on unloading",
         "As on loading. At the largest penetration both branches are one state.",
-        fields.spectra_on_unloading,
-        "Fig. 5",
+        shapes_and_spectra.spectra_on_unloading,
+        "Fig. 5(b)",
+        _compared_with(paper.FIGURE_5),
     ),
     Illustration(
         "fig8_gap_density",
         "Probability density of the separation",
-        "Gap outside contact, in units of each realisation's h_max; the integral is the fraction "
-        "out of contact. Middle γ. At the largest penetration both branches are one state.",
-        fields.gap_density,
+        "Gap t outside contact, in units of each realisation's h_max; the integral is the fraction "
+        "out of contact. At the largest penetration both branches are one state. Straight part: "
+        "openings beside the edges of contact grow with the square root of the distance, and their "
+        "density with t. Peaks at small t: single gaps, over a crest that is close to touching; "
+        "above the least opening t0 there the density falls as (t - t0)^-1/2. Gaps below the axis "
+        "are not shown.",
+        shapes_and_spectra.gap_density,
         "Fig. 8",
+        _compared_with(paper.FIGURE_8),
     ),
 )
 HEIGHTS = (
@@ -115,8 +149,9 @@ HEIGHTS = (
         "fig9_height_density",
         "Probability density of the heights",
         "Rigid profiles, mean over realisations, with the Gaussian of the same variance.",
-        fields.height_density,
+        shapes_and_spectra.height_density,
         "Fig. 9",
+        lambda data: "The paper's figure is at H = 0.8, with heights in units of h_max.",
     ),
 )
 MECHANISMS = (
@@ -126,7 +161,7 @@ MECHANISMS = (
         "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
         "large scale: patches appear, merge, split, vanish or pull off. Figures above the bars: "
         "share of the small scale. Error bars: 95 % interval of the mean of either part.",
-        losses.loss_by_mechanism,
+        loss_figures.loss_by_mechanism,
     ),
     Illustration(
         "jump_energies",
@@ -134,14 +169,14 @@ MECHANISMS = (
         "Jumps of one loop per decade of energy drop, mean over realisations. Drops more than "
         "eight decades below the largest are not shown. Shading: n jumps in a bin are known to "
         "sqrt(n).",
-        losses.jump_energies,
+        loss_figures.jump_energies,
     ),
     Illustration(
         "pull_off_stress",
         "Pull-off stress",
         "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
         "a little.",
-        losses.pull_off,
+        loss_figures.pull_off,
     ),
 )
 PENETRATIONS = (
@@ -151,7 +186,7 @@ PENETRATIONS = (
         "This campaign and those beside it that differ in max_penetration: means with 95 % "
         "intervals over the realisations that all of them have finished. The curves are moved "
         "apart a little.",
-        losses.loss_against_penetration,
+        loss_figures.loss_against_penetration,
     ),
 )
 

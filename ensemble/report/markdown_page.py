@@ -10,10 +10,10 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.escape import code_span, fence, markdown, printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.report import findings, paper
-from adhesis.ensemble.report.axes import shown_cells
 from adhesis.ensemble.report.figures.catalogue import Illustration
 from adhesis.ensemble.report.figures.style import left_out
-from adhesis.ensemble.report.tables import losses as loss_tables
+from adhesis.ensemble.report.further_axes import shown_cells
+from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.works import works
 
@@ -32,7 +32,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     of_paper = paper.are_its_cells(data.shown.cells)
 
     def show(section: str) -> list[str]:
-        return [_shown(item, of_paper) for item in figures.get(section, ())]
+        return [_shown(item, data, of_paper) for item in figures.get(section, ())]
 
     losses, known = loss_tables.losses(data), loss_tables.precision(data)
     out = [
@@ -196,11 +196,11 @@ def _bullets(sentences: Sequence[str]) -> list[str]:
     return ["\n".join(f"- {markdown(sentence)}" for sentence in sentences)] if sentences else []
 
 
-def _shown(item: Illustration, of_paper: bool) -> str:
+def _shown(item: Illustration, data: Aggregate, of_paper: bool) -> str:
     title = f"{item.title} (paper's {item.of_paper})" if of_paper and item.of_paper else item.title
     caption = item.caption
-    if of_paper and item.name == "table1_losses":
-        caption += " Stars: the paper's values."
+    if of_paper and item.beside_paper is not None:
+        caption += f" {item.beside_paper(data if item.whole else data.shown)}"
     return f"![{title}]({item.name}.png)\n\n**{title}.** {caption} ([PDF]({item.name}.pdf))"
 
 

@@ -55,8 +55,7 @@ def write_report(
 def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], None]) -> None:
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
-    from adhesis.ensemble.report.axes import common, place
-    from adhesis.ensemble.report.curves import write_curves
+    from adhesis.ensemble.report.curves_dataset import write_curves
     from adhesis.ensemble.report.figures.catalogue import (
         HEIGHTS,
         LOOPS,
@@ -66,21 +65,22 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
         SHAPES,
         along_axes,
     )
-    from adhesis.ensemble.report.figures.losses import of_penetration
+    from adhesis.ensemble.report.figures.loss_figures import of_penetration
     from adhesis.ensemble.report.figures.style import save, say_below, style
+    from adhesis.ensemble.report.further_axes import common, place
     from adhesis.ensemble.report.html import html_page
-    from adhesis.ensemble.report.page import write_page
-    from adhesis.ensemble.report.tables import losses, mechanisms, works
+    from adhesis.ensemble.report.markdown_page import write_page
+    from adhesis.ensemble.report.tables import loss_tables, mechanisms, works
 
-    losses.losses(data).write_csv(directory / "losses.csv")
-    if (known := losses.precision(data)).rows:
+    loss_tables.losses(data).write_csv(directory / "losses.csv")
+    if (known := loss_tables.precision(data)).rows:
         known.write_csv(directory / "precision.csv")
-    losses.paired(data).write_csv(directory / "growth.csv")
+    loss_tables.paired(data).write_csv(directory / "growth.csv")
     mechanisms.jumps(data).write_csv(directory / "jumps.csv")
     works.works(data).write_csv(directory / "works.csv")
     write_curves(data, directory / "curves.nc")
     if data.companions:
-        losses.companions(data).write_csv(directory / "beside.csv")
+        loss_tables.companions(data).write_csv(directory / "beside.csv")
     mechanisms.slopes(data).write_csv(directory / "slopes.csv")
     with_shapes = (*SHAPES, *HEIGHTS) if data.fields.penetration.size else HEIGHTS
     sections = (
@@ -107,11 +107,11 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
 
 def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:
     from adhesis.ensemble.report import findings
-    from adhesis.ensemble.report.tables import losses, mechanisms
+    from adhesis.ensemble.report.tables import loss_tables, mechanisms
 
-    losses.losses(data).print(stream)
+    loss_tables.losses(data).print(stream)
     print(file=stream)
-    if (known := losses.precision(data)).rows:
+    if (known := loss_tables.precision(data)).rows:
         known.print(stream)
         print(file=stream)
     mechanisms.mechanisms(data).print(stream)

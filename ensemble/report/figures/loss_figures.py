@@ -33,69 +33,102 @@ from adhesis.ensemble.report.figures.style import (
     spread_out,
 )
 from adhesis.ensemble.report.findings import typical_cell
+from adhesis.ensemble.report.tables.loss_tables import papers_loss
 
 _MOST_BARS = 9  # in one column, so that their labels do not touch
+_MOST_BESIDE = 3  # panels beside each other in one column
+_MOST_TICKS = 4
+# Fewer points are not joined by a line: it would claim a course between them.
+_FEWEST_FOR_A_LINE = 5
+_STAR: Any = {
+    "linestyle": "none",
+    "marker": "*",
+    "markersize": 8,
+    "markerfacecolor": "white",
+    "markeredgecolor": "0.3",
+}
 
 
 def loss_against_adhesion(data: Aggregate) -> Figure:
-    """Table 1 as a figure: W~ against γ for each H with intervals, the paper's values beside."""
-    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
-    axes = figure.axes[0]
+    """Table 1 as a figure: W~ of each H with intervals, a panel for each γ, the paper's beside."""
+    shown = shown_gammas(data)
+    columns = min(len(shown), _MOST_BESIDE)
+    rows = -(-len(shown) // columns)
+    height = (20 + 42 * rows) * MM
+    figure = new_figure(rows, columns, ONE_COLUMN, height, sharex=True, sharey=True)
     hursts = spread_out(data.hursts, MOST_CURVES)
-    of_paper = paper.are_its_cells(data.cells)
-    for k, hurst in enumerate(hursts):
-        cells = [cell for cell in data.cells if cell.hurst == hurst and cell.done]
-        errorbar(
-            axes,
-            np.array([cell.work_of_adhesion for cell in cells]),
-            [cell.estimates["loss_dimensionless"] for cell in cells],
-            k,
-            f"H = {hurst:g}",
-            offset=_apart(data, k, len(hursts)),
-        )
-        known = [(g, paper.table_1(hurst, g)) for g in data.works_of_adhesion if of_paper]
-        quoted = [(g, value) for g, value in known if value is not None]
-        if quoted:
-            axes.plot(
-                *zip(*quoted, strict=True),
-                linestyle="none",
-                marker="*",
-                markersize=8,
-                markerfacecolor="white",
-                zorder=5,
-                markeredgecolor=look(k).colour,
-                label=f"H = {hurst:g}, paper",
-            )
-    axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    axes.set_ylabel(r"loss $\tilde W = \oint\tilde\sigma\,\mathrm{d}\tilde\Delta$")
-    axes.set_ylim(bottom=0)
-    legend_above(figure, axes.get_legend_handles_labels()[0], 3)
+    aside = 0.2 * min(np.diff(hursts), default=0.1)
+    for axes, (k, gamma) in zip(figure.axes, shown, strict=False):
+        cells = _of_gamma(data, gamma)
+        x = np.array([cell.hurst for cell in cells])
+        errorbar(axes, x, [cell.estimates["loss_dimensionless"] for cell in cells], k, "_")
+        _stars(axes, [(cell.hurst + aside, papers_loss(cell), look(k).colour) for cell in cells])
+        axes.set_title(gamma_label(gamma), loc="left", pad=3)
+    for axes in figure.axes[len(shown) :]:
+        axes.set_axis_off()
+    for axes in figure.axes[-columns:]:
+        axes.set_xlabel("Hurst exponent $H$")
+    for row in panels(figure, rows, columns):
+        row[0].set_ylabel(r"loss $\tilde W = \oint\tilde\sigma\,\mathrm{d}\tilde\Delta$")
+    first = figure.axes[0]
+    first.set_ylim(bottom=0)
+    if len(hursts) <= _MOST_TICKS:
+        first.set_xticks(hursts)
+    first.set_xlim(min(hursts) - 2.5 * aside, max(hursts) + 2.5 * aside)
+    legend_above(figure, [_mean_handle(), *_star_handle(data)], 2)
     return figure
 
 
 def loss_against_slope(data: Aggregate) -> Figure:
-    """W~ against the mean square slope m2, one curve for each γ, with intervals."""
-    figure = new_figure(1, 1, ONE_COLUMN, 62 * MM)
-    axes = figure.axes[0]
+    """W~ against the mean square slope m2 with intervals, a panel for each γ."""
     shown = shown_gammas(data)
-    slopes = [cell.estimates["m2"].mean for cell in data.cells if cell.done]
-    apart = 0.012 * (max(slopes) - min(slopes))
-    for place, (k, gamma) in enumerate(shown):
-        cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
-        cells.sort(key=lambda cell: cell.estimates["m2"].mean)
-        errorbar(
-            axes,
-            np.array([cell.estimates["m2"].mean for cell in cells]),
-            [cell.estimates["loss_dimensionless"] for cell in cells],
-            k,
-            gamma_label(gamma),
-            offset=(place - (len(shown) - 1) / 2) * apart,
-        )
-    axes.set_xlabel("mean square slope $m_2$")
-    axes.set_ylabel(r"loss $\tilde W$")
-    axes.set_ylim(bottom=0)
-    legend_above(figure, axes.get_legend_handles_labels()[0], 3)
+    figure = new_figure(len(shown), 1, ONE_COLUMN, (20 + 33 * len(shown)) * MM, sharex=True)
+    hursts = spread_out(data.hursts, MOST_CURVES)
+    for axes, (_, gamma) in zip(figure.axes, shown, strict=True):
+        for k, hurst in enumerate(hursts):
+            cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
+            m2 = np.array([cell.estimates["m2"].mean for cell in cells])
+            found = [cell.estimates["loss_dimensionless"] for cell in cells]
+            errorbar(axes, m2, found, k, f"H = {hurst:g}")
+            colour = look(k).colour
+            _stars(axes, [(paper.m2(c.hurst), papers_loss(c), colour) for c in cells])
+        axes.set_ylabel(r"loss $\tilde W$")
+        axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
+        label_panel(axes, gamma_label(gamma))
+    figure.axes[-1].set_xlabel("mean square slope $m_2$")
+    handles = [
+        Line2D([], [], color=look(k).colour, marker=look(k).marker, ls="none", label=f"H = {h:g}")
+        for k, h in enumerate(hursts)
+    ]
+    legend_above(figure, [*handles, *_star_handle(data)], 4)
     return figure
+
+
+def _of_gamma(data: Aggregate, gamma: float) -> list[Cell]:
+    """The finished cells of one γ that a figure shows, by H."""
+    hursts = spread_out(data.hursts, MOST_CURVES)
+    cells = [cell for cell in data.cells if cell.work_of_adhesion == gamma and cell.done]
+    return [cell for cell in cells if cell.hurst in hursts]
+
+
+def _stars(axes: Axes, values: list[tuple[float | None, float | None, str]]) -> None:
+    """Draw values of the paper, where it gives them: (x, W~, colour)."""
+    for x, value, colour in values:
+        if x is not None and value is not None:
+            look_of_star = {**_STAR, "markeredgecolor": colour}
+            axes.plot([x], [value], **look_of_star, zorder=5, label="paper")
+
+
+def _mean_handle() -> Line2D:
+    label = "mean and 95 % interval"
+    return Line2D([], [], color="0.3", marker="o", linestyle="none", label=label)
+
+
+def _star_handle(data: Aggregate) -> list[Line2D]:
+    """The entry of the paper's values in a legend, if any are drawn."""
+    if all(papers_loss(cell) is None for cell in data.cells if cell.done):
+        return []
+    return [Line2D([], [], **_STAR, label="paper")]
 
 
 def of_penetration(data: Aggregate) -> list[Companion]:
@@ -355,7 +388,7 @@ def errorbar(
     offset: float = 0.0,
     unit: float = 1.0,
 ) -> None:
-    """Draw means with their intervals, in multiples of a unit."""
+    """Draw means with their intervals, in multiples of a unit; joined if they are many."""
     mean = np.array([estimate.mean for estimate in found]) / unit
     low = np.array([estimate.low for estimate in found]) / unit
     high = np.array([estimate.high for estimate in found]) / unit
@@ -365,6 +398,6 @@ def errorbar(
         yerr=np.nan_to_num(np.array([mean - low, high - mean])),
         color=look(k).colour,
         marker=look(k).marker,
-        linestyle=LINES[k],
+        linestyle=LINES[k] if x.size >= _FEWEST_FOR_A_LINE else "none",
         label=label,
     )

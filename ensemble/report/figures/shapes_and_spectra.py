@@ -1,6 +1,11 @@
-"""Shapes (Fig. 3), spectra (Fig. 4 and 5), densities of gap (Fig. 8) and height (Fig. 9)."""
+"""Shapes (Fig. 3), spectra (Figs. 4 and 5), densities of gap (Fig. 8) and height (Fig. 9).
+
+Each shows the (H, γ) and the Δ/h_max of the paper's figure where the campaign has them.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,6 +18,8 @@ from numpy.typing import NDArray
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.fields import DeformedShape, FieldStatistics
+from adhesis.ensemble.report import paper
+from adhesis.ensemble.report.figures.selection import cell_of_hurst, cells_of, state_of
 from adhesis.ensemble.report.figures.style import (
     LINE_OF_BRANCH,
     LINES,
@@ -29,7 +36,6 @@ from adhesis.ensemble.report.figures.style import (
     plain_decades,
     spread_out,
 )
-from adhesis.ensemble.report.findings import typical_cell
 from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
@@ -40,8 +46,7 @@ _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 
 def shapes(data: Aggregate) -> Figure:
     """Fig. 3: rigid profile and deformed surface of one realisation on both branches."""
-    cell = typical_cell(data)
-    assert cell is not None
+    cell = cells_of(data, paper.FIGURE_3)[0]
     fields = data.fields
     shape = fields.shapes[data.cells.index(cell)]
     chosen = shown_penetrations(fields, 3)
@@ -88,46 +93,74 @@ def shapes(data: Aggregate) -> Figure:
     return figure
 
 
+def spectra_of_branches(data: Aggregate) -> Figure:
+    """Fig. 4: spectral density of profile and deformed surface on both branches at one state."""
+    cells = cells_of(data, paper.FIGURE_4)
+    figure = new_figure(len(cells), 1, ONE_COLUMN, (16 + 52 * len(cells)) * MM, sharex=True)
+    for (axes,), cell in zip(panels(figure, len(cells), 1), cells, strict=True):
+        k = state_of(cell.plan, paper.FIGURE_4)
+        for b, branch in enumerate(BRANCHES):
+            _spectrum(
+                axes,
+                cell,
+                data.fields.psd_displacement[data.cells.index(cell), b, k],
+                color=_COLOUR_OF_BRANCH[branch],
+                linestyle=LINE_OF_BRANCH[branch],
+                label=branch,
+            )
+        _finish_spectra(axes, data, cell, f", {_depth(data, cell, k)}")
+    handles = [
+        Line2D([], [], color=_COLOUR_OF_BRANCH[b], linestyle=LINE_OF_BRANCH[b], label=b)
+        for b in BRANCHES
+    ]
+    _label_spectra(figure, len(cells), handles)
+    return figure
+
+
 def spectra_on_loading(data: Aggregate) -> Figure:
-    """Fig. 4: spectral density of profile and deformed surface on loading."""
+    """Fig. 5(a): spectral density of profile and deformed surface on loading, state by state."""
     return _spectra(data, 0)
 
 
 def spectra_on_unloading(data: Aggregate) -> Figure:
-    """Fig. 5: the same on unloading."""
+    """Fig. 5(b): the same on unloading."""
     return _spectra(data, 1)
 
 
 def gap_density(data: Aggregate) -> Figure:
-    """Fig. 8: probability density of the gap, for each H at the middle γ."""
+    """Fig. 8: probability density of the gap on either branch, for each H."""
     hursts = spread_out(data.hursts, MOST_PANELS)
-    figure = new_figure(len(hursts), 1, ONE_COLUMN, (16 + 46 * len(hursts)) * MM, sharex=True)
+    height = (16 + 46 * len(hursts)) * MM
+    figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True, sharey=True)
+    grid = panels(figure, len(hursts), 2)
     fields = data.fields
     chosen = shown_penetrations(fields, MOST_CURVES)
-    for (axes,), hurst in zip(panels(figure, len(hursts), 1), hursts, strict=True):
-        cell = typical_cell(data, hurst)
+    for row, hurst in zip(grid, hursts, strict=True):
+        cell = cell_of_hurst(data, hurst, paper.FIGURE_8)
+        row[0].set_ylabel(r"density of $t/h_\mathrm{max}$")
         if cell is None:
             continue
-        density = fields.gap_density[data.cells.index(cell)]
-        for place, k in enumerate(chosen):
-            for b, branch in enumerate(BRANCHES):
-                values = density[b, k]
+        for b, (axes, branch) in enumerate(zip(row, BRANCHES, strict=True)):
+            for place, k in enumerate(chosen):
+                # The outermost bins also hold all gaps beyond the axis.
+                values = fields.gap_density[data.cells.index(cell), b, k][1:-1]
                 if np.any(values > 0):
                     axes.plot(
-                        fields.gap_bin,
+                        fields.gap_bin[1:-1],
                         np.where(values > 0, values, np.nan),
                         color=look(place).colour,
-                        linestyle=LINE_OF_BRANCH[branch],
-                        label=f"{cell.plan.penetration[k]:.2f}, {branch}",
+                        linestyle=LINES[place],
+                        label=f"{cell.plan.penetration[k]:.2f}",
                     )
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_ylim(bottom=max(axes.get_ylim()[0], _LEAST_DENSITY))
-        axes.set_ylabel(r"density of $t/h_\mathrm{max}$")
-        label_panel(axes, _cell_label(cell))
-    figure.axes[len(hursts) - 1].set_xlabel(r"gap $t/h_\mathrm{max}$")
+            label_panel(axes, f"{_cell_label(cell)}, {branch}")
+    first = grid[0][0]
+    first.set_xscale("log")
+    first.set_yscale("log")
+    first.set_ylim(bottom=max(first.get_ylim()[0], _LEAST_DENSITY))
+    for axes in grid[-1]:
+        axes.set_xlabel(r"gap $t/h_\mathrm{max}$")
     plain_decades(figure.axes)
-    legend_above(figure, _penetration_handles(data, chosen, with_branches=True), 3)
+    legend_above(figure, _penetration_handles(data, chosen, markers=False), len(chosen))
     return figure
 
 
@@ -173,40 +206,63 @@ def _spectra(data: Aggregate, b: int) -> Figure:
     fields = data.fields
     chosen = shown_penetrations(fields, 3)
     for (axes,), hurst in zip(panels(figure, len(hursts), 1), hursts, strict=True):
-        cell = typical_cell(data, hurst)
+        cell = cell_of_hurst(data, hurst, paper.FIGURE_5)
         if cell is None:
             continue
-        index = data.cells.index(cell)
-        rigid, present = fields.psd_height[index], cell.plan.filled
-        axes.loglog(
-            cell.plan.wave_number[present], rigid[present], color="0.55", linewidth=2, label="rigid"
-        )
         for place, k in enumerate(chosen):
-            values = fields.psd_displacement[index, b, k]
-            if np.any(values > 0):
-                axes.loglog(
-                    cell.plan.wave_number,
-                    np.where(values > 0, values, np.nan),
-                    color=look(place).colour,
-                    linestyle=LINES[place],
-                    marker=look(place).marker,
-                    markersize=2,
-                    markevery=4,
-                    label=f"{cell.plan.penetration[k]:.2f}",
-                )
-        _reference_slopes(axes, hurst, rigid[present], cell.plan.wave_number[present])
-        axes.set_ylabel(r"spectral density $C(q)$ (m³)")
-        label_panel(axes, _cell_label(cell))
-    plain_decades(figure.axes[: len(hursts)])
-    figure.axes[len(hursts) - 1].set_xlabel("wave number $q$ (rad/m)")
-    handles = [Line2D([], [], color="0.55", linewidth=2, label="rigid profile")]
-    handles += _penetration_handles(data, chosen, with_branches=False)
-    handles += [
+            _spectrum(
+                axes,
+                cell,
+                fields.psd_displacement[data.cells.index(cell), b, k],
+                color=look(place).colour,
+                linestyle=LINES[place],
+                marker=look(place).marker,
+                label=f"{cell.plan.penetration[k]:.2f}",
+            )
+        _finish_spectra(axes, data, cell)
+    _label_spectra(figure, len(hursts), _penetration_handles(data, chosen))
+    return figure
+
+
+def _spectrum(axes: Axes, cell: Cell, values: Array, **options: Any) -> None:
+    """Draw the spectrum of one state, unless no realisation is in contact there."""
+    if np.any(values > 0):
+        axes.loglog(
+            cell.plan.wave_number,
+            np.where(values > 0, values, np.nan),
+            markersize=2,
+            markevery=4,
+            **options,
+        )
+
+
+def _finish_spectra(axes: Axes, data: Aggregate, cell: Cell, state: str = "") -> None:
+    """Add the rigid profile and the reference slopes to a panel, and its labels."""
+    rigid, present = data.fields.psd_height[data.cells.index(cell)], cell.plan.filled
+    axes.loglog(
+        cell.plan.wave_number[present],
+        rigid[present],
+        color="0.55",
+        linewidth=2,
+        label="rigid",
+        zorder=1.5,
+    )
+    _reference_slopes(axes, cell.hurst, rigid[present], cell.plan.wave_number[present])
+    axes.set_ylabel(r"spectral density $C(q)$ (m³)")
+    label_panel(axes, f"{_cell_label(cell)}{state}")
+
+
+def _label_spectra(figure: Figure, count: int, handles: list[Line2D]) -> None:
+    """Label the wave numbers, and put the legend of all panels above them."""
+    plain_decades(figure.axes[:count])
+    figure.axes[count - 1].set_xlabel("wave number $q$ (rad/m)")
+    handles = [
+        Line2D([], [], color="0.55", linewidth=2, label="rigid profile"),
+        *handles,
         Line2D([], [], color="0.3", linewidth=0.7, linestyle=":", label="$q^{-(2H+1)}$"),
         Line2D([], [], color="0.3", linewidth=0.7, linestyle="-.", label="$q^{-(2+H)}$"),
     ]
     legend_above(figure, handles, 3)
-    return figure
 
 
 def _reference_slopes(axes: Axes, hurst: float, rigid: np.ndarray, q: np.ndarray) -> None:
@@ -261,31 +317,34 @@ def _window(cell: Cell, shape: DeformedShape) -> NDArray[np.intp]:
 
 
 def _penetration_handles(
-    data: Aggregate, chosen: list[int], *, with_branches: bool
+    data: Aggregate, chosen: list[int], *, markers: bool = True
 ) -> list[Line2D]:
     # Where the largest penetration varies with H or γ, only its share is the same for all.
     tops = {cell.campaign.cycle.turning_point for cell in data.cells}
-    unit = r"\Delta/h" if len(tops) == 1 else r"\Delta/\Delta"
-    if data.campaign.cycle.under_load:
-        unit = r"\bar p/\bar p"
+    unit = _penetration_sign(data)
+    if len(tops) > 1 and not data.campaign.cycle.under_load:
+        unit = r"\Delta/\Delta"
     penetration = data.cells[0].plan.penetration if len(tops) == 1 else data.fields.penetration
-    handles = [
+    return [
         Line2D(
             [],
             [],
             color=look(place).colour,
-            linestyle="-" if with_branches else LINES[place],
-            marker="" if with_branches else look(place).marker,
+            linestyle=LINES[place],
+            marker=look(place).marker if markers else "",
             label=rf"${unit}_\mathrm{{max}}$ = {penetration[k]:.2f}",
         )
         for place, k in enumerate(chosen)
     ]
-    if with_branches:
-        handles += [
-            Line2D([], [], color="0.3", linestyle=LINE_OF_BRANCH[branch], label=branch)
-            for branch in BRANCHES
-        ]
-    return handles
+
+
+def _penetration_sign(data: Aggregate) -> str:
+    return r"\bar p/\bar p" if data.campaign.cycle.under_load else r"\Delta/h"
+
+
+def _depth(data: Aggregate, cell: Cell, k: int) -> str:
+    """Return "Δ/h_max = 0.41" for the state at one place."""
+    return rf"${_penetration_sign(data)}_\mathrm{{max}}$ = {cell.plan.penetration[k]:.2f}"
 
 
 def _cell_label(cell: Cell) -> str:
