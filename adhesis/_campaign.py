@@ -188,7 +188,7 @@ class Campaign:
             )
 
     def _run_ranks(self, path: Path, ranks: int, progress: bool) -> None:
-        from adhesis.ensemble.command.run import BAD_INPUT, DONE, SOME_FAILED
+        from adhesis.ensemble.command.campaigns.run import BAD_INPUT, DONE, SOME_FAILED
         from adhesis.ensemble.errors import InputError
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run import launch

@@ -48,7 +48,7 @@ step("numpy")(imported("numpy"))
 step("scipy: what the solver uses")(imported("scipy.fft", "scipy.linalg"))
 step("numba, the compiler")(imported("numba"))
 step("mpi4py and h5py")(imported("mpi4py.MPI", "h5py"))
-packages = ("adhesis.ensemble.command.run", "adhesis.solver.precompile")
+packages = ("adhesis.ensemble.command.campaigns.run", "adhesis.solver.precompile")
 step("solver and ensemble")(imported(*packages))
 
 

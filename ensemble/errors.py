@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -15,6 +15,19 @@ class _Printable(Exception):
 
     def __str__(self) -> str:
         return printable(super().__str__())
+
+
+_LONGEST = 80  # characters of a value that a message shows
+
+
+def quoted(text: str) -> str:
+    """Return the repr of a text, shortened for a message."""
+    return repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…")
+
+
+def one_of(names: Sequence[str]) -> str:
+    """Join alternatives: ".png, .pdf or .svg"."""
+    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 class InputError(_Printable, ValueError):

@@ -1,7 +1,8 @@
-"""Units of the numbers that results and commands state."""
+"""Units of the numbers that results and commands state; losses over the work of adhesion."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 _NAMES = {
@@ -29,3 +30,53 @@ def with_units(table: Any) -> Any:
     """Return a DataFrame with the unit of every column in ``attrs["units"]``."""
     table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
     return table
+
+
+# Of the turning points: in Pa under a load, else dimensionless.
+_TURNING = ("turning_point", "turning_points", "start", "turn")
+# Not listed: settings of a method, which its documentation describes, and loops with the keys of
+# the whole document.
+_LEFT_OUT = ("method_details", "turns", "provenance")
+
+
+def units_of(document: Mapping[str, Any]) -> dict[str, str]:
+    """Return the unit of every number of a JSON document; "1" if it is dimensionless.
+
+    The keys are paths ("jumps.energy_drop"), entries of a list have one of them.
+    """
+    found: dict[str, str] = {}
+    turning = "Pa" if document.get("stiffness") == 0 else "1"
+
+    def visit(path: tuple[str, ...], value: Any) -> None:
+        if isinstance(value, Mapping):
+            for name, part in value.items():
+                visit((*path, name), part)
+        elif isinstance(value, list | tuple):
+            parts = [part for part in value if isinstance(part, Mapping | list | tuple)]
+            for part in parts or value[:1]:
+                visit(path, part)
+        elif value is None and path[-1] not in UNITS:
+            pass  # unknown whether it would be a number
+        elif value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
+            found[".".join(path)] = turning if path[-1] in _TURNING else _unit(path)
+
+    for name, value in document.items():
+        if name not in _LEFT_OUT:
+            visit((name,), value)
+    return found
+
+
+def _unit(path: tuple[str, ...]) -> str:
+    name, parent = path[-1], path[-2] if len(path) > 1 else ""
+    if parent == "doubts":
+        return "1"
+    if parent == "cut_off_limits":
+        return UNITS["cut_off"]
+    if name in ("value", "uncertainty"):
+        return UNITS.get(parent, "1")
+    return UNITS.get(name, "1")
+
+
+def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
+    """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
+    return f", {loss / work_of_adhesion:.4g} γ" if work_of_adhesion > 0 else ""

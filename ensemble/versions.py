@@ -13,6 +13,11 @@ _PACKAGES = ("adhesis", "numpy", "scipy", "numba", "llvmlite", "pyfftw", "h5py",
 
 def versions() -> dict[str, str]:
     """Return the root attributes of a results file: versions, commit, and the MPI in use."""
+    return {**software(), "mpi": _mpi(), "hdf5": _hdf5(), "fftw": _fftw()}
+
+
+def software() -> dict[str, str]:
+    """Return the versions that decide the bits of a loop, the commit and the processor."""
     return {
         "adhesis_version": _package("adhesis", missing="unknown"),
         "commit": commit(),
@@ -22,9 +27,6 @@ def versions() -> dict[str, str]:
         "numba": _package("numba"),
         "llvmlite": _package("llvmlite"),
         "processor": processor(),
-        "mpi": _mpi(),
-        "hdf5": _hdf5(),
-        "fftw": _fftw(),
     }
 
 

@@ -35,6 +35,8 @@ printf '%s\n' '[profile]' 'period = 1e-3' 'n0 = 1' 'ratio = 4' 'h_rms = 1e-6' '[
     'realisations = 2' 'seed = 1' '[cycle]' 'max_penetration = 0.6' 'load_steps = 4' \
     >"$place/small.toml"
 adhesis --version
+adhesis sample trace.csv && adhesis new my.toml
+adhesis run my.toml --dry-run >/dev/null
 echo "package: loop (compiles first), run, status, report"
 adhesis loop --hurst 0.8 --seed 1 --period 1e-3 --n0 1 --ratio 4 --max-penetration 0.6 \
     --load-steps 4 --json loop.json >/dev/null

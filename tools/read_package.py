@@ -19,7 +19,8 @@ def sources() -> set[str]:
         for top in (ROOT / "adhesis", ROOT)
         for folder in ((top,) if top.name == "adhesis" else (ROOT / "solver", ROOT / "ensemble"))
         for path in folder.rglob("*")
-        if path.suffix in (".py", ".typed", ".mplstyle") and "__compiled__" not in path.parts
+        if path.suffix in (".py", ".typed", ".mplstyle", ".csv")
+        and "__compiled__" not in path.parts
     }
     return found | {"adhesis/ensemble/commit.txt"}
 

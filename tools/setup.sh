@@ -343,9 +343,9 @@ finish_installation() {
     # Byte code of what commands import, also for users who may not write here.
     "$venv/bin/python" -c '
 from importlib import import_module
-from adhesis.ensemble.command.main import COMMANDS
+from adhesis.ensemble.command.main import COMMANDS, module_of
 for name in COMMANDS:
-    import_module(f"adhesis.ensemble.command.{name}")
+    import_module(module_of(name))
 import adhesis.ensemble.bench.equal_error, adhesis.ensemble.bench.bench_page, adhesis.solver.validate.claims
 import h5netcdf, markdown_it, matplotlib.pyplot, mpi4py, pandas, rich.live, rich.progress, xarray'
 }

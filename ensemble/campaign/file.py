@@ -192,7 +192,7 @@ def _check_together(source: str, campaign: Campaign) -> None:
     if campaign.task_count > _MOST_TASKS:
         raise InputError(
             f"{source}: [sweep] makes {campaign.task_count} tasks: "
-            f"at most {_MOST_TASKS} are allowed"
+            f"it must make at most {_MOST_TASKS}"
         )
     if campaign.output.field_penetrations and campaign.has_axis("max_penetration"):
         raise InputError(
@@ -247,7 +247,7 @@ def _check_slopes(source: str, campaign: Campaign) -> None:
             except ValueError as error:
                 raise InputError(
                     f"{source}: [profile] {norm} is {shown(values[-1])} with period "
-                    f"{shown(values[1])}: {error}"
+                    f"{shown(values[1])}, so the {error}"
                 ) from None
 
 
@@ -273,6 +273,6 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
     for name in (other, *(["stiffness"] if cycle.under_load else [])):
         if getattr(cycle, name) is not None:
             raise InputError(
-                f'{source}: [cycle] {name} is given with control = "{cycle.control}": a path of '
-                f"the {cycle.control} turns at {wanted} and has no {name}"
+                f"{source}: [cycle] {name} is given: with control = \"{cycle.control}\" a path "
+                f"turns at {wanted}, so leave {name} out"
             )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.lengths import length_with_unit
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds
 
@@ -46,16 +47,22 @@ def shown(value: object) -> str:
 
 
 def number_in(bounds: Bounds) -> Rule:
-    """A number between the solver's bounds; a whole one, where they say so, without a point."""
+    """A number between the solver's bounds; a whole one, where they say so, without a point.
+
+    A length may also be a text with its unit.
+    """
+    is_length = bounds.unit == "m"
 
     def read(value: object) -> float:
+        if is_length and isinstance(value, str):
+            value = length_with_unit(value)
         # TOML has numbers of two types and bool; Python takes the latter for a number too.
         kinds = int if bounds.whole else int | float
         if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError
         return (checks.whole if bounds.whole else checks.real)("", value, bounds)
 
-    return Rule(bounds.text, read)
+    return Rule(bounds.text + (', or a length as "2 mm"' if is_length else ""), read)
 
 
 def positive_number(unit: str) -> Rule:

@@ -84,7 +84,10 @@ class ProfileTable:
         number_in(NORMALISATIONS["m2"]), "mean square slope", None, axis="1"
     )
     c0: float | None = _key(
-        number_in(NORMALISATIONS["c0"]), "C0 = |a_n0|² in m²", None, axis="m2"
+        number_in(NORMALISATIONS["c0"]),
+        "|a_n0|² in m², the same for every H (C0 of the spectrum)",
+        None,
+        axis="m2",
     )
     amplitudes: Amplitudes = _key(  # noqa: RUF009  # a field
         choice(*get_args(Amplitudes)),
@@ -143,7 +146,7 @@ class CycleTable:
     )
     max_stress: float | None = _key(
         number_in(MAX_STRESS),
-        "under a load, instead: mean stress in Pa at which unloading starts",
+        "mean stress in Pa at which unloading starts under a load, instead of max_penetration",
         None,
         axis="Pa",
     )

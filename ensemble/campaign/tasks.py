@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, parameter
 
 
 def task_seed(campaign_seed: int, realisation: int) -> int:
@@ -89,7 +89,7 @@ class Part:
         match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text.strip())
         if match and 1 <= int(match[1]) <= int(match[2]):
             return cls(int(match[1]), int(match[2]))
-        raise InputError(f"part is {text!r}: it must be K/N with 1 ≤ K ≤ N, as 3/20")
+        raise InputError(f"{parameter('part')} is {text!r}: it must be K/N with 1 ≤ K ≤ N, as 3/20")
 
     def rows(self, count: int) -> NDArray[np.int64]:
         """Rows of the whole campaign, of ``count`` tasks, that belong to the part, ascending."""

@@ -1,4 +1,4 @@
-"""Speed of each method against its error in the loss: CPU time, memory, table and figure.
+"""Measure the speed of each method against its error in the loss; write table and figure.
 
 Every run has a process of its own with one thread; time is CPU time, so other work on the machine
 does not count. The full benchmark takes three quarters of an hour, --quick less than a minute.
@@ -69,7 +69,7 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.solver.precompile import COMPILED_METHODS
 
     if not (math.isfinite(args.budget) and args.budget > 0):
-        raise InputError(f"--budget is {args.budget!r}: it must be positive, in seconds")
+        raise InputError(f"--budget is {args.budget!r}: it must be a positive number of seconds")
     check_output_folder("--to", args.to, _FILES, {})
     warm_missing(COMPILED_METHODS, log)  # or the first run of each would do it, silently
     # A file or a pipe has no width of its own; the tables need this one.

@@ -1,4 +1,7 @@
-"""Which MPI, HDF5, FFTW and writer this installation uses, and why; exit code 1 if not usable."""
+"""Report which MPI, HDF5, FFTW and writer this installation uses, and why.
+
+Exit code 1 if it is not usable.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(args: argparse.Namespace) -> int:
     """Print what was found; 0 if campaigns can run here."""
     if args.directory is not None and not os.access(args.directory, os.W_OK | os.X_OK):
-        raise InputError(f"--in {args.directory} is no folder that can be written to.")
+        raise InputError(f"--in is {args.directory}: it must be a folder that can be written")
     diagnosis = examine(args.directory)
     if args.json:
         print(json.dumps(diagnosis.as_dict(), indent=2))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.errors import InputError, refused_as_input
+from adhesis.ensemble.errors import InputError, one_of, refused_as_input
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of
 from adhesis.ensemble.loop.heights import closure_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
@@ -24,6 +24,7 @@ from adhesis.ensemble.loop.record import (
     write_npz,
 )
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
+from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.reporter import StatusLine, log, ticking
 from adhesis.ensemble.trace.options import (
     delimiter_of,
@@ -45,6 +46,7 @@ from adhesis.solver.registry import make_method
 
 _FIELD_PARTS = (0.25, 0.5, 0.75, 1.0)
 _SECONDS_BETWEEN_LINES = 5.0
+_BELONGS_TO_TRACE = "{} belongs to --trace, which is not given"
 FIGURE_FORMATS = (".png", ".pdf", ".svg")
 _MATERIAL = {"work_of_adhesion": 0.04, "young": 1e6, "poisson": 0.5}
 # Of every field that is kept, over all its states: three arrays of so many numbers take 1.6 GB.
@@ -57,6 +59,7 @@ def execute(args: argparse.Namespace) -> int:
     _check_files(args)
     with refused_as_input(vars(args)):
         profile, warnings = _profile(args)
+        source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
         problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control)
@@ -79,7 +82,15 @@ def execute(args: argparse.Namespace) -> int:
     writing = Writing()
     if args.json is not None:
         with writing.output("--json", args.json):
-            write_json(args.json, _document(results, warnings))
+            document = _document(results, warnings)
+            seed = (args.seed or 0) if source is None else None
+            document["provenance"] = provenance(args.words, source, seed, document)
+            write_json(args.json, document)
+    if args.csv is not None:
+        from adhesis.ensemble.loop.saved import write_csv  # loads pandas
+
+        with writing.output("--csv", args.csv):
+            write_csv(args.csv, results)
     if fields:
         with writing.output("--fields", args.fields):
             write_npz(args.fields, fields)
@@ -138,13 +149,14 @@ def _run(
 
 
 def _set_material(args: argparse.Namespace) -> None:
-    """Set the material's defaults; with heights of one's own there are none."""
+    """Set the material's defaults; with heights or a trace of one's own there are none."""
     missing = [name for name in _MATERIAL if getattr(args, name) is None]
-    if args.heights is not None and missing:
+    given_source = "--heights" if args.heights else "--trace" if args.trace else ""
+    if given_source and missing:
         options = ", ".join("--" + name.replace("_", "-") for name in missing)
         verb = "is" if len(missing) == 1 else "are"
         raise InputError(
-            f"{options} {verb} missing: with --heights the material has to be given "
+            f"{options} {verb} missing: with {given_source} the material has to be given "
             "(--work-of-adhesion in J/m², --young in Pa, --poisson)"
         )
     for name in missing:
@@ -155,7 +167,7 @@ def _check_files(args: argparse.Namespace) -> None:
     """Refuse output files that cannot be written, or that would destroy an input or each other."""
     if args.figure is not None and args.figure.suffix.lower() not in FIGURE_FORMATS:
         raise InputError(
-            f"--figure is {args.figure}: the name must end in {', '.join(FIGURE_FORMATS)}"
+            f"--figure is {args.figure}: the name must end in {one_of(FIGURE_FORMATS)}"
         )
     if args.fields is not None and args.fields.suffix != ".npz":
         raise InputError(f"--fields is {args.fields}: the name must end in .npz")
@@ -164,7 +176,7 @@ def _check_files(args: argparse.Namespace) -> None:
         paths = {f"--{name}": getattr(args, name) for name in names}
         return {option: path for option, path in paths.items() if path is not None}
 
-    check_outputs(named("json", "fields", "figure", "film"), named("heights", "trace"))
+    check_outputs(named("json", "csv", "fields", "figure", "film"), named("heights", "trace"))
 
 
 def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
@@ -184,32 +196,25 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
 
 def _profile(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     """Return the profile of the one source that is given, and what is doubtful about it."""
-    if args.trace is None:
-        if _wants_heights(args):
-            return _given_heights(args)
+    sources = [f"--{n}" for n in ("hurst", "heights", "trace") if getattr(args, n) is not None]
+    if len(sources) != 1:
+        found = f"{' and '.join(sources)} are" if sources else "no profile is"
+        raise InputError(f"{found} given: give one of --hurst, --heights and --trace")
+    if args.hurst is not None:
         for option in given(args):
-            raise InputError(f"{option} belongs to --trace")
+            raise InputError(_BELONGS_TO_TRACE.format(option))
         return _self_affine(args), []
-    if args.heights is not None or args.hurst is not None:
-        raise InputError("give one of --heights, --hurst and --trace: several are given")
+    if args.heights is not None:
+        if args.period is None:
+            raise InputError("--heights needs --period, the length of the period, as in 2mm")
+        _refuse_options_of_hurst(args)
+        return _given_heights(args)
     _refuse_options_of_hurst(args, "period")
     prepared = prepared_of(args, trace_of(args, args.trace))
     print(what_was_read(prepared))
     for warning in prepared.warnings:
         print(f"WARNING     {warning}")
     return prepared.profile(), []
-
-
-def _wants_heights(args: argparse.Namespace) -> bool:
-    if (args.heights is None) == (args.hurst is None):
-        both = "neither is" if args.hurst is None else "both are"
-        raise InputError(f"give either --heights or --hurst: {both} given")
-    if args.heights is None:
-        return False
-    if args.period is None:
-        raise InputError("--heights needs --period, the length of the period in m")
-    _refuse_options_of_hurst(args)
-    return True
 
 
 def _refuse_options_of_hurst(args: argparse.Namespace, *more: str) -> None:
@@ -222,7 +227,7 @@ def _refuse_options_of_hurst(args: argparse.Namespace, *more: str) -> None:
 def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     for option in given(args):
         if option not in ("--unit", "--delimiter", "--decimal"):
-            raise InputError(f"{option} belongs to --trace")
+            raise InputError(_BELONGS_TO_TRACE.format(option))
     heights = read_heights(
         args.heights, unit=args.unit, delimiter=delimiter_of(args), decimal=args.decimal
     )
@@ -232,6 +237,9 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
 
 def _self_affine(args: argparse.Namespace) -> Profile:
     norms = {name: getattr(args, name) for name in ("h_rms", "m2", "c0")}
+    several = [f"--{n.replace('_', '-')}" for n, value in norms.items() if value is not None]
+    if len(several) > 1:
+        raise InputError(f"{' and '.join(several)} are given: give one of --h-rms, --m2 and --c0")
     if all(value is None for value in norms.values()):
         norms["h_rms"] = H_RMS
     return self_affine_profile(
@@ -250,7 +258,8 @@ def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
     if args.fields is None:
         for name in ("field_penetrations", "field_nodes"):
             if getattr(args, name) is not None:
-                raise InputError(f"--{name.replace('_', '-')} needs --fields, where to write them")
+                option = "--" + name.replace("_", "-")
+                raise InputError(f"{option} needs --fields, the file to which fields are written")
         return []
     if cycle.is_path or len(cycle.turning_points) > 1 or not cycle.control.is_fixed:
         raise InputError(

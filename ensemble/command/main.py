@@ -25,22 +25,26 @@ from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
 from adhesis.ensemble.run.ranks import launched
 
 COMMANDS: dict[str, str] = {
+    "new": "write a commented campaign file to start from",
     "run": "run or resume a campaign; under mpirun, rank 0 hands out and the others work",
-    "status": "what of a results file is pending, done and failed",
-    "verify": "whether a results file is damaged, and which of its rows",
+    "status": "report which tasks of a results file are pending, done and failed",
+    "verify": "check whether a results file is damaged, and which of its rows",
     "merge": "join the results files of parts, as --part has made them, into one",
-    "report": "tables, curves and figures of a results file",
-    "loop": "one loop of one profile",
-    "trace": "a measured trace to its loss, with what is doubtful about it",
-    "validate": "the exact references: error against bound",
-    "bench": "speed against error of each method",
+    "report": "write tables, curves and figures of a results file",
+    "loop": "compute one loop of one profile",
+    "trace": "compute the loss of a measured trace, and its uncertainty",
+    "sample": "write a sample trace, to try `trace` with",
+    "validate": "compare the methods with exact references: error against bound",
+    "bench": "measure the speed of each method against its error",
     "warm": "compile both methods now, for all users of this installation",
-    "doctor": "which MPI, HDF5, FFTW and writer this installation uses, and why",
+    "doctor": "report which MPI, HDF5, FFTW and writer this installation uses, and why",
+    "completion": "print the code with which a shell completes commands and options",
 }
 EXAMPLES = (
     "adhesis loop --hurst 0.8 --seed 1",
     "adhesis run jobs/example.toml --ranks 3",
 )
+_CAMPAIGNS = ("new", "run", "status", "verify", "merge", "report")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
 _OPTIONS = {
     "loop": "adhesis.ensemble.loop.loop_arguments",
@@ -86,9 +90,15 @@ def main(argv: list[str] | None = None) -> int:
     return 0 if code and hand_over(code) else code
 
 
+def module_of(name: str) -> str:
+    """Return the name of a command's module."""
+    folder = "campaigns." if name in _CAMPAIGNS else ""
+    return f"adhesis.ensemble.command.{folder}{name}"
+
+
 def parser_of(name: str) -> Parser:
     """Return the parser of a command."""
-    module = importlib.import_module(_OPTIONS.get(name, f"adhesis.ensemble.command.{name}"))
+    module = importlib.import_module(_OPTIONS.get(name, module_of(name)))
     parser = Parser(f"adhesis {name}", module.__doc__ or "", module.EXAMPLES)
     module.add_arguments(parser)
     return parser
@@ -137,7 +147,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
         return 0
     args.words = list(words)
     with naming_options():
-        code: int = importlib.import_module(f"adhesis.ensemble.command.{name}").execute(args)
+        code: int = importlib.import_module(module_of(name)).execute(args)
     return code
 
 
@@ -160,7 +170,7 @@ def _termination(*, enabled: bool) -> Iterator[None]:
 
 
 def _overview() -> Parser:
-    listing = "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
+    listing = "\n".join(f"  {name:<12}{text}" for name, text in COMMANDS.items())
     parser = Parser(
         "adhesis",
         "Hysteresis loops of rough contacts with zero-range (JKR) adhesion.\n\n"

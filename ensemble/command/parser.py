@@ -5,11 +5,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
-from adhesis.ensemble.errors import InputError
-
-_LONGEST = 80  # characters of a value that are shown
+from adhesis.ensemble.errors import InputError, quoted
 
 
 class Parser(argparse.ArgumentParser):
@@ -51,6 +49,11 @@ class Parser(argparse.ArgumentParser):
             link = " " if error.message.startswith("is ") else ": "
             self.error(f"{error.argument_name}{link}{error.message}")
 
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            names = ", ".join(map(repr, action.choices))
+            raise argparse.ArgumentError(action, f"is {value!r}: it must be one of {names}")
+
     def error(self, message: str) -> NoReturn:
         """Raise an InputError that names the help."""
         raise InputError(f"{message} ({self.prog} --help lists the options)")
@@ -67,7 +70,7 @@ def _whole_number(value: str) -> int:
         return int(value)
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"is {_shown(value)}: it must be a whole number"
+            f"is {quoted(value)}: it must be a whole number"
         ) from None
 
 
@@ -75,14 +78,10 @@ def _number(value: str) -> float:
     try:
         return float(value)  # NaN too: the rule of the quantity refuses it
     except ValueError:
-        raise argparse.ArgumentTypeError(f"is {_shown(value)}: it must be a number") from None
+        raise argparse.ArgumentTypeError(f"is {quoted(value)}: it must be a number") from None
 
 
 def _path(value: str) -> Path:
     if not value:
         raise argparse.ArgumentTypeError("is '': it must be the name of a file or directory")
     return Path(value)
-
-
-def _shown(value: str) -> str:
-    return repr(value if len(value) <= _LONGEST else value[:_LONGEST] + "…")

@@ -7,7 +7,9 @@ import sys
 import time
 
 from adhesis.ensemble.errors import InputError, refused_as_input
+from adhesis.ensemble.loop.cycle import control_of, turning_points_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
+from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.reporter import StatusLine
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
@@ -16,24 +18,31 @@ from adhesis.ensemble.trace.variants import Plan, clock, make_plan
 from adhesis.solver.model.half_space import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
-_FIGURES = ("trace.png", "spectrum.png", "loop.png", "cut-off.png", "tables.png")
-_FILES = ("trace.json", "trace.html", "trace.md", *_FIGURES)
+_FIGURES = ("trace", "spectrum", "loop", "cut-off", "tables")
+_FILES = (
+    *("trace.json", "trace.html", "trace.md"),
+    *(f"{name}.{suffix}" for name in _FIGURES for suffix in ("png", "pdf")),
+)
 
 
 def execute(args: argparse.Namespace) -> int:
     """Read, plan, run, write; returns the exit code."""
     if args.to is None and not args.plan:
-        raise InputError("give --to, the directory for the page, or --plan")
+        raise InputError("--to is missing: give the directory for the page, or --plan for none")
     if args.processes is not None and args.processes < 1:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
     gammas = _numbers(args.work_of_adhesion, "--work-of-adhesion")
-    depths = _numbers(args.max_penetration, "--max-penetration")
     with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
-        cycle = make_cycle(half_space, gammas, depths, args.load_steps, args.method, args.accuracy)
+        control = control_of(args, half_space)
+        turns = turning_points_of(args, control)
+        cycle = make_cycle(
+            half_space, gammas, turns, args.load_steps, args.method, args.accuracy, control
+        )
     if args.to is not None:
         check_output_folder("--to", args.to, _FILES, {"the command": args.file})
     prepared = prepared_of(args, trace_of(args, args.file))
+    source = input_record(args.file)
     with refused_as_input(vars(args)):
         check(prepared, cycle)
     plan = make_plan(prepared, cycle, quick=args.quick, processes=args.processes)
@@ -53,7 +62,9 @@ def execute(args: argparse.Namespace) -> int:
     writing = Writing()
     with writing.output("--to", args.to / "trace.json"):
         args.to.mkdir(parents=True, exist_ok=True)
-        write_json(args.to / "trace.json", document(answer))
+        numbers = document(answer)
+        numbers["provenance"] = provenance(args.words, source, None, numbers)
+        write_json(args.to / "trace.json", numbers)
     with writing.output("--to", args.to / "trace.html"), staged_folder(args.to) as folder:
         write_page(answer, folder)
     print(summary(answer))
@@ -67,9 +78,11 @@ def _numbers(text: str, option: str) -> list[float]:
     try:
         values = [float(word) for word in str(text).split(",")]
     except ValueError:
-        raise InputError(f"{option} is {text!r}: one number, or several with commas") from None
+        raise InputError(
+            f"{option} is {text!r}: it must be one number, or several with commas"
+        ) from None
     if len(set(values)) < len(values):
-        raise InputError(f"{option} is {text!r}: it names a value twice")
+        raise InputError(f"{option} is {text!r}: its values must differ")
     return values
 
 
@@ -87,8 +100,7 @@ class _Progress:
     def _text(self, pool: Pool, finished: bool) -> str:
         now = time.monotonic()
         running = ", ".join(
-            f"{name} ({branch} {penetration:+.2f})"
-            for name, (_, branch, penetration) in pool.running.items()
+            f"{name} ({branch} {drive:+.3g})" for name, (_, branch, drive) in pool.running.items()
         )
         left = self._left(pool, now)
         line = f"{len(pool.done)} of {len(self.plan.runs)} loops"

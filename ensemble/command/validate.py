@@ -1,4 +1,7 @@
-"""The methods against exact references: error against bound, exit code 1 if one is exceeded."""
+"""Compare the methods with exact references: error against bound.
+
+Exit code 1 if a bound is exceeded.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read the loading path of ``adhesis loop``: turning points or any path, and the control."""
+"""Read loading paths from options: turning points or any path, and the control."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Cycle:
             If it breaks a rule, which the message gives.
         """
         if self.is_path:
-            check_path(self.turning_points, self.load_steps, problem)
+            check_path(self.turning_points, self.load_steps, problem, self.out)
         for turn in () if self.is_path else self.turning_points:
             check_cycle(turn, self.load_steps, self.control)
 
@@ -68,16 +68,26 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     ValueError
         If stiffness or layer break their rule.
     """
-    control = _control(args, half_space)
-    given = [n for n in ("max_penetration", "max_stress", "path") if getattr(args, n) is not None]
-    if len(given) > 1:
-        names = " and ".join("--" + name.replace("_", "-") for name in given)
-        raise InputError(f"{names} are given: a loop has one of them")
+    control = control_of(args, half_space)
+    _refuse_several(args, "max_penetration", "max_stress", "path")
     if args.path is not None:
         words = [word.strip() for word in args.path.split(",")]
         out = words[-1] == _OUT
         points = _numbers("--path", words[:-1] if out else words)
         return Cycle(control, points, True, out, args.load_steps)
+    points = turning_points_of(args, control)
+    return Cycle(control, tuple(sorted(points)), False, True, args.load_steps)
+
+
+def turning_points_of(args: argparse.Namespace, control: Control) -> tuple[float, ...]:
+    """Read the turning points of a control, in the given order.
+
+    Raises
+    ------
+    InputError
+        If they belong to another control, are no numbers, or one is given twice.
+    """
+    _refuse_several(args, "max_penetration", "max_stress")
     if control.is_load != (args.max_stress is not None):
         if control.is_load:
             raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
@@ -87,15 +97,30 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     points = (_MAX_PENETRATION,) if text is None else _numbers(name, str(text).split(","))
     if len(set(points)) < len(points):
         raise InputError(f"{name} is {text}: turning points must differ")
-    return Cycle(control, tuple(sorted(points)), False, True, args.load_steps)
+    return points
 
 
-def _control(args: argparse.Namespace, half_space: HalfSpace) -> Control:
+def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
+    """Read the control: a fixed separation, a stiffness, that of a layer, or a load.
+
+    Raises
+    ------
+    InputError
+        If both a stiffness and a layer are given.
+    ValueError
+        If one of them breaks its rule.
+    """
     if args.layer is not None:
         if args.stiffness is not None:
             raise InputError("--stiffness and --layer are given: give one of them")
         return Control(half_space.layer_stiffness(args.layer))
     return Control(math.inf if args.stiffness is None else args.stiffness)
+
+
+def _refuse_several(args: argparse.Namespace, *names: str) -> None:
+    given = [f"--{n.replace('_', '-')}" for n in names if getattr(args, n) is not None]
+    if len(given) > 1:
+        raise InputError(f"{' and '.join(given)} are given: a loop has one of them")
 
 
 def _numbers(option: str, words: list[str]) -> tuple[float, ...]:

@@ -25,7 +25,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, one_of
 from adhesis.ensemble.loop.film_page import BODY, STYLE
 from adhesis.ensemble.loop.film_scenes import Scene, Scenes, jump_places, scenes_of
 from adhesis.ensemble.outputs import whole_file
@@ -78,7 +78,7 @@ def check_film(name: str, path: str | os.PathLike[str]) -> Path:
     path = Path(checks.path(name, path))
     ending = path.suffix.lower()
     if ending not in FORMATS:
-        raise InputError(f"{name} is {path}: the name must end in {', '.join(FORMATS)}")
+        raise InputError(f"{name} is {path}: the name must end in {one_of(FORMATS)}")
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError(
             f"{name} is {path}: ffmpeg, which writes .mp4, is not installed, so take .html or .gif"

@@ -8,12 +8,8 @@ import re
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.reading.header_units import (
-    METRES,
-    length_text,
-    parse_units,
-    units_of_header,
-)
+from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
+from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_header
 from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_column
@@ -45,7 +41,8 @@ def read_heights(
     ----------
     path : path
     unit : str, optional
-        Unit of the heights; without it that of the header, and without that metres.
+        Unit of the heights; without it that of the header. Without either they are in metres if
+        they range over at most 1 mm, and otherwise refused.
     delimiter, decimal : str, optional
         Delimiter and decimal sign, where a text can be read in two ways.
 
@@ -72,18 +69,18 @@ def read_heights(
         array = load_array(source)
         if array.ndim == 2 and 1 not in array.shape:
             raise InputError(_not_one_column(source, *array.shape))
-        return np.asarray(array.reshape(-1) * METRES[given or "m"])
+        return _in_metres(source, array.reshape(-1), given)
     table = read_column(source, delimiter, decimal)
     if len(table.columns) > 1:
         raise InputError(_not_one_column(source, table.columns.shape[1], len(table.columns)))
-    heights: Array = table.columns[0] * METRES[_unit_of(source, table, given)]
-    missing = np.flatnonzero(~np.isfinite(heights))
+    unit = _unit_of(source, table, given)
+    missing = np.flatnonzero(~np.isfinite(table.columns[0]))
     if missing.size:
         raise InputError(
             f"{path} has no finite height on line {table.lines[missing[0]]}: --heights needs every "
             "height of the period (adhesis trace fills gaps)"
         )
-    return heights
+    return _in_metres(source, table.columns[0], unit)
 
 
 def _not_one_column(source: Source, rows: int, columns: int) -> str:
@@ -99,14 +96,27 @@ def _unit(text: str) -> str:
     return parse_units(text)[1]
 
 
-def _unit_of(source: Source, table: Table, given: str | None) -> str:
-    """Return the unit of the heights: of the option, of the header, or metres without either."""
+def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
+    """Convert heights to m; without a unit they are taken as metres, if they can be."""
+    if unit is not None:
+        return np.asarray(heights * METRES[unit])
+    size = float(np.ptp(heights)) if heights.size else 0.0
+    if HIGHEST_IN_METRES < size < np.inf:
+        raise InputError(
+            f"{source} states no unit, and its heights would range over {length_text(size, 4)}: "
+            "give --unit, as in --unit um (--unit m, if metres are meant)"
+        )
+    return heights
+
+
+def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
+    """Return the unit of the heights, of the option or of the header; None without either."""
     found = units_of_header(table.header, table.fields)[-1]
     if given is not None:
         if found not in (None, given):
             raise InputError(
-                f"--unit is {given} and the header of {source} has heights in {found}: take the "
-                "wrong one out"
+                f"--unit is {given} and the header of {source} has heights in {found}: correct the "
+                "wrong one"
             )
         return given
     if found is not None:
@@ -118,7 +128,7 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str:
                 f"the header of {source} has {word[0]!r}, from which the unit of the heights is "
                 "not clear: give --unit, as in --unit um"
             )
-    return "m"
+    return None
 
 
 def closure_warning(heights: Array, name: str) -> str | None:

@@ -1,7 +1,8 @@
 """Compute one loading-unloading loop of one profile: its losses, its jumps and its energy audit.
 
 The profile is either given as heights (one period, equally spaced, band-limited interpolation
-between them), a measured trace, or self-affine with random phases. Lengths in m, stresses in Pa.
+between them), a measured trace, or self-affine with random phases. Lengths are in m unless they
+carry a unit (5um), stresses in Pa.
 """
 
 from __future__ import annotations
@@ -10,13 +11,14 @@ import argparse
 import math
 from pathlib import Path
 
-from adhesis.ensemble.trace.trace_arguments import add_reading_arguments
+from adhesis.ensemble.lengths import height, length
+from adhesis.ensemble.trace.trace_arguments import add_cycle_arguments, add_reading_arguments
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6
 EXAMPLES = (
     "adhesis loop --hurst 0.8 --seed 1 --json loop.json",
-    "adhesis loop --heights heights.csv --period 1e-3 --work-of-adhesion 0.04 --young 1e6 "
+    "adhesis loop --heights heights.csv --period 1mm --work-of-adhesion 0.04 --young 1e6 "
     "--poisson 0.5 --figure loop.png",
 )
 
@@ -24,19 +26,24 @@ EXAMPLES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``adhesis loop``."""
     shape = parser.add_argument_group("profile (--heights, --hurst or --trace)")
-    shape.add_argument("--heights", type=Path, metavar="FILE", help="text or .npy: heights in m")
+    shape.add_argument(
+        "--heights",
+        type=Path,
+        metavar="FILE",
+        help="text or .npy: heights in m, or in the unit of the header or of --unit",
+    )
     shape.add_argument(
         "--trace", type=Path, metavar="FILE", help="a measured trace: see adhesis trace"
     )
     shape.add_argument("--hurst", type=float, metavar="H", help="Hurst exponent, 0 < H < 1")
     shape.add_argument("--seed", type=int, metavar="K", help="seed of the phases (default 0)")
     shape.add_argument(
-        "--period", type=float, metavar="L", help="period in m (default with --hurst: 2π mm)"
+        "--period", type=length, metavar="L", help="period: 2mm (default with --hurst: 2π mm)"
     )
     shape.add_argument("--n0", type=int, help=f"lowest harmonic (default {N0})")
     shape.add_argument("--ratio", type=int, help=f"highest over lowest harmonic (default {RATIO})")
     shape.add_argument(
-        "--h-rms", type=float, metavar="M", help=f"rms height in m (default {H_RMS:g})"
+        "--h-rms", type=height, metavar="M", help="rms height: 0.5um (default 1um)"
     )
     shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
     shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
@@ -47,15 +54,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--work-of-adhesion",
         type=float,
         metavar="G",
-        help="J/m² (required with --heights; else default 0.04)",
+        help="J/m² (required unless the profile is that of --hurst; there 0.04)",
     )
     contact.add_argument(
-        "--young", type=float, metavar="E", help="Pa (required with --heights; else default 1e6)"
+        "--young", type=float, metavar="E", help="Pa (likewise; with --hurst 1e6)"
     )
     contact.add_argument(
-        "--poisson", type=float, metavar="NU", help="(required with --heights; else default 0.5)"
+        "--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)"
     )
-    _add_cycle_arguments(contact)
+    add_cycle_arguments(contact)
+    contact.add_argument(
+        "--path",
+        metavar="A,B,…,out",
+        help="instead of turning points: any path, loading first, ending with 'out' of contact or "
+        "in contact",
+    )
     method = parser.add_argument_group("method")
     method.add_argument(
         "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
@@ -66,6 +79,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     method.add_argument("--nodes-per-wave", type=int, metavar="N", help="for grid")
     output = parser.add_argument_group("output")
     output.add_argument("--json", type=Path, metavar="OUT", help="states, losses and jumps")
+    output.add_argument(
+        "--csv", type=Path, metavar="FILE", help="the curve: a row a state, units in the header"
+    )
     output.add_argument(
         "--figure", type=Path, metavar="FILE", help="stress and contact: .png, .pdf or .svg"
     )
@@ -88,32 +104,3 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--strict", action="store_true", help="exit code 1 if the loss is doubtful"
     )
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
-
-
-def _add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
-    """Declare the options of the loading path."""
-    group.add_argument(
-        "--max-penetration",
-        metavar="D[,D…]",
-        help="turning point in h_max, or several that share their loading branch (default 0.9); "
-        "with --stiffness of the far side, u_tot/h_max",
-    )
-    group.add_argument(
-        "--max-stress", metavar="P[,P…]", help="Pa: turning points under a load (--stiffness 0)"
-    )
-    group.add_argument(
-        "--path",
-        metavar="A,B,…,out",
-        help="instead: any path, loading first, ending with 'out' of contact or in contact",
-    )
-    group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
-    group.add_argument(
-        "--stiffness",
-        type=float,
-        metavar="K",
-        help="Pa/m of nominal area of what holds the solid; 0 is load control "
-        "(default: fixed separation)",
-    )
-    group.add_argument(
-        "--layer", type=float, metavar="D", help="m: the stiffness of a layer of this thickness"
-    )

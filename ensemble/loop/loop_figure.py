@@ -41,8 +41,9 @@ def draw_loops(results: Sequence[LoopResult] | PathResult) -> Figure:
         else:
             _draw_each(stress, contact, results)
         stress.axhline(0, color="0.7", lw=0.5, zorder=0)
-        stress.set(xlabel="penetration Δ/h_max", ylabel="mean stress (kPa)")
-        contact.set(xlabel="penetration Δ/h_max", ylabel="contact fraction A/A0", ylim=(0, None))
+        depth = r"penetration $\Delta/h_{\max}$"
+        stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
+        contact.set(xlabel=depth, ylabel="contact fraction $A/A_0$", ylim=(0, None))
         if len(stress.get_legend_handles_labels()[1]) > 1:
             contact.legend()
     return figure

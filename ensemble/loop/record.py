@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
@@ -85,7 +86,9 @@ def path_summary(result: PathResult) -> str:
     lines = [
         f"path        {way}{', out' if result.ends_out else ''} in {result.load_steps} load steps "
         "to the largest",
-        f"work        {result.work:.6g} J/m², of which {result.energy_change:.6g} J/m² are stored",
+        f"work        {result.work:.6g} J/m²"
+        f"{in_works_of_adhesion(result.work, result.problem.work_of_adhesion)}, of which "
+        f"{result.energy_change:.6g} J/m² are stored",
         _audit(result),
         _range(result),
     ]
@@ -119,7 +122,9 @@ def loop_summary(result: LoopResult) -> str:
             f"detached by {result.pull_off_penetration:.4g} h_max; "
             f"largest contact fraction {result.contact_fraction.max():.4g}, "
             f"most patches {result.patches.max()}",
-            f"loss        {result.loss:.6g} J/m² (dimensionless {result.loss_dimensionless:.6g})",
+            f"loss        {result.loss:.6g} J/m²"
+            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)} "
+            f"(dimensionless {result.loss_dimensionless:.6g})",
             _range(result),
             _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,25 @@ def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str
 
 
 # ---------------------------------------------------------------------- files
+
+
+def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
+    """Write the states as a CSV, one row each, with units in the header (OSError).
+
+    Of several loops the first column is the turning point.
+    """
+    several = [results] if isinstance(results, PathResult) else results
+    tables = [to_dataframe(result, "states") for result in several]
+    units = tables[0].attrs["units"] | {"penetration": "h_max"}
+    if not isinstance(results, PathResult) and len(results) > 1:
+        units["turning_point"] = "Pa" if results[0].problem.control.is_load else "h_max"
+        for table, result in zip(tables, results, strict=True):
+            table.insert(0, "turning_point", result.turning_point)
+    for table in tables:
+        table.attrs.clear()  # pandas compares them when it joins tables
+    names = {name: f"{name} ({unit})" if unit else name for name, unit in units.items()}
+    with whole_file(path) as stream:
+        pd.concat(tables).rename(columns=names).to_csv(stream, index=False)
 
 
 def save(result: Result, path: str | os.PathLike[str]) -> None:

@@ -13,7 +13,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adhesis.ensemble.quantities import UNITS, with_units
+from adhesis.ensemble.quantities import UNITS, in_works_of_adhesion, with_units
 from adhesis.ensemble.reporter import bar
 from adhesis.solver import checks
 from adhesis.solver.loading.loop import Progress
@@ -132,7 +132,11 @@ def _rows_of_result(result: Result) -> list[tuple[str, str]]:
     problem = result.problem
     is_loop = isinstance(result, LoopResult)
     rows = [
-        ("loss" if is_loop else "work", f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²"),
+        (
+            "loss" if is_loop else "work",
+            f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²"
+            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)}",
+        ),
         ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
         ("jumps", str(len(result.jumps))),
         ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),

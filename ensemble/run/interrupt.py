@@ -11,7 +11,7 @@ from traceback import walk_tb
 from types import FrameType
 from typing import Any, Self
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, parameter
 
 # Tasks in progress are given up, and the file is closed, this long (s) before the walltime ends, or
 # this share of it if that is shorter.
@@ -90,7 +90,8 @@ def parse_duration(text: str) -> float:
         seconds = ((24 * days + hours) * 60 + minutes) * 60 + rest
     if not 0 < seconds < 1e9:
         raise InputError(
-            f"walltime is {text!r}: it must be a positive time as 3600, 1h30m or 12:00:00"
+            f"{parameter('walltime')} is {text!r}: it must be a positive time as 3600 (s), 1h30m "
+            "or 12:00:00"
         )
     return seconds
 

@@ -30,6 +30,7 @@ from adhesis.solver.checks import (
     whole,
 )
 from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.registry import METHOD_NAMES, MethodName
@@ -57,6 +58,8 @@ DOUBTS = {
 }
 
 
+# Turning point Δ/h_max of the answer where none is given.
+MAX_PENETRATION = 0.9
 Several = float | Sequence[float]
 
 
@@ -218,7 +221,9 @@ def loss_of_trace(
     *,
     half_space: HalfSpace,
     work_of_adhesion: Several,
-    max_penetration: Several = 0.9,
+    max_penetration: Several | None = None,
+    max_stress: Several | None = None,
+    control: Control | None = None,
     load_steps: int = 40,
     method: MethodName = "auto",
     accuracy: float = 1e-3,
@@ -236,8 +241,13 @@ def loss_of_trace(
     work_of_adhesion : float or several
         γ in J/m²; the first is the answer's, the others fill its table (without others, half and
         twice as much).
-    max_penetration : float or several
-        Turning points Δ/h_max in the same way (without others, one and two thirds).
+    max_penetration : float or several, optional
+        Turning points Δ/h_max in the same way (without others, one and two thirds); u_tot/h_max
+        if the control is a stiffness. 0.9 by default.
+    max_stress : float or several, optional
+        Instead, under a load: turning points p̄ in Pa.
+    control : Control, optional
+        What is prescribed along the path; without it the separation.
     load_steps : int
         Of the loading branch of each loop.
     method : {"auto", "sharp", "grid"}
@@ -265,7 +275,17 @@ def loss_of_trace(
     ----------
     docs/measured-profile.md, "The answer and its doubts"
     """
-    cycle = make_cycle(half_space, work_of_adhesion, max_penetration, load_steps, method, accuracy)
+    control = Control() if control is None else control
+    instance("control", control, Control, "Control(stiffness), for a load Control(0)")
+    cycle = make_cycle(
+        half_space,
+        work_of_adhesion,
+        _turns(control, max_penetration, max_stress),
+        load_steps,
+        method,
+        accuracy,
+        control,
+    )
     check(prepared, cycle)
     flag("quick", quick)
     function("watch", watch)
@@ -285,13 +305,29 @@ def loss_of_trace(
         return run_plan(prepared, cycle, plan, both)
 
 
+def _turns(
+    control: Control, max_penetration: Several | None, max_stress: Several | None
+) -> Several:
+    """Return the turning points that belong to a control."""
+    if control.is_load:
+        if max_penetration is not None:
+            raise ValueError("max_penetration is given: a path under a load turns at max_stress")
+        if max_stress is None:
+            raise ValueError("max_stress is missing: a path under a load must have it, in Pa")
+        return max_stress
+    if max_stress is not None:
+        raise ValueError("max_stress is given: it belongs to a load, so give control=Control(0)")
+    return MAX_PENETRATION if max_penetration is None else max_penetration
+
+
 def make_cycle(
     half_space: HalfSpace,
     work_of_adhesion: Several,
-    max_penetration: Several,
+    turning_points: Several,
     load_steps: int,
     method: MethodName,
     accuracy: float,
+    control: Control | None = None,
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -302,15 +338,17 @@ def make_cycle(
     """
     choice("method", method, METHOD_NAMES)
     real("accuracy", accuracy, ACCURACY)
-    gammas, depths = default_tables(
-        _several("work_of_adhesion", work_of_adhesion), _several("max_penetration", max_penetration)
+    control = control or Control()
+    turning = "max_stress" if control.is_load else "max_penetration"
+    gammas, turns = default_tables(
+        _several("work_of_adhesion", work_of_adhesion), _several(turning, turning_points)
     )
-    for name, values in (("work_of_adhesion", gammas), ("max_penetration", depths)):
+    for name, values in (("work_of_adhesion", gammas), (turning, turns)):
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
-    for depth in depths:
-        check_cycle(depth, load_steps)
-    return Cycle(half_space, gammas, depths, load_steps, method, accuracy)
+    for point in turns:
+        check_cycle(point, load_steps, control)
+    return Cycle(half_space, gammas, turns, load_steps, method, accuracy, control)
 
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
@@ -456,9 +494,12 @@ def document(answer: Answer) -> dict[str, Any]:
         "young": cycle.half_space.young,
         "poisson": cycle.half_space.poisson,
         "work_of_adhesion": cycle.works_of_adhesion[0],
-        "max_penetration": cycle.max_penetrations[0],
+        "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
+        "max_penetration": None if cycle.control.is_load else cycle.turning_points[0],
+        "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
         "load_steps": cycle.load_steps,
         "loss": _plain(answer.loss),
+        "loss_over_work_of_adhesion": answer.main["loss_over_work_of_adhesion"],
         "pull_off_stress": _plain(answer.pull_off_stress),
         "contact_fraction": _plain(answer.contact_fraction),
         "valid_range": answer.valid_range,

@@ -17,9 +17,11 @@ from adhesis.ensemble.report.figures.style import (
     TWO_COLUMNS,
     new_figure,
     plain_decades,
+    save,
     style,
 )
 from adhesis.ensemble.trace.answer import Answer
+from adhesis.ensemble.trace.variants import Cycle
 from adhesis.solver.model.measured_profile import trace_spectrum
 from adhesis.solver.model.profile import Array
 
@@ -37,7 +39,7 @@ class Drawn:
 
 
 def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
-    """Draw all figures for which the answer has data, as PNG (200 dpi)."""
+    """Draw all figures for which the answer has data, as PNG and PDF."""
     drawn = []
     with style():
         for stem, title, build in (
@@ -51,8 +53,7 @@ def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
             if built is None:
                 continue
             figure, caption = built
-            path = folder / f"{stem}.png"
-            figure.savefig(path, dpi=200, metadata={"Software": None})
+            path, _ = save(figure, folder / stem)
             drawn.append(Drawn(path, title, caption))
     return drawn
 
@@ -221,9 +222,9 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
     cycle = answer.cycle
     gammas = [(cycle.works_of_adhesion[0], answer.main)]
     gammas += [(float(n.split()[1]), r) for n, _, r in answer.group("work of adhesion")]
-    depths = [(cycle.max_penetrations[0], answer.main)]
-    depths += [(float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
-    if len(gammas) + len(depths) < 4:
+    turns = [(cycle.turning_points[0], answer.main)]
+    turns += [(float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    if len(gammas) + len(turns) < 4:
         return None
     figure = new_figure(3, 2, TWO_COLUMNS, 4.4, sharex="col")
     panels = np.array(figure.axes).reshape(3, 2)
@@ -234,7 +235,7 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
     )
     for line, (key, by, label, quantity) in enumerate(rows):
         top = 0.0
-        for column, points in enumerate((sorted(gammas, key=_first), sorted(depths, key=_first))):
+        for column, points in enumerate((sorted(gammas, key=_first), sorted(turns, key=_first))):
             axes: Axes = panels[line, column]
             x = [point[0] for point in points]
             y = np.array([by * point[1][key] for point in points])
@@ -245,12 +246,18 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
         for axes in panels[line]:
             axes.set_ylim(0, top)
         panels[line, 0].set_ylabel(label)
-    panels[2, 0].set_xlabel("work of adhesion γ (J/m²)")
-    panels[2, 1].set_xlabel(r"turning point $\Delta/h_{\max}$")
+    panels[2, 0].set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
+    panels[2, 1].set_xlabel("turning point " + _turn_label(cycle))
     return figure, (
         "Bars: the relative uncertainty of the answer; at the other points it is assumed to be "
         "the same."
     )
+
+
+def _turn_label(cycle: Cycle) -> str:
+    if cycle.control.is_load:
+        return r"$\bar p$ (Pa)"
+    return r"$\Delta/h_{\max}$" if cycle.control.is_fixed else r"$u_\mathrm{tot}/h_{\max}$"
 
 
 def _first(point: tuple[float, Any]) -> float:

@@ -8,7 +8,6 @@ from pathlib import Path
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.reading.header_units import parse_length
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.reading.text_table import DELIMITERS
 
@@ -26,12 +25,12 @@ def trace_of(args: argparse.Namespace, path: Path) -> Trace:
             columns = [int(word) for word in args.columns.split(",")]
         except ValueError:
             raise InputError(
-                f"--columns is {args.columns!r}: two whole numbers, as in 1,3"
+                f"--columns is {args.columns!r}: it must be two whole numbers, as in 1,3"
             ) from None
     return read_trace(
         path,
         unit=args.unit,
-        step=None if args.step is None else parse_length(args.step, "--step"),
+        step=args.step,
         columns=columns,
         row=args.row,
         channel=args.channel,
@@ -52,16 +51,12 @@ def delimiter_of(args: argparse.Namespace) -> str | None:
 
 def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:
     """Prepare the trace by the options."""
-
-    def length(text: str | None, option: str) -> float | None:
-        return None if text is None else parse_length(text, option)
-
     return prepare_trace(
         trace,
         degree=args.degree,
-        cut_off=length(args.cut_off, "--cut-off"),
-        tip_radius=length(args.tip_radius, "--tip-radius"),
-        longest_gap=length(args.longest_gap, "--longest-gap"),
+        cut_off=args.cut_off,
+        tip_radius=args.tip_radius,
+        longest_gap=args.longest_gap,
         keep_outliers=args.keep_outliers,
         invert=args.invert,
     )
@@ -80,4 +75,5 @@ def what_was_read(prepared: Prepared) -> str:
 
 def given(args: argparse.Namespace) -> list[str]:
     """Return the given options of reading and preparation."""
-    return [f"--{name.replace('_', '-')}" for name in _NAMES if getattr(args, name)]
+    names = [name for name in _NAMES if getattr(args, name) not in (None, False)]
+    return [f"--{name.replace('_', '-')}" for name in names]

@@ -1,7 +1,7 @@
-"""A measured trace to its loss, with what is doubtful about it.
+"""Compute the loss of a measured trace, and its uncertainty.
 
-Reads a text of one or two columns, or an instrument's file, says what it read, makes one period of
-it step by step, runs the loop and what could have been decided otherwise, and writes one page.
+The trace is a text of one or two columns, or an instrument's file. One period of a profile is made
+of it, its loop is run and those that other decisions would have given, and one page is written.
 Lengths are in m unless they carry a unit (5um), stresses in Pa.
 """
 
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+
+from adhesis.ensemble.lengths import length
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
@@ -24,14 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--work-of-adhesion",
         required=True,
         metavar="G",
-        help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others a table",
+        help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others make a "
+        "table, as of several turning points",
     )
     contact.add_argument("--young", type=float, required=True, metavar="E", help="Pa")
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
-    contact.add_argument(
-        "--max-penetration", default="0.9", metavar="D", help="Δ/h_max, or several (default 0.9)"
-    )
-    contact.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+    add_cycle_arguments(contact)
     contact.add_argument(
         "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
     )
@@ -39,12 +39,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_reading_arguments(parser)
     output = parser.add_argument_group("output")
     output.add_argument("--to", type=Path, metavar="DIR", help="for the page, its figures and JSON")
-    output.add_argument("--plan", action="store_true", help="say what would be done, do nothing")
+    output.add_argument("--plan", action="store_true", help="print the plan, and stop")
     output.add_argument(
         "--quick", action="store_true", help="without tables of γ and turning point"
     )
     output.add_argument("--processes", type=int, metavar="N", help="side by side (default: cores)")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
+    """Declare turning points and control, which ``adhesis loop`` shares."""
+    group.add_argument(
+        "--max-penetration",
+        metavar="D[,D…]",
+        help="turning points in h_max (default 0.9); with --stiffness those of the far side, "
+        "u_tot/h_max",
+    )
+    group.add_argument(
+        "--max-stress",
+        metavar="P[,P…]",
+        help="instead, under a load (--stiffness 0): turning points in Pa",
+    )
+    group.add_argument(
+        "--stiffness",
+        type=float,
+        metavar="K",
+        help="Pa/m of nominal area of what holds the solid; 0 is load control "
+        "(default: fixed separation)",
+    )
+    group.add_argument(
+        "--layer",
+        type=length,
+        metavar="D",
+        help="instead: the stiffness of a layer of this thickness, 1mm",
+    )
+    group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +82,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument(
         "--unit", metavar="U", help="unit of a text: um, or mm,um for positions and heights"
     )
-    reading.add_argument("--step", metavar="S", help="step, for heights without positions: 0.5um")
+    reading.add_argument(
+        "--step", type=length, metavar="S", help="step, for heights without positions: 0.5um"
+    )
     reading.add_argument("--columns", metavar="X,Z", help="columns of a text, from 1")
     reading.add_argument("--delimiter", metavar="C", help="of a text, if it is not found out")
     reading.add_argument("--decimal", choices=[",", "."], help="decimal sign, if not found out")
@@ -64,11 +95,19 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--degree", type=int, metavar="N", help="polynomial taken off (default 1, or as is seen)"
     )
     making.add_argument(
-        "--cut-off", metavar="W", help="shortest wave kept (default from step, noise and tip)"
+        "--cut-off",
+        type=length,
+        metavar="W",
+        help="shortest wave kept: 5um (default from step, noise and tip)",
     )
-    making.add_argument("--tip-radius", metavar="R", help="of the stylus or probe: 2um")
     making.add_argument(
-        "--longest-gap", metavar="G", help="drop-outs up to this length are interpolated"
+        "--tip-radius", type=length, metavar="R", help="of the stylus or probe: 2um"
+    )
+    making.add_argument(
+        "--longest-gap",
+        type=length,
+        metavar="G",
+        help="drop-outs up to this length are interpolated: 20um",
     )
     making.add_argument("--keep-outliers", action="store_true", help="leave spikes in")
     making.add_argument("--invert", action="store_true", help="z points into the sample: turn it")

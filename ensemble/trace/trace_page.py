@@ -7,11 +7,12 @@ from pathlib import Path
 
 from adhesis._version import __version__
 from adhesis.ensemble.escape import code_span, markdown, printable
+from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.outputs import staged_folder, write_json
+from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, Answer, Quantity, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
-from adhesis.ensemble.trace.reading.header_units import length_text
 from adhesis.solver.checks import counted
 
 
@@ -19,11 +20,13 @@ def summary(answer: Answer) -> str:
     """The answer in a few lines for the terminal."""
     loop = answer.main
     lines = [
-        f"loss        {_value(answer.loss, 1e3, 'mJ/m²')}",
+        f"loss        {_value(answer.loss, 1e3, 'mJ/m²')}"
+        f"{in_works_of_adhesion(answer.loss.value, answer.cycle.works_of_adhesion[0])}",
         f"pull-off    {_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension",
         f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area')} at most",
-        f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to Δ/h_max = "
-        f"{answer.cycle.max_penetrations[0]:g} with h_max = {length_text(loop['h_max'], 4)}; "
+        f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
+        f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
+        f"{length_text(loop['h_max'], 4)}; "
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
         f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
@@ -97,12 +100,13 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
     }
     parts = [
         f"# From the trace {code_span(name)} to its loss",
-        f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area, pull-off at a mean "
-        f"tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
-        f"most **{_value(answer.contact_fraction, 1.0, '')}**: one loop to Δ/h_max = "
-        f"{cycle.max_penetrations[0]:g} (h_max = {length_text(answer.main['h_max'], 4)}) and off "
-        f"again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} Pa, "
-        f"ν = {half_space.poisson:g}.",
+        f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area"
+        f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}, pull-off at a "
+        f"mean tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
+        f"most **{_value(answer.contact_fraction, 1.0, '')}**: one loop to "
+        f"{cycle.turn(cycle.turning_points[0])} (h_max = {length_text(answer.main['h_max'], 4)}) "
+        f"and off again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} "
+        f"Pa, ν = {half_space.poisson:g}.",
         *(f"> **Warning:** {markdown(warning)}" for warning in answer.warnings),
         "## What was read",
         f"- {code_span(name)}: {markdown('; '.join(trace.notes))}\n- {trace.summary}",
@@ -188,11 +192,14 @@ def _variant_rows(answer: Answer) -> list[list[str]]:
 
 def _sweep_rows(answer: Answer) -> list[list[str]]:
     cycle = answer.cycle
-    gamma, depth = cycle.works_of_adhesion[0], cycle.max_penetrations[0]
-    rows = [(gamma, depth, answer.main)]
-    rows += [(float(n.split()[1]), depth, r) for n, _, r in answer.group("work of adhesion")]
+    gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
+    turn = (
+        "p̄, Pa" if cycle.control.is_load else "Δ/h_max" if cycle.control.is_fixed else "u_tot/h_max"
+    )
+    rows = [(gamma, point, answer.main)]
+    rows += [(float(n.split()[1]), point, r) for n, _, r in answer.group("work of adhesion")]
     rows += [(gamma, float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
-    head = ["γ, J/m²", "Δ/h_max", "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
+    head = ["γ, J/m²", turn, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
     return [
         head,
         *(

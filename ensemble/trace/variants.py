@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import parameter
+from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.reading.header_units import length_text
 from adhesis.ensemble.trace.worker import Job
+from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName
@@ -32,14 +33,26 @@ _START = 2.0  # seconds for a process to start
 
 @dataclass(frozen=True)
 class Cycle:
-    """Contact and cycle in SI units; the answer has the first value of each tuple."""
+    """Contact and cycle in SI units; the answer has the first value of each tuple.
+
+    Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load.
+    """
 
     half_space: HalfSpace
     works_of_adhesion: tuple[float, ...]
-    max_penetrations: tuple[float, ...]
+    turning_points: tuple[float, ...]
     load_steps: int = 40
     method: MethodName = "auto"
     accuracy: float = 1e-3
+    control: Control = field(default_factory=Control)
+
+    def turn(self, point: float) -> str:
+        """Describe a turning point: "Δ/h_max = 0.9"."""
+        if self.control.is_load:
+            return f"p̄ = {point:g} Pa"
+        if self.control.is_fixed:
+            return f"Δ/h_max = {point:g}"
+        return f"u_tot/h_max = {point:g} of a stiffness of {self.control.stiffness:.4g} Pa/m"
 
 
 @dataclass(frozen=True)
@@ -55,7 +68,7 @@ class Run:
     changes: dict[str, Any] = field(default_factory=dict)
     reference: str = "answer"
     work_of_adhesion: float | None = None
-    max_penetration: float | None = None
+    turning_point: float | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,20 +229,26 @@ def _doubts(prepared: Prepared) -> list[Run]:
 
 def _tables(cycle: Cycle) -> list[Run]:
     runs = []
-    gammas, depths = cycle.works_of_adhesion, cycle.max_penetrations
+    gammas, turns = cycle.works_of_adhesion, cycle.turning_points
+    sign = "p̄" if cycle.control.is_load else "Δ" if cycle.control.is_fixed else "u"
     for gamma in gammas[1:]:
         runs.append(
             Run(f"γ {gamma:g}", "work of adhesion", f"γ = {gamma:g} J/m²", work_of_adhesion=gamma)
         )
-    for depth in depths[1:]:
+    for point in turns[1:]:
         runs.append(
-            Run(f"Δ {depth:g}", "turning point", f"Δ/h_max to {depth:g}", max_penetration=depth)
+            Run(
+                f"{sign} {point:g}",
+                "turning point",
+                f"turning at {cycle.turn(point)}",
+                turning_point=point,
+            )
         )
     return runs
 
 
 def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
-    gamma, depth = cycle.works_of_adhesion[0], cycle.max_penetrations[0]
+    gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
     return Job(
         name=run.name,
         period=profile.period,
@@ -237,7 +256,8 @@ def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
         young=cycle.half_space.young,
         poisson=cycle.half_space.poisson,
         work_of_adhesion=gamma if run.work_of_adhesion is None else run.work_of_adhesion,
-        max_penetration=depth if run.max_penetration is None else run.max_penetration,
+        turning_point=point if run.turning_point is None else run.turning_point,
+        stiffness=cycle.control.stiffness,
         load_steps=cycle.load_steps,
         method=cycle.method,
         accuracy=cycle.accuracy,
@@ -290,12 +310,12 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
 
 
 def default_tables(
-    work_of_adhesion: Sequence[float], max_penetration: Sequence[float]
+    work_of_adhesion: Sequence[float], turning_points: Sequence[float]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Complete a single γ by half and twice of it, a single turning point by one and two thirds."""
-    gammas, depths = tuple(work_of_adhesion), tuple(max_penetration)
+    gammas, turns = tuple(work_of_adhesion), tuple(turning_points)
     if len(gammas) == 1 and gammas[0] > 0:
         gammas = (gammas[0], gammas[0] / 2, gammas[0] * 2)
-    if len(depths) == 1:
-        depths = (depths[0], round(depths[0] / 3, 6), round(2 * depths[0] / 3, 6))
-    return gammas, depths
+    if len(turns) == 1:
+        turns = (turns[0], *(float(f"{share * turns[0]:.6g}") for share in (1 / 3, 2 / 3)))
+    return gammas, turns

@@ -6,6 +6,7 @@ script, so it works from a notebook as well as from the command line.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import signal
@@ -44,10 +45,11 @@ class Job(ByValue):
     young: float
     poisson: float
     work_of_adhesion: float
-    max_penetration: float
+    turning_point: float
     load_steps: int
     method: MethodName
     accuracy: float
+    stiffness: float = math.inf
 
 
 def main() -> None:
@@ -76,6 +78,7 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.loading.zero_range import range_warnings
     from adhesis.solver.method import Branch, ContactState
+    from adhesis.solver.model.control import Control
     from adhesis.solver.model.half_space import HalfSpace
     from adhesis.solver.model.problem import Problem
     from adhesis.solver.model.profile import Profile
@@ -90,14 +93,12 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
             report(branch, penetration)
 
     profile = Profile(job.period, job.coefficients)
-    problem = Problem(profile, HalfSpace(job.young, job.poisson), job.work_of_adhesion)
+    half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
+    problem = Problem(profile, half_space, job.work_of_adhesion, control)
     method = make_method(job.method, problem, accuracy=job.accuracy)
-    loop = run_loop(
-        method,
-        max_penetration=job.max_penetration,
-        load_steps=job.load_steps,
-        progress=progress,
-    )
+    name = "max_stress" if control.is_load else "max_penetration"
+    turn: Any = {name: job.turning_point}
+    loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
     return loop.numbers() | {
         "range_warnings": range_warnings(

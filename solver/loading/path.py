@@ -178,15 +178,16 @@ class PathResult(EquilibriumPath):
 
 
 def check_path(
-    turning_points: Sequence[float], load_steps: int, problem: Problem
+    turning_points: Sequence[float], load_steps: int, problem: Problem, out: bool = False
 ) -> tuple[float, ...]:
-    """Check a path and return its turning points.
+    """Check a path and return its turning points; ``out`` says that it ends out of contact.
 
     Raises
     ------
     ValueError
-        Unless it starts with loading and turns at every point, and the largest turning point could
-        be that of a loop (:func:`adhesis.solver.loading.loop.check_cycle`).
+        Unless it starts with loading and turns at every point (at the last one too, if it ends out
+        of contact), and the largest turning point could be that of a loop
+        (:func:`adhesis.solver.loading.loop.check_cycle`).
     TypeError
         If one of them, or load_steps, is not a number.
     """
@@ -206,6 +207,10 @@ def check_path(
                 f"the path goes from {points[i - 1]:g} to {points[i]:g}: after "
                 f"{'loading it must unload' if i % 2 else 'unloading it must load'}"
             )
+    if out and len(points) % 2 == 0:
+        raise ValueError(
+            f"the path ends with unloading to {points[-1]:g} and goes out: omit that turning point"
+        )
     check_cycle(max(points), load_steps, problem.control)
     return points
 
@@ -249,13 +254,9 @@ def run_path(
     docs/theory.md, "8. Paths and controls"
     """
     instance("method", method, Method, HOW_METHOD)
-    points = check_path(turning_points, load_steps, method.problem)
+    points = check_path(turning_points, load_steps, method.problem, flag("out", out))
     load_steps = int(load_steps)
     function("on_state", on_state)
-    if flag("out", out) and len(points) % 2 == 0:
-        raise ValueError(
-            f"the path ends with unloading to {points[-1]:g} and goes out: omit that turning point"
-        )
     started = process_time()
     with progress_of(progress, max(points)) as report:
         runner = _PathRunner(method, Axis(max(points), load_steps), Record(on_state), report)

@@ -368,7 +368,7 @@ def self_affine_profile(
     choice("amplitudes", amplitudes, get_args(Amplitudes))
     top = n0 * ratio
     if top > MOST_WAVES:
-        raise ValueError(f"n0 · ratio is {top}: at most {MOST_WAVES} waves are supported")
+        raise ValueError(f"n0 · ratio is {top}: it must be at most {MOST_WAVES}")
     phase_stream, size_stream = np.random.SeedSequence(seed).spawn(2)
     phase = np.random.default_rng(phase_stream).uniform(-np.pi, np.pi, top)  # wave numbers 1 … top
     m = np.arange(n0, top + 1)

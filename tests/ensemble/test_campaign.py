@@ -119,11 +119,11 @@ def test_bad_values_are_named_with_their_rule(key, value):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"h_rms": "1.0"}, r"h_rms is 1\.0 with period 0\.001: rms slope is .+ it must be .+; are"),
-        ({"h_rms": "1e-18"}, r"h_rms is 1e-18 with period 0\.001: rms slope is .+: it must be"),
-        ({"h_rms": "[1e-6, 1.0]"}, r"h_rms is 1\.0 with period 0\.001: rms slope is"),
-        ({"period": "[1e-3, 1e-9]"}, r"h_rms is 1e-06 with period 1e-09: rms slope is"),
-        ({"ratio": "50000", "h_rms": "1e-3"}, r"h_rms is 0\.001 with period 0\.001: rms slope is"),
+        ({"h_rms": "1.0"}, r"h_rms is 1\.0 with period 0\.001, so the rms slope is .+ must .+ are"),
+        ({"h_rms": "1e-18"}, r"h_rms is 1e-18 with period 0\.001, so the rms slope is .+: it must"),
+        ({"h_rms": "[1e-6, 1.0]"}, r"h_rms is 1\.0 with period 0\.001, so the rms slope is"),
+        ({"period": "[1e-3, 1e-9]"}, r"h_rms is 1e-06 with period 1e-09, so the rms slope is"),
+        ({"ratio": "50000", "h_rms": "1e-3"}, r"h_rms is 0\.001 with period 0\.001, so the rms"),
     ],
 )
 def test_heights_and_period_in_different_units_are_refused_with_the_key(changes, sentence):
@@ -136,7 +136,8 @@ def test_keys_that_vary_together_are_not_refused_for_what_they_never_are_togethe
     lists = {"period": "[1e-9, 1e-3]", "h_rms": "[1e-12, 1e-6]"}
     zipped = campaign_text(**lists).replace("[sweep]", '[sweep]\nzip = [["period", "h_rms"]]')
     assert parse_campaign(zipped).task_count
-    assert "h_rms is 1e-06 with period 1e-09: rms slope is" in refused(campaign_text(**lists))
+    sentence = refused(campaign_text(**lists))
+    assert "h_rms is 1e-06 with period 1e-09, so the rms slope is" in sentence
 
 
 def test_a_grid_that_fills_the_memory_is_refused():
@@ -169,7 +170,7 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         ("[profile\n", "is not valid TOML"),
         ("x = " + "[" * 5000, "is not valid TOML"),
         (campaign_text(ratio="90000", n0="2"), "n0 · ratio is 180000"),
-        (campaign_text(realisations="2000000000"), "tasks: at most"),
+        (campaign_text(realisations="2000000000"), "tasks: it must make at most"),
         (campaign_text(load_steps="100000", unloading_until="-1000"), "unloading curve has"),
         ("# " + "x" * 70_000, "bytes"),
         ("", "[profile] period is missing"),
@@ -384,18 +385,24 @@ def test_a_path_turns_where_its_control_lets_it_turn():
     ("cycle", "sentence"),
     [
         ("", "max_penetration is missing (Δ~max"),
-        ('control = "load"', "max_stress is missing (under a load"),
+        ('control = "load"', "max_stress is missing (mean stress in Pa"),
         ('control = "load"\nmax_stress = -5', "max_stress is -5: it must be a positive"),
         (
             'control = "force"\nmax_stress = 5',
             "control is 'force': it must be one of \"separation\"",
         ),
-        ("max_penetration = 0.5\nmax_stress = 5", "max_stress is given with control"),
+        (
+            "max_penetration = 0.5\nmax_stress = 5",
+            'max_stress is given: with control = "separation" a path turns at max_penetration, so',
+        ),
         (
             'control = "load"\nmax_stress = 5\nmax_penetration = 0.5',
-            "max_penetration is given with",
+            "max_penetration is given: with",
         ),
-        ('control = "load"\nmax_stress = 5\nstiffness = 1e9', "stiffness is given with control"),
+        (
+            'control = "load"\nmax_stress = 5\nstiffness = 1e9',
+            'stiffness is given: with control = "load" a path turns at max_stress, so leave',
+        ),
     ],
 )
 def test_turning_points_that_do_not_belong_to_the_control_are_refused(cycle, sentence):

@@ -15,7 +15,7 @@ import pytest
 
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command import main as command_line
-from adhesis.ensemble.command.main import COMMANDS, main, parser_of
+from adhesis.ensemble.command.main import COMMANDS, main, module_of, parser_of
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.errors import RankError
 from adhesis.ensemble.results.layout import create
@@ -49,6 +49,19 @@ def refused(capsys, words) -> str:
 # ---------------------------------------------------------------------- bad options
 
 BAD = {
+    "new": [
+        ("my.txt", "FILE.toml is my.txt: the name must end in .toml"),
+        ("c.toml", "FILE.toml is c.toml, which exists: give another name"),
+        ("none/my.toml", "FILE.toml is none/my.toml: there is no directory none"),
+    ],
+    "sample": [
+        ("text", "FILE is text, which exists"),
+        ("directory", "FILE is directory: it is a directory"),
+    ],
+    "completion": [
+        ("", "SHELL is ''"),
+        ("fish", "SHELL is 'fish': it must be one of 'bash', 'zsh'"),
+    ],
     "run": [
         ("", "CAMPAIGN.toml is ''"),
         ("none.toml", "none.toml"),
@@ -60,16 +73,23 @@ BAD = {
         ("c.toml --out text", "is not a results file"),
         ("c.toml --ranks 100000", f"at most {launch.largest_number_of_ranks()} are started here"),
         *((f"c.toml --ranks {bad}", f"--ranks is '{bad}'") for bad in ("x", "0", "-1", "nan")),
-        *((f"c.toml --walltime {bad}", f"walltime is '{bad}'") for bad in ("x", "0", "-1", "nan")),
+        *(
+            (f"c.toml --walltime {bad}", f"--walltime is '{bad}': it must")
+            for bad in ("x", "0", "-1", "nan")
+        ),
         *(
             (f"c.toml {option} {bad}", f"{option} is '{bad}'")
             for option in ("--max-failures", "--patience")
             for bad in ("x", "-1", "nan", "1e99", "inf")
         ),
-        *((f"c.toml --out p.h5 --part {bad}", bad) for bad in ("x", "0/3", "4/3", "1/0")),
+        *(
+            (f"c.toml --out p.h5 --part {bad}", f"--part is '{bad}': it must be K/N")
+            for bad in ("x", "0/3", "4/3", "1/0")
+        ),
         ("c.toml --part 1/2", "--part needs --out"),
         ("c.toml --redo some", "--redo is 'some'"),
-        ("c.toml --hurst 0.7", "choose among --redo"),
+        ("c.toml --hurst 0.7", "--hurst needs --redo: it chooses the tasks to compute again"),
+        ("c.toml --realisation 1", "--realisation needs --redo"),
         *(
             (f"c.toml --redo all {option} {bad}", f"{option} is '{bad}'")
             for option in ("--hurst", "--work-of-adhesion", "--realisation")
@@ -104,9 +124,11 @@ BAD = {
         ("text --to out", "is not a results file"),
     ],
     "loop": [
-        ("--hurst 0.8 --decimal x", "--decimal: invalid choice"),
+        ("--hurst 0.8 --decimal x", "--decimal is 'x': it must be one of ',', '.'"),
         *((f"--hurst 0.8 --{name} nan", f"{name} is nan") for name in ("young", "period")),
         ("--heights none.npy --period 1e-3", "with --heights the material has to be given"),
+        ("--trace none.csv --young 1e6", "with --trace the material has to be given"),
+        ("--hurst 0.8 --csv directory", "--csv is directory: it is a directory"),
     ],
     "trace": [
         ("text", "required: --work-of-adhesion, --young, --poisson"),
@@ -120,7 +142,11 @@ BAD = {
         ("--to text/below", "--to is text/below: "),
     ],
     "warm": [("--own 3", "unrecognized arguments: 3")],
-    "doctor": [("--in none", "--in none"), ("--in text", "--in text"), ("--in ''", "--in is ''")],
+    "doctor": [
+        ("--in none", "--in is none: it must be a folder that can be written"),
+        ("--in text", "--in is text: it must be a folder"),
+        ("--in ''", "--in is ''"),
+    ],
 }
 
 
@@ -160,7 +186,7 @@ def required(name: str) -> list[str]:
     words = []
     for action in parser_of(name)._actions:
         if action.required:
-            words += [*action.option_strings[-1:], "1"]
+            words += [*action.option_strings[-1:], (action.choices or ["1"])[0]]
     return words
 
 
@@ -170,7 +196,7 @@ def test_an_unknown_command_is_refused_with_the_list(words, capsys):
         assert main(words) == 0  # as without a word: the overview
         return
     line = refused(capsys, words)
-    assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of run, status, ")
+    assert line.startswith(f"adhesis: COMMAND is {words[0]!r}: it must be one of new, run, ")
 
 
 def test_the_parser_keeps_the_names_and_values_of_its_options(capsys):
@@ -193,6 +219,15 @@ def test_help_ends_with_two_examples_that_are_understood(name, capsys):
     for line in shown[-2:]:
         program, command, *words = shlex.split(line)
         assert (program, command) == ("adhesis", name)
+        parser_of(name).parse(words)
+
+
+def test_the_overview_ends_with_two_examples_that_are_understood(capsys):
+    assert main(["--help"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[-3] == "examples:"
+    for line in shown[-2:]:
+        _, name, *words = shlex.split(line)
         parser_of(name).parse(words)
 
 
@@ -244,7 +279,7 @@ def ctrl_c():
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
 )
 def test_signals_end_a_command_in_one_line(name, number, code, word, capsys, monkeypatch):
-    module = importlib.import_module(f"adhesis.ensemble.command.{name}")
+    module = importlib.import_module(module_of(name))
     monkeypatch.setattr(module, "execute", lambda args: signal.raise_signal(number))
     assert main([name, *required(name)]) == code
     assert capsys.readouterr().err == f"adhesis {name}: {word}\n"
@@ -255,7 +290,7 @@ def test_watching_ends_with_ctrl_c(folder, capsys, monkeypatch):
     def interrupt(seconds):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("adhesis.ensemble.command.status.time.sleep", interrupt)
+    monkeypatch.setattr("adhesis.ensemble.command.campaigns.status.time.sleep", interrupt)
     assert main(["status", "r.h5", "--watch"]) == 130
     assert capsys.readouterr().err == "adhesis status: interrupted\n"
 
@@ -264,7 +299,7 @@ def test_an_error_of_adhesis_itself_is_not_taken_for_a_result(capsys, monkeypatc
     def fail(args):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("adhesis.ensemble.command.status.execute", fail)
+    monkeypatch.setattr("adhesis.ensemble.command.campaigns.status.execute", fail)
     assert main(["status", "r.h5"]) == 70
     assert "ZeroDivisionError" in capsys.readouterr().err
 
@@ -345,7 +380,7 @@ def test_an_error_of_one_rank_is_reported_when_rank_0_had_its_time(rank_one, cap
     def fail(args):
         raise RankError("no mpi4py here")
 
-    monkeypatch.setattr("adhesis.ensemble.command.run.execute", fail)
+    monkeypatch.setattr("adhesis.ensemble.command.campaigns.run.execute", fail)
     assert main(["run", "c.toml"]) == 2
     assert len(rank_one) == 2
     assert capsys.readouterr().err == "adhesis run: no mpi4py here\n"

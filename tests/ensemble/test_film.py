@@ -213,7 +213,7 @@ def test_the_command_writes_the_film_of_a_loop_and_of_a_path(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (("--film", "a.avi"), "--film is a.avi: the name must end in .html, .gif, .mp4"),
+        (("--film", "a.avi"), "--film is a.avi: the name must end in .html, .gif or .mp4"),
         (("--film", "no/a.html"), "--film is no/a.html: there is no directory no"),
         (("--film", "a.html", "--max-penetration", "0.5,0.6"), "--film is given with 2 turning"),
         (("--film", "a.html", "--json", "a.html"), "--json and --film are both a.html"),

@@ -292,7 +292,7 @@ OPTIONS: dict[str, tuple[tuple[object, ...], str]] = {
     "a step": ((*H, *CONTACT, "--step", "1um"), "--step belongs to --trace"),
     "a degree": ((*H, *CONTACT, "--degree", 2), "--degree belongs to --trace"),
     "a unit of a spectrum": ((*S, "--unit", "um"), "--unit belongs to --trace"),
-    "a long period": ((*S, "--period", 1e300), "--period is 1e+300: "),
+    "a long period": ((*S, "--period", 1e300), "--period is 1e+300, which would be 1e+300 m: give"),
     "a short period": ((*S, "--period", 1e-300), "--period is 1e-300: "),
     "many load steps": (
         (*S, "--load-steps", 10**9),

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
+import re
+import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import adhesis
 import adhesis.ensemble.command.loop as loop_command
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.provenance import provenance
+from adhesis.ensemble.quantities import units_of
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
+from tests.support.scenes import HALF_SPACE
 
 PERIOD, AMPLITUDE, ALPHA = 1e-3, 1e-9, 0.2
 MODULUS = 1e6 / 0.75
@@ -76,9 +84,118 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
     assert data["loss"] == pytest.approx(loss, rel=1e-12)
     assert set(data["branch"]) == {"loading", "unloading"}
     text = capsys.readouterr()
-    assert f"{data['loss']:.6g} J/m²" in text.out
+    assert data["loss_over_work_of_adhesion"] == data["loss"] / GAMMA
+    assert f"{data['loss']:.6g} J/m², {data['loss'] / GAMMA:.4g} γ (dimensionless" in text.out
     assert str(out) in text.out
     assert "unloading" in text.err
+
+
+# Units of what a JSON document may hold; a number that is none of these is dimensionless.
+DIMENSIONAL = {
+    "m": {"h_max", "h_rms", "period", "separation", "patch_length", "valid_range", "edge_range"},
+    "m²": {"m0"},
+    "1/m²": {"m4"},
+    "Pa": {"young", "mean_stress", "pull_off_stress", "largest_interior_tension"},
+    "J/m": {"energy", "elastic_energy", "adhesion_energy"},
+    "J/m²": {
+        *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),
+        *("energy_at_stake", "work_gained", "work_spent", "full_contact_energy"),
+        *("effective_work_of_approach", "effective_work_of_separation"),
+    },
+    "Pa/m": {"stiffness"},
+    "s": {"seconds"},
+}
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_provenance_is_that_of_program_command_and_input(wave_file, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = wave_words(wave_file, "--load-steps", 3, "--json", "o.json", "--quiet")
+    assert run(*words) == 0
+    data = json.loads(Path("o.json").read_text())
+    found = data["provenance"]
+    assert found["command"] == shlex.join(["adhesis", "loop", *map(str, words)])
+    assert found["input"] == {
+        "file": str(wave_file),
+        "bytes": wave_file.stat().st_size,
+        "sha256": hashlib.sha256(wave_file.read_bytes()).hexdigest(),
+    }
+    assert found["seed"] is None
+    assert found["adhesis_version"] == adhesis.__version__
+    assert {"commit", "python", "numpy", "numba", "processor", "date"} <= found.keys()
+    units = found["units"]
+    assert units["states.mean_stress"] == units["mean_stress"] == "Pa"
+    assert units["jumps.energy_drop"] == units["loss"] == "J/m²"
+    assert units["turning_point"] == units["penetration"] == units["m2"] == "1"
+    by_unit: dict[str, set[str]] = {}
+    for name, unit in units.items():
+        by_unit.setdefault(unit, set()).add(name.rpartition(".")[2])
+    dimensionless = by_unit.pop("1")
+    assert {unit: names - DIMENSIONAL[unit] for unit, names in by_unit.items()} == {
+        unit: set() for unit in by_unit
+    }
+    assert dimensionless & set().union(*DIMENSIONAL.values()) == set()
+    numbers = {name for name, value in data.items() if isinstance(value, int | float)}
+    assert numbers - units.keys() == set()
+
+
+def test_the_seed_is_kept_and_turning_points_of_a_load_are_in_pa():
+    document = {"stiffness": 0.0, "turning_point": 500.0, "minor_loops": [{"start": 1.0}]}
+    units = units_of(document)
+    assert units == {"stiffness": "Pa/m", "turning_point": "Pa", "minor_loops.start": "Pa"}
+    assert provenance(["loop"], None, 3, document)["seed"] == 3
+    assert provenance(["loop"], None, 3, document)["input"] is None
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_the_curve_as_csv_has_units_in_its_header(wave_file, tmp_path):
+    out, table = tmp_path / "o.json", tmp_path / "o.csv"
+    words = ("--load-steps", 4, "--json", out, "--csv", table, "--quiet")
+    assert run(*wave_words(wave_file, *words)) == 0
+    data = json.loads(out.read_text())
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0])[:5] == [
+        *("branch", "load_step", "penetration (h_max)", "separation (m)", "mean_stress (Pa)")
+    ]
+    for column, key in (("mean_stress (Pa)", "mean_stress"), ("energy (J/m)", "energy")):
+        assert [float(row[column]) for row in rows] == data[key]
+    assert [row["branch"] for row in rows] == data["branch"]
+    assert run(*wave_words(wave_file, *words, "--max-penetration", "0.3,0.6")) == 0
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["turning_point (h_max)"] for row in rows} == {"0.3", "0.6"}
+    assert run(*wave_words(wave_file, *words, "--path", "0.5,0.2,0.4,out")) == 0
+    with table.open(newline="") as stream:
+        assert {row["leg"] for row in csv.DictReader(stream)} == {"0", "1", "2", "3"}
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_a_figure_as_pdf_has_truetype_fonts_and_mathematics(wave_file, tmp_path):
+    figure = tmp_path / "loop.pdf"
+    assert run(*wave_words(wave_file, "--load-steps", 3, "--figure", figure, "--quiet")) == 0
+    assert "Type3" not in fonts_of(figure)
+    loop = adhesis.run_loop(
+        ExactWave(adhesis.Problem(adhesis.single_wave(1e-9, 1e-3), HALF_SPACE, GAMMA)),
+        max_penetration=0.5,
+        load_steps=2,
+    )
+    drawn = loop.plot()
+    drawn.savefig(tmp_path / "plot.pdf")  # as a user of the library does, without the style
+    assert "Type3" not in fonts_of(tmp_path / "plot.pdf")
+    labels = {axes.get_xlabel() for axes in drawn.axes} | {axes.get_ylabel() for axes in drawn.axes}
+    assert labels == {
+        r"penetration $\Delta/h_{\max}$",
+        r"mean stress $\bar p$ (kPa)",
+        "contact fraction $A/A_0$",
+    }
+
+
+def fonts_of(path):
+    """Return the types of the fonts of a PDF."""
+    fonts = re.findall(rb"/Subtype\s*/(Type0|Type1|Type3|TrueType|CIDFontType2)", path.read_bytes())
+    assert fonts
+    return {name.decode() for name in fonts}
 
 
 @pytest.mark.usefixtures("exact_method")
@@ -122,7 +239,7 @@ def test_a_csv_is_the_same_as_a_npy(wave_file, tmp_path):
         out = tmp_path / f"{i}.json"
         assert run(*wave_words(path, "--load-steps", 5, "--json", out, "--quiet")) == 0
         documents.append(json.loads(out.read_text()))
-        del documents[-1]["seconds"]
+        del documents[-1]["seconds"], documents[-1]["provenance"]
     assert documents[0] == documents[1] == documents[2]
 
 
@@ -241,7 +358,7 @@ def no_computing(monkeypatch):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((), "give either --heights or --hurst: neither is given"),
+        ((), "no profile is given: give one of --hurst, --heights and --trace"),
         (("--hurst", 1.0), "--hurst is 1.0: it must be a number between 0 and 1"),
         (("--hurst", -0.2), "--hurst is -0.2: it must be a number between"),
         (("--hurst", "nan"), "--hurst is nan: it must be a number between"),
@@ -250,7 +367,7 @@ def no_computing(monkeypatch):
         ((*OK, "--n0", 0), "--n0 is 0: it must be a whole number from 1 to"),
         ((*OK, "--ratio", -2), "--ratio is -2: it must be"),
         ((*OK, "--seed", -1), "--seed is -1: it must be"),
-        ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "give exactly one of h_rms, m2 and c0"),
+        ((*OK, "--h-rms", 1e-6, "--m2", 1e-3), "--h-rms and --m2 are given: give one of"),
         ((*OK, "--h-rms=-1e-6"), "--h-rms is -1e-06: it must be a positive number"),
         ((*OK, "--h-rms", 0), "--h-rms is 0.0: it must be a positive number"),
         ((*OK, "--amplitudes", "gauss"), "--amplitudes is 'gauss': it must be one of"),
@@ -264,7 +381,7 @@ def no_computing(monkeypatch):
         ((*OK, "--method", "magic"), "--method is 'magic': it must be one of grid"),
         ((*OK, "--accuracy", 0), "--accuracy is 0.0: it must be a number of at least 1e-10"),
         ((*OK, "--nodes-per-wave", 1), "--nodes-per-wave is 1: it must be"),
-        ((*OK, "--field-penetrations", 0.5), "--field-penetrations needs --fields"),
+        ((*OK, "--field-penetrations", 0.5), "--field-penetrations needs --fields, the file"),
     ],
 )
 def test_bad_values_are_refused_with_value_and_rule(words, sentence, capsys):
@@ -281,7 +398,8 @@ def test_fields_too_coarse_for_the_shortest_wave_name_it(capsys):
 def test_heights_take_a_period_and_no_spectrum(wave_file, capsys):
     assert "--heights needs --period" in refused(capsys, "--heights", wave_file, *MATERIAL)
     words = ("--heights", wave_file, "--period", 1, *MATERIAL)
-    assert "both are given" in refused(capsys, *OK, *words)
+    line = refused(capsys, *OK, *words)
+    assert line == "--hurst and --heights are given: give one of --hurst, --heights and --trace"
     line = refused(capsys, *wave_words(wave_file, "--seed", 4))
     assert line.startswith("--seed belongs to --hurst")
     line = refused(capsys, *wave_words(wave_file), "--period", -1)

@@ -69,6 +69,7 @@ def test_a_stiffness_and_a_load(tmp_path, capsys):
     [
         (["--path", "0.5,0.6,out"], "after loading it must unload"),
         (["--path", "-0.5,out"], "it must start with loading"),
+        (["--path", "0.5,0.2,out"], "ends with unloading to 0.2 and goes out: omit that turning"),
         (["--path", "out"], "holds no turning point"),
         (["--path", "0.5,x"], "must be numbers with commas"),
         (["--path", "0.5", "--max-penetration", "0.5"], "a loop has one of them"),

@@ -114,7 +114,7 @@ def test_loop_refuses_outputs_before_any_work(kind: str, ask: Ask, tmp_path: Pat
 
 @pytest.mark.usefixtures("no_loop")
 def test_loop_refuses_to_write_over_its_trace(ask: Ask) -> None:
-    code, _, error = ask("loop", "--trace", "wave.csv", "--json", "wave.csv")
+    code, _, error = ask("loop", "--trace", "wave.csv", *CONTACT, "--json", "wave.csv")
     assert (code, "the file that --trace reads" in error) == (2, True)
 
 

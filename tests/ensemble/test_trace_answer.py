@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import importlib.util
 import json
 import os
@@ -18,7 +19,7 @@ import pytest
 from markdown_it import MarkdownIt
 from matplotlib.image import imread
 
-from adhesis import Problem, make_method, run_loop, self_affine_profile
+from adhesis import Control, Problem, make_method, run_loop, self_affine_profile
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
@@ -34,7 +35,7 @@ from adhesis.ensemble.trace.options import what_was_read
 from adhesis.ensemble.trace.pool import Pool
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
-from adhesis.ensemble.trace.trace_page import page_text
+from adhesis.ensemble.trace.trace_page import page_text, summary
 from adhesis.ensemble.trace.variants import Plan, make_plan
 from tests.support.scenes import HALF_SPACE
 from tools.interrupted import Interrupt, interrupted
@@ -131,7 +132,12 @@ def test_the_range_is_the_least_of_the_answer_and_its_variants(document: dict[st
 
 
 def test_the_page_holds_its_figures_and_needs_nothing_else(folder: Path) -> None:
-    made = [*FIGURES, "trace.html", "trace.json", "trace.md"]
+    pdfs = [name.replace(".png", ".pdf") for name in FIGURES]
+    made = [*FIGURES, *pdfs, "trace.html", "trace.json", "trace.md"]
+    for name in pdfs:
+        fonts = re.findall(rb"/Subtype\s*/(Type3|Type0|TrueType)", (folder / name).read_bytes())
+        assert fonts
+        assert b"Type3" not in fonts, name
     assert sorted(p.name for p in folder.iterdir()) == sorted(made)
     html = (folder / "trace.html").read_text()
     assert html.count('src="data:image/png;base64,') == len(FIGURES)
@@ -143,6 +149,82 @@ def test_the_page_holds_its_figures_and_needs_nothing_else(folder: Path) -> None
     for words in ("decimal commas", "tilt and bow", "interval", "taper 10 %", "γ, J/m²"):
         assert words in text, words
         assert words in html, words
+
+
+def test_the_document_carries_its_provenance(folder: Path, document: dict[str, Any]) -> None:
+    found, source = document["provenance"], (folder.parent / "t.csv").read_bytes()
+    assert found["input"]["sha256"] == hashlib.sha256(source).hexdigest()
+    assert found["command"].startswith(f"adhesis trace {folder.parent}/t.csv --work-of-adhesion")
+    assert found["seed"] is None
+    units = found["units"]
+    assert units["loss.value"] == units["loss.uncertainty"] == units["runs.loss"] == "J/m²"
+    assert units["loss.doubts.noise"] == units["contact_fraction.value"] == "1"
+    assert units["pull_off_stress.value"] == units["loop.states.mean_stress"] == "Pa"
+    assert units["read.step"] == units["cut_off_limits.noise"] == "m"
+    assert (units["spectrum.wave_number"], units["spectrum.power"]) == ("rad/m", "m³")
+    assert document["loss_over_work_of_adhesion"] == document["loss"]["value"] / 0.04
+
+
+def test_a_preload_is_the_turning_point_of_a_trace() -> None:
+    """Under a load to 300 Pa, with the table of a third and two thirds of it."""
+    cycle = make_cycle(HALF_SPACE, 0.005, 300.0, 4, "auto", 1e-2, Control(0.0))
+    plan = make_plan(prepared(), cycle, processes=0)
+    kept = {"answer", "p̄ 100", "p̄ 200"}
+    plan = dataclasses.replace(
+        plan,
+        runs=tuple(run for run in plan.runs if run.name in kept),
+        jobs=tuple(job for job in plan.jobs if job.name in kept),
+    )
+    answer = run_plan(prepared(), cycle, plan)
+    for name, stress in (("answer", 300), ("p̄ 100", 100), ("p̄ 200", 200)):
+        found = answer.result(name)
+        assert found is not None
+        assert max(found["states"]["mean_stress"]) == pytest.approx(stress)
+    document = answers.document(answer)
+    assert (document["stiffness"], document["max_stress"]) == (0.0, 300.0)
+    assert document["max_penetration"] is None
+    said = summary(answer)
+    assert "to p̄ = 300 Pa with h_max" in said
+    assert f"{answer.loss.value / 0.005:.4g} γ" in said
+    text = page_text(answer, [])
+    assert "one loop to p̄ = 300 Pa" in text
+    assert "| γ, J/m² | p̄, Pa |" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "control", "turns"),
+    [
+        (["--stiffness", "0", "--max-stress", "300,100"], Control(0.0), (300.0, 100.0)),
+        (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3)),
+        (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4)),
+    ],
+)
+def test_the_command_passes_control_and_turning_points(
+    words: list[str],
+    control: Control,
+    turns: tuple[float, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "t.txt"
+    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
+    given: list[Any] = []
+
+    def stop(prepared: Prepared, cycle: Any, plan: Plan, watch: object) -> Answer:
+        given.append(cycle)
+        raise NoAnswer("stopped")
+
+    monkeypatch.setattr("adhesis.ensemble.command.trace.run_plan", stop)
+    rest = ["--unit", "um", "--to", str(tmp_path / "out"), "--quiet"]
+    assert main(["trace", str(path), *CONTACT, *rest, *words]) == 1
+    assert (given[0].control, given[0].turning_points) == (control, turns)
+
+
+def test_a_stiffness_is_passed_to_every_loop_of_a_trace() -> None:
+    cycle = make_cycle(HALF_SPACE, 0.04, 0.3, 4, "auto", 1e-3, Control(1e9))
+    plan = make_plan(prepared(), cycle, quick=True, processes=0)
+    assert {job.stiffness for job in plan.jobs} == {1e9}
+    assert cycle.turn(0.3) == "u_tot/h_max = 0.3 of a stiffness of 1e+09 Pa/m"
 
 
 def small_plan() -> tuple[Prepared, Any, Plan]:
@@ -277,6 +359,13 @@ def test_what_the_solver_refuses_is_refused_before_any_loop() -> None:
         loss_of_trace(prepared(), half_space=HALF_SPACE, work_of_adhesion=0.04, max_penetration=1.0)
     with pytest.raises(ValueError, match="work_of_adhesion is -1"):
         loss_of_trace(prepared(), half_space=HALF_SPACE, work_of_adhesion=-1.0)
+    options: dict[str, Any] = {"half_space": HALF_SPACE, "work_of_adhesion": 0.04}
+    with pytest.raises(ValueError, match="max_stress is missing: a path under a load must have it"):
+        loss_of_trace(prepared(), control=Control(0), **options)
+    with pytest.raises(ValueError, match="max_penetration is given: a path under a load turns at"):
+        loss_of_trace(prepared(), control=Control(0), max_penetration=0.5, **options)
+    with pytest.raises(ValueError, match="max_stress is given: it belongs to a load"):
+        loss_of_trace(prepared(), max_stress=500.0, **options)
 
 
 @pytest.fixture(scope="module")
@@ -305,7 +394,8 @@ def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     heights = PROFILE.at(X) + 1e-3 * X
     path = tmp_path / "t.txt"
     np.savetxt(path, 1e6 * np.column_stack([X, heights]))
-    words = ["loop", "--trace", str(path), "--unit", "um", "--cut-off", "100um", "--quiet"]
+    words = ["loop", "--trace", str(path), *CONTACT, "--unit", "um", "--cut-off", "100um"]
+    words = [*words, "--quiet"]
     cheap = ["--load-steps", "5", "--max-penetration", "0.3", "--json", str(tmp_path / "l.json")]
     assert main([*words, *cheap]) == 0
     assert "400 points" in capsys.readouterr().out
@@ -314,7 +404,7 @@ def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     for more, reported in (
         (["--seed", "1"], "--seed belongs to --hurst"),
         (["--period", "1"], "--period belongs to --hurst"),
-        (["--hurst", "0.8"], "several are given"),
+        (["--hurst", "0.8"], "--hurst and --trace are given: give one of"),
         (["--degree", "8"], "--degree is 8"),
     ):
         assert main([*words, *more]) == 2

@@ -16,7 +16,6 @@ import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.reading.header_units import length_text, parse_length
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 
 N, STEP = 200, 0.5e-6
@@ -115,7 +114,7 @@ def test_one_column_takes_its_step_from_the_header_or_the_option(tmp_path: Path)
 
 def test_columns_are_chosen_where_there_are_more(tmp_path: Path) -> None:
     lines = [f"{k},{row}" for k, row in enumerate(rows(",", "."))]
-    with pytest.raises(InputError, match=r"3 columns: columns"):
+    with pytest.raises(InputError, match=r"3 columns: give columns X,Z"):
         read(tmp_path, ["n,x (um),z (um)", *lines])
     assert_right(read(tmp_path, ["n,x (um),z (um)", *lines], columns=(2, 3)))
 
@@ -270,7 +269,7 @@ REFUSED: dict[str, tuple[list[str], dict[str, object], str]] = {
     "no unit": (rows(" ", "."), {}, "states no unit.*give unit, as in um"),
     "mm that would be 2 m": (rows(" ", ".", 2e4, 1e6), {}, "states no unit"),
     "a unit of one column": (["x (mm),z", *rows(",", ".")], {}, "of the positions alone"),
-    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit says mm and the hea"),
+    "header against option": ([UM, *rows(";", ".")], {"unit": "mm"}, "unit is mm for the pos"),
     "a row of a text": ([UM, *rows(";", ".")], {"row": 3}, "row is 3: .* no map and no channels"),
     "two rows": ([UM, "1;2", "2;3"], {}, "holds 2 rows of numbers"),
     "unknown unit": (rows(" ", "."), {"unit": "furlong"}, "'furlong' is no unit"),
@@ -340,16 +339,6 @@ def test_refusals_of_files(tmp_path: Path) -> None:
         read_trace(tmp_path / "c.txt")
 
 
-def test_lengths_of_options() -> None:
-    assert parse_length("2.5um", "--x") == pytest.approx(2.5e-6)
-    assert parse_length("1e-6", "--x") == 1e-6
-    assert length_text(5e-6) == "5 µm"
-    assert length_text(2e-3) == "2 mm"
-    for text in ("-1um", "5 parsec", "um", "nan", "0"):
-        with pytest.raises(InputError):
-            parse_length(text, "--x")
-
-
 CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
 
 
@@ -357,15 +346,29 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
     ("words", "reported"),
     [
         (["--plan"], "states no unit"),
-        (["--plan", "--unit", "um", "--columns", "1"], "--columns"),
+        (["--plan", "--unit", "um", "--columns", "1"], "--columns is 1: it must name two of the 2"),
         (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
-        (["--plan", "--unit", "um", "--tip-radius", "5"], "trusted from 50 µm on (what a tip of"),
+        (["--plan", "--unit", "um", "--tip-radius", "5"], "--tip-radius is 5, which would be 5 m"),
+        (["--plan", "--unit", "um", "--tip-radius", "5m"], "trusted from 50 µm on (what a tip of"),
+        (["--plan", "--unit", "um", "--tip-radius=-1um"], "--tip-radius is -1e-06: it must be"),
+        (["--plan", "--unit", "um", "--cut-off", "nan"], "--cut-off is nan: it must be"),
+        (["--plan", "--unit", "um", "--longest-gap", "5 parsec"], "'parsec' is no unit of length"),
+        (["--plan", "--unit", "um", "--max-stress", "5"], "give --stiffness 0 with it"),
+        (["--plan", "--unit", "um", "--stiffness", "0"], "(--stiffness 0) needs --max-stress"),
+        (["--plan", "--unit", "um", "--stiffness", "0", "--max-stress", "0"], "--max-stress is 0"),
+        (
+            ["--plan", "--unit", "um", "--stiffness", "1", "--layer", "1mm"],
+            "--stiffness and --layer are given: give one of them",
+        ),
         (["--plan", "--unit", "um", "--degree", "9"], "--degree is 9"),
         (["--plan", "--unit", "um", "--max-penetration", "1.5"], "--max-penetration is 1.5"),
         (["--plan", "--unit", "um", "--max-penetration", "deep"], "--max-penetration is 'deep'"),
         (["--plan", "--unit", "um", "--step", "1um"], "--step belongs to heights without"),
         (["--plan", "--unit", "um", "--method", "magic"], "method is 'magic'"),
-        (["--unit", "um"], "give --to"),
+        (["--unit", "um"], "--to is missing: give the directory for the page, or --plan"),
+        (["--plan", "--unit", "um", "--columns", "x"], "--columns is 'x': it must be two whole"),
+        (["--plan", "--work-of-adhesion", "1,1"], "--work-of-adhesion is '1,1': its values must"),
+        (["--plan", "--work-of-adhesion", "1;2"], "--work-of-adhesion is '1;2': it must be one"),
         (["--plan", "--unit", "um", "--processes", "0"], "--processes is 0"),
         (["--plan", "--unit", "um", "--young", "-1"], "--young is -1"),
         (["--plan", "--unit", "um", "--work-of-adhesion", "-1"], "--work-of-adhesion is -1"),

@@ -19,7 +19,7 @@ from matplotlib.image import imread
 
 import adhesis
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.command import run
+from adhesis.ensemble.command.campaigns import run
 from adhesis.ensemble.command.main import COMMANDS, INTERRUPTED, TERMINATED, main, parser_of
 from adhesis.ensemble.run import launch
 from tools import transcripts
@@ -71,6 +71,8 @@ NOT_RUN = {
     ),
     "python benchmarks/trace_coverage.py --cases 20 --json out/coverage.json": "takes minutes; "
     "test_trace_answer.py runs two cases",
+    "adhesis trace trace.csv --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --stiffness 0 "
+    "--max-stress 500 --to out/preload": "as before",
     "adhesis trace long.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out/long": (
         "takes minutes on a busy machine; as the trace before"
     ),

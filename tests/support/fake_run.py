@@ -110,7 +110,7 @@ def fake_engine(behaviour: str) -> Engine:
 
 
 if __name__ == "__main__":
-    from adhesis.ensemble.command import run
+    from adhesis.ensemble.command.campaigns import run
     from adhesis.ensemble.command.main import main
 
     program = [sys.executable, "-m", "mpi4py", __file__, sys.argv[1]]

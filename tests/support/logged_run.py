@@ -10,7 +10,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from adhesis.ensemble.command import run
+from adhesis.ensemble.command.campaigns import run
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.run.session import Engine
 from adhesis.ensemble.task.compute import run_task

@@ -104,9 +104,21 @@ def left_out(data: Aggregate) -> str:
     return f"{what} {' and '.join(parts)}." if parts else ""
 
 
+class PublishedFigure(Figure):
+    """A figure whose PDF has TrueType fonts, also when it is saved outside of :func:`style`.
+
+    Publishers refuse the Type 3 fonts that matplotlib writes by default.
+    """
+
+    def savefig(self, *args: Any, **options: Any) -> None:
+        """Save as :meth:`matplotlib.figure.Figure.savefig` does."""
+        with mpl.rc_context({"pdf.fonttype": 42, "ps.fonttype": 42}):
+            super().savefig(*args, **options)
+
+
 def new_figure(rows: int, columns: int, width: float, height: float, **options: Any) -> Figure:
     """Return a figure of the given width and height (inches) with a grid of panels."""
-    figure = Figure(figsize=(width, height))
+    figure = PublishedFigure(figsize=(width, height))
     figure.subplots(rows, columns, squeeze=False, **options)
     return figure
 

@@ -1,4 +1,4 @@
-"""Find units of length in files, headers and options."""
+"""Find units of length in headers of texts, and parse the parameter ``unit``."""
 
 from __future__ import annotations
 
@@ -6,42 +6,10 @@ import re
 from collections.abc import Sequence
 
 from adhesis.ensemble.errors import InputError, parameter
-
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "Å": 1e-10, "inch": 25.4e-3}
-
-_OTHER_NAMES = {
-    "um": "µm",
-    "μm": "µm",  # the Greek letter instead of the sign
-    "micron": "µm",
-    "microns": "µm",
-    "micrometer": "µm",
-    "micrometers": "µm",
-    "micrometre": "µm",
-    "micrometres": "µm",
-    "mikrometer": "µm",
-    "nanometer": "nm",
-    "nanometers": "nm",
-    "nanometre": "nm",
-    "nanometres": "nm",
-    "millimeter": "mm",
-    "millimeters": "mm",
-    "millimetre": "mm",
-    "millimetres": "mm",
-    "meter": "m",
-    "meters": "m",
-    "metre": "m",
-    "metres": "m",
-    "a": "Å",
-    "å": "Å",
-    "angstrom": "Å",
-    "angstroms": "Å",
-    "ångström": "Å",
-    "in": "inch",
-    "inches": "inch",
-}
+from adhesis.ensemble.lengths import METRES, OTHER_NAMES, unit_named
 
 # Units that are recognised in running text; "m", "in" and "A" are ambiguous and need brackets.
-_UNAMBIGUOUS = [n for n in (*METRES, *_OTHER_NAMES) if n.lower() not in ("m", "in", "a")]
+_UNAMBIGUOUS = [n for n in (*METRES, *OTHER_NAMES) if n.lower() not in ("m", "in", "a")]
 _WORD = "|".join(sorted(map(re.escape, _UNAMBIGUOUS), key=len, reverse=True))
 _IN_TEXT = re.compile(rf"(?<![^\W\d_])({_WORD})(?![^\W_])(?!\s*[/^²])", re.IGNORECASE)
 _IN_BRACKETS = re.compile(r"(?:[(\[<{/=:]|\bin\s)\s*(m|in|a)\s*(?=[)\]>}]|$)", re.IGNORECASE)
@@ -66,23 +34,6 @@ _STEP = re.compile(
 )
 
 
-def unit_named(name: str) -> str:
-    """Return the unit of this name ("um" is "µm").
-
-    Raises
-    ------
-    InputError
-        For a name that is no unit of length.
-    """
-    plain = name.strip()
-    for known in METRES:
-        if plain == known or plain.lower() == known.lower():
-            return known
-    if plain.lower() in _OTHER_NAMES:
-        return _OTHER_NAMES[plain.lower()]
-    raise InputError(f"{name!r} is no unit of length: it must be one of {', '.join(METRES)}")
-
-
 def parse_units(text: str) -> tuple[str, str]:
     """Parse the parameter ``unit``: "um" for positions and heights, or "mm,um"."""
     words = text.split(",")
@@ -91,32 +42,6 @@ def parse_units(text: str) -> tuple[str, str]:
             f"{parameter('unit')} is {text!r}: one unit for both columns, or two as in mm,um"
         )
     return unit_named(words[0]), unit_named(words[-1])
-
-
-def parse_length(text: str, option: str) -> float:
-    """Parse a length of an option, in m: a number in m, or a number and its unit as in 2.5um.
-
-    Raises
-    ------
-    InputError
-        If it is neither, or not positive.
-    """
-    found = re.fullmatch(r"\s*([+\-]?(?:\d+\.?\d*|\.\d+)(?:e[+\-]?\d+)?)\s*(\D*)", text, re.I)
-    if not found:
-        raise InputError(f"{option} is {text!r}: it must be a length, as in 5e-6 (m) or 5um")
-    unit = found[2].strip()
-    value = float(found[1]) * (METRES[unit_named(unit)] if unit else 1.0)
-    if not 0 < value < float("inf"):
-        raise InputError(f"{option} is {text!r}: it must be a positive length")
-    return value
-
-
-def length_text(metres: float, digits: int = 3) -> str:
-    """Format a length in a unit of its size: "5 µm"."""
-    for unit in ("m", "mm", "µm"):
-        if abs(metres) >= METRES[unit]:
-            return f"{metres / METRES[unit]:.{digits}g} {unit}"
-    return f"{metres / METRES['nm']:.{digits}g} nm"
 
 
 def _units_in(text: str) -> list[str]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.trace.reading.header_units import METRES, unit_named
+from adhesis.ensemble.lengths import METRES, unit_named
 from adhesis.ensemble.trace.reading.source import Source
 from adhesis.solver.model.profile import Array
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
+from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
 from adhesis.ensemble.trace.reading.header_units import (
-    METRES,
-    length_text,
     parse_units,
     step_of_header,
     units_of_header,
@@ -32,8 +31,8 @@ TEXT = frozenset(("txt", "csv", "tsv", "dat", "asc", "prn", "xy", "xyz", "tab", 
 
 # Positions may scatter about equal steps by this share of a step; heights are then interpolated.
 _UNEVEN = 0.10
-# Without a unit, numbers are taken as metres only up to these lengths, steps and heights (m).
-_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES, _HIGHEST_IN_METRES = 0.02, 2e-5, 1e-3
+# Without a unit, numbers are taken as metres only up to these lengths and steps (m).
+_LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES = 0.02, 2e-5
 # Beyond these limits (m, m, median slope) the unit is wrong.
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
 # A repeated height that lies this many ranges of the other heights outside them stands for a
@@ -365,14 +364,14 @@ def _from_table(
     if wanted is not None:
         if len(wanted) != 2 or not all(1 <= w <= len(columns) for w in wanted):
             raise InputError(
-                f"{parameter('columns')} is {','.join(map(str, wanted))}: positions and heights, "
-                f"two of the {len(columns)} columns of {name}"
+                f"{parameter('columns')} is {','.join(map(str, wanted))}: it must name two of the "
+                f"{len(columns)} columns of {name}, those of positions and heights, as in 1,2"
             )
         columns = columns[[w - 1 for w in wanted]]
         fields = [tuple(row[w - 1] for w in wanted) for row in fields]
     elif len(columns) > 2:
         raise InputError(
-            f"{name} has {len(columns)} columns: {parameter('columns')} X,Z names those of "
+            f"{name} has {len(columns)} columns: give {parameter('columns')} X,Z, those of "
             "positions and heights"
         )
     if columns.shape[1] < MIN_POINTS:
@@ -400,7 +399,7 @@ def _from_table(
         if step is None:
             raise InputError(
                 f"{name} has heights without positions, and its header states no step: "
-                f"give {parameter('step')}"
+                f"give {parameter('step')}, as in 0.5um"
             )
         notes.append(f"step {length_text(step, 6)} (header)")
     return _in_metres(Trace(heights, float(step), name, tuple(notes)))
@@ -424,8 +423,8 @@ def _units(
         for kind, known, wanted in zip(("positions", "heights"), found, given, strict=True):
             if known not in (None, wanted) and not (len(columns) == 1 and kind == "positions"):
                 raise InputError(
-                    f"{parameter('unit')} says {wanted} and the header of {name} {known} for the "
-                    f"{kind}: take the wrong one out"
+                    f"{parameter('unit')} is {wanted} for the {kind}, and the header of {name} "
+                    f"has {known}: correct the wrong one"
                 )
         return given, parameter("unit")
     if found[0] is not None and found[1] is not None:
@@ -453,7 +452,7 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     heights = columns[-1][np.isfinite(columns[-1])]
     if (
         heights.size == 0
-        or np.percentile(heights, 99) - np.percentile(heights, 1) > _HIGHEST_IN_METRES
+        or np.percentile(heights, 99) - np.percentile(heights, 1) > HIGHEST_IN_METRES
     ):
         return False
     if len(columns) == 1:
@@ -511,7 +510,9 @@ def _even(
     elif np.any(steps <= 0):
         back = int(np.argmax(steps <= 0)) + 1
         word = "stand still" if steps[back - 1] == 0 else "turn back"
-        raise InputError(f"the positions {word} at {place(back)}: a trace goes one way")
+        raise InputError(
+            f"the positions {word} at {place(back)}: they must rise or fall throughout"
+        )
     middle = float(np.median(steps))
     apart = np.rint(steps / middle).astype(int)
     if apart.sum() > 4 * heights.size or apart.min() < 1:

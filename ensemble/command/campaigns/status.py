@@ -1,4 +1,4 @@
-"""What of a results file is pending, done and failed; works while the run is writing."""
+"""Report which tasks of a results file are pending, done and failed, also during a run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE.h5", help="the results file")
     parser.add_argument("--json", action="store_true", help="everything, as JSON")
     parser.add_argument(
-        "--watch", action="store_true", help="stay and show how it goes on, until all is done"
+        "--watch", action="store_true", help="repeat the status until all is done"
     )
     parser.add_argument(
         "--interval", metavar="SECONDS", default="2", help="with --watch: how often (default: 2)"

@@ -1,4 +1,4 @@
-"""Tables, curves and figures of a results file, finished or not."""
+"""Write tables, curves and figures of a results file, finished or not."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def execute(args: argparse.Namespace) -> int:
             lock.acquire(1, 10.0)
             merged = merge(args.parts, out)
     except WriteError as error:
-        print(f"adhesis merge: {error}; the same command goes on", file=sys.stderr)
+        print(f"adhesis merge: {error}; the same command resumes", file=sys.stderr)
         return _WRITE_FAILED
     for doubt in merged.doubts:
         print(f"adhesis merge: {doubt}", file=sys.stderr)

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run",
         action="store_true",
-        help="say what the campaign costs, by a minute of pilot loops at most; writes nothing",
+        help="estimate the cost from a minute of pilot loops at most, and write nothing",
     )
     parser.add_argument(
         "--part",
@@ -313,8 +313,10 @@ def _selection(args: argparse.Namespace) -> Any:
     gamma = tuple(_number("--work-of-adhesion", v) for v in args.work_of_adhesion)
     realisation = tuple(int(_number("--realisation", v, whole=True)) for v in args.realisation)
     if args.redo is None:
-        if hurst or gamma or realisation:
-            raise InputError("--hurst, --work-of-adhesion and --realisation choose among --redo")
+        for name in ("hurst", "work_of_adhesion", "realisation"):
+            if getattr(args, name):
+                option = "--" + name.replace("_", "-")
+                raise InputError(f"{option} needs --redo: it chooses the tasks to compute again")
         return None
     if args.redo not in ("failed", "all"):
         raise InputError(f"--redo is {args.redo!r}: it must be failed or all")

@@ -1,0 +1,81 @@
+"""Write a commented campaign file that runs as it is and lists every key."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from dataclasses import MISSING, Field, fields
+from typing import Any
+
+from adhesis.ensemble.campaign.tables import TABLES, Table
+
+# The campaign that runs as it is: values as TOML spells them.
+_VALUES = {
+    "profile.period": '"2 mm"',
+    "profile.n0": "4",
+    "profile.ratio": "8",
+    "profile.h_rms": '"1 µm"',
+    "material.young": "1e6",
+    "material.poisson": "0.5",
+    "sweep.hurst": "[0.7, 0.8]",
+    "sweep.work_of_adhesion": "[0.04]",
+    "sweep.realisations": "3",
+    "cycle.max_penetration": "0.9",
+    "cycle.load_steps": "20",
+}
+# Values of keys that are left out by default.
+EXAMPLES = {
+    "profile.m2": "1e-4",
+    "profile.c0": "1e-14",
+    "cycle.max_stress": "200",
+    "cycle.stiffness": "1e9",
+    "solver.nodes_per_wave": "64",
+    "solver.time_limit": "3600.0",
+    "output.field_penetrations": "[0.3, 0.6, 0.9]",
+    "stop.relative_error": "0.1",
+}
+_HEAD = """\
+# A campaign of adhesis: one loop for every Hurst exponent, work of adhesion and realisation.
+#
+#   adhesis run FILE.toml --dry-run       what it costs
+#   adhesis run FILE.toml                 run it, or resume it
+#   adhesis report FILE.h5 --to DIR       tables and figures
+#
+# Every key is listed, below its meaning and its rule. A line that begins with "# KEY =" has no
+# effect until "# " is removed; it shows the default, or an example where there is none. Numbers are
+# in SI units, lengths may have a unit as here. docs/campaign-file.md describes the keys.
+"""
+_WIDTH = 96
+
+
+def campaign_template() -> str:
+    """Return the text of the file."""
+    return _HEAD + "".join(_table(name) for name in TABLES)
+
+
+def _table(name: Table) -> str:
+    title = (TABLES[name].__doc__ or "").partition(": ")[2].rstrip(".")
+    entries = [_entry(f"{name}.{entry.name}", entry) for entry in fields(TABLES[name])]
+    mark = "" if any(f"{name}.{entry.name}" in _VALUES for entry in fields(TABLES[name])) else "# "
+    # A table without a key may stay empty, but [stop] asks for one of its own.
+    mark = mark if name == "stop" else ""
+    return f"\n{mark}[{name}]  # {title}\n" + "".join(entries)
+
+
+def _entry(key: str, entry: Field[Any]) -> str:
+    rule = entry.metadata["rule"].text
+    if entry.metadata["axis"] is not None:
+        rule += "; or a list of them"
+    lines = [f"# {line}" for line in textwrap.wrap(entry.metadata["meaning"], _WIDTH)]
+    lines += [f"#   {line}" for line in textwrap.wrap(rule, _WIDTH)]
+    comment = "".join(f"{line}\n" for line in lines)
+    if key in _VALUES:
+        return f"{comment}{entry.name} = {_VALUES[key]}\n"
+    if key in EXAMPLES:
+        return f"{comment}# {entry.name} = {EXAMPLES[key]}  # example; left out by default\n"
+    assert entry.default is not MISSING, f"{key} has neither default nor example"
+    return f"{comment}# {entry.name} = {_literal(entry.default)}\n"
+
+
+def _literal(value: Any) -> str:
+    return json.dumps(list(value) if isinstance(value, tuple) else value)

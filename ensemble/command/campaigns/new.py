@@ -1,0 +1,40 @@
+"""Write a commented campaign file that runs as it is, as a start for one of your own.
+
+It lists every key with its meaning, its rule and its default. An existing file is not overwritten.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+
+EXAMPLES = (
+    "adhesis new my.toml",
+    "adhesis new study/first.toml",
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help="the file to write")
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Write the file; returns 0."""
+    if args.file.suffix != ".toml":
+        raise InputError(f"FILE.toml is {args.file}: the name must end in .toml")
+    if args.file.is_file():
+        raise InputError(f"FILE.toml is {args.file}, which exists: give another name")
+    check_outputs({"FILE.toml": args.file}, {})
+    from adhesis.ensemble.campaign.template import campaign_template
+
+    writing = Writing()
+    with writing.output("FILE.toml", args.file), whole_file(args.file) as stream:
+        stream.write(campaign_template().encode())
+    writing.finish()
+    print(f"wrote       {args.file}")
+    print(f"next        adhesis run {args.file} --dry-run   (its cost; without --dry-run: the run)")
+    return 0

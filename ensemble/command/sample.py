@@ -1,0 +1,40 @@
+"""Write a sample trace, as a stylus would measure it, to try ``adhesis trace`` with.
+
+It is synthetic: 1 mm in steps of 1 µm, rough down to 20 µm, with tilt, bow, noise and drop-outs.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+
+SAMPLE = Path(__file__).with_name("sample.csv")
+EXAMPLES = (
+    "adhesis sample trace.csv",
+    "adhesis sample data/stylus.csv",
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the file to write, as .csv")
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Write the file; returns 0."""
+    if args.file.is_file():
+        raise InputError(f"FILE is {args.file}, which exists: give another name")
+    check_outputs({"FILE": args.file}, {})
+    writing = Writing()
+    with writing.output("FILE", args.file), whole_file(args.file) as stream:
+        stream.write(SAMPLE.read_bytes())
+    writing.finish()
+    print(f"wrote       {args.file}")
+    print(
+        f"next        adhesis trace {args.file} --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 "
+        "--to out"
+    )
+    return 0

@@ -1,0 +1,148 @@
+"""The commands that write files to start from: a campaign, a sample trace, a shell's completion."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+from adhesis.ensemble.campaign.tables import TABLES
+from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
+from adhesis.ensemble.command.main import COMMANDS, main, parser_of
+from adhesis.ensemble.command.sample import SAMPLE
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
+from tools import sample_trace
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+KEYS = [(name, entry.name) for name, table in TABLES.items() for entry in dataclasses.fields(table)]
+
+# ---------------------------------------------------------------------- a campaign
+
+
+def listed(text: str) -> list[tuple[str, str]]:
+    """Return table and key of every line of a campaign file, in a comment or not."""
+    table, found = "", []
+    for line in text.splitlines():
+        if head := re.match(r"(?:# )?\[(\w+)\]", line):
+            table = head[1]
+        elif key := re.match(r"(?:# )?(\w+) = ", line):
+            found.append((table, key[1]))
+    return found
+
+
+def test_a_new_campaign_runs_as_it_is_and_is_not_written_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "my.toml"]) == 0
+    assert capsys.readouterr().out.startswith("wrote       my.toml\n")
+    campaign = load_campaign("my.toml")
+    assert campaign.task_count == 6
+    assert campaign.profile.period == 2e-3
+    before = Path("my.toml").read_text()
+    assert main(["new", "my.toml"]) == 2
+    sentence = "adhesis new: FILE.toml is my.toml, which exists: give another name\n"
+    assert capsys.readouterr().err == sentence
+    assert Path("my.toml").read_text() == before
+
+
+def test_a_new_campaign_lists_every_key_of_the_page() -> None:
+    page = (ROOT / "docs" / "campaign-file.md").read_text()
+    described = []
+    for name in TABLES:
+        section = page.split(f"## `[{name}]`")[1].split("\n## ")[0]
+        described += [(name, key) for key in re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)]
+    assert listed(campaign_template()) == described == KEYS
+    assert all(len(line) <= 100 for line in campaign_template().splitlines())
+
+
+@pytest.mark.parametrize(("table", "key"), KEYS)
+def test_a_key_in_a_comment_shows_its_default_or_a_value_that_is_allowed(
+    table: str, key: str
+) -> None:
+    text = campaign_template()
+    line = next(
+        line
+        for line in re.split(rf"(?m)^(?:# )?\[{table}\]", text)[1].splitlines()
+        if re.match(rf"(# )?{key} = ", line)
+    )
+    if not line.startswith("# "):
+        return
+    (entry,) = (entry for entry in dataclasses.fields(TABLES[table]) if entry.name == key)
+    text = text.replace(line, line[2:])
+    if table == "stop":
+        text = text.replace("# [stop]", "[stop]").replace("# relative_error", "relative_error")
+    if key in ("m2", "c0"):
+        text = text.replace("\nh_rms", "\n# h_rms")
+    if key == "max_stress":
+        text = text.replace("\nmax_penetration", "\n# max_penetration")
+        text = text.replace('# control = "separation"', 'control = "load"')
+    value = getattr(getattr(parse_campaign(text), table), key)
+    if f"{table}.{key}" in EXAMPLES:
+        assert entry.default is None
+        assert value is not None
+        assert "# example; left out by default" in line
+    else:
+        assert value == entry.default
+
+
+# ---------------------------------------------------------------------- a trace
+
+
+def test_the_sample_is_what_its_program_makes_and_a_trace(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["sample", "t.csv"]) == 0
+    shown = capsys.readouterr().out
+    assert Path("t.csv").read_text() == SAMPLE.read_text() == sample_trace.text()
+    trace = read_trace("t.csv")
+    assert (trace.points, trace.drop_outs) == (1001, 4)
+    assert trace.length == pytest.approx(1e-3)
+    following = re.search(r"^next        adhesis (.*)$", shown, re.MULTILINE)
+    assert following is not None
+    assert main([*following[1].split(), "--plan"]) == 0
+    assert "form        tilt and bow taken off" in capsys.readouterr().out
+    assert main(["sample", "t.csv"]) == 2
+    assert "FILE is t.csv, which exists" in capsys.readouterr().err
+
+
+def test_the_sample_is_part_of_the_package() -> None:
+    """``make check-package`` compares the wheel with these; here: they are declared as its data."""
+    project = (ROOT / "pyproject.toml").read_text()
+    assert f'"adhesis.ensemble.command" = ["{SAMPLE.name}"]' in project
+
+
+# ---------------------------------------------------------------------- a shell's completion
+
+
+def completed(script: str, *words: str) -> set[str]:
+    """Return what bash would offer for the last word."""
+    code = (
+        f"{script}\nCOMP_WORDS=({' '.join(map(repr, words))})\n"
+        f"COMP_CWORD={len(words) - 1}\n_adhesis\nprintf '%s\\n' \"${{COMPREPLY[@]}}\""
+    )
+    done = subprocess.run(
+        ["bash", "--norc", "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stderr == ""
+    return set(done.stdout.split())
+
+
+def test_a_shell_completes_commands_options_and_shells(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    assert completed(script, "adhesis", "") == {*COMMANDS, "--help", "--version"}
+    assert completed(script, "adhesis", "me") == {"merge"}
+    options = set(parser_of("loop")._option_string_actions)
+    assert completed(script, "adhesis", "loop", "--hurst", "0.8", "-") == options
+    assert completed(script, "adhesis", "loop", "--max-p") == {"--max-penetration"}
+    assert completed(script, "adhesis", "completion", "") == {"bash", "zsh"}
+    assert completed(script, "adhesis", "run", "") == set()  # files, by the shell's own rule
+    assert completed(script, "adhesis", "nothing", "-") == set()
+    assert main(["completion", "zsh"]) == 0
+    assert capsys.readouterr().out == f"autoload -U +X bashcompinit && bashcompinit\n{script}"

@@ -1,0 +1,124 @@
+"""Lengths with their units: of options and of campaign files, by one reader."""
+
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.command.main import COMMANDS, main, parser_of
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.lengths import height, length, length_text, length_with_unit
+from tests.support.campaign_support import campaign_text
+
+READ = {
+    "1e-6": 1e-6,
+    "0.5": 0.5,
+    "-1e-3": -1e-3,
+    "2.5um": 2.5e-6,
+    "7 µm": 7e-6,
+    "7μm": 7e-6,
+    "3e2nm": 3e-7,
+    " .5 mm ": 5e-4,
+    "12m": 12.0,
+    "-1um": -1e-6,
+    "1 inch": 0.0254,
+}
+REFUSED = {
+    "": "is '': it must be a length, as in 5e-6 (m) or 5um",
+    "um": "is 'um': it must be a length",
+    "5 parsec": "is '5 parsec': 'parsec' is no unit of length: it must be one of m, cm, mm",
+    "1,5mm": "is '1,5mm': it must be a length",
+    "5um5": "is '5um5': it must be a length",
+    "9" * 400 + "x": "…': 'x' is no unit of length",
+    "20": "is 20, which would be 20 m: give its unit, as in 20um (20m, if metres are meant)",
+}
+
+
+@pytest.mark.parametrize("text", READ)
+def test_a_length_is_the_number_nearest_to_its_decimals(text: str) -> None:
+    """So that 7um has the bits of 7e-6, and the same loss."""
+    assert length(text) == READ[text]
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_is_no_length_is_refused_with_the_rule(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError) as refusal:
+        length(text)
+    assert REFUSED[text] in str(refusal.value)
+    assert len(str(refusal.value)) < 220
+
+
+def test_heights_of_a_metre_are_asked_about_and_a_nan_is_left_to_its_rule() -> None:
+    assert height("1e-3") == 1e-3
+    assert height("10m") == 10.0
+    with pytest.raises(argparse.ArgumentTypeError, match=r"is 0\.4, which would be 0\.4 m: give"):
+        height("0.4")
+    assert height("nan") != height("nan")
+    assert length("inf") == float("inf")
+
+
+# Options that are numbers, but no lengths.
+NUMBERS = (
+    *("--hurst", "--m2", "--c0", "--work-of-adhesion", "--young", "--poisson", "--stiffness"),
+    *("--accuracy", "--field-penetrations", "--budget"),
+)
+
+
+def test_every_option_that_is_a_length_takes_a_unit() -> None:
+    actions = [action for name in COMMANDS for action in parser_of(name)._actions]
+    options = {kind: set[str]() for kind in (length, height, float)}
+    for action in actions:
+        if action.type in options:
+            options[action.type].add(action.option_strings[-1])  # type: ignore[index]
+    assert options[height] == {"--h-rms"}
+    lengths = {"--period", "--step", "--cut-off", "--tip-radius", "--longest-gap", "--layer"}
+    assert options[length] == lengths
+    assert options[float] == set(NUMBERS)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--h-rms", "10"), "--h-rms is 10, which would be 10 m: give its unit, as in 10um (10m,"),
+        (("--period", "2000"), "--period is 2000, which would be 2000 m: give its unit"),
+        (("--h-rms", "0.5 furlong"), "--h-rms is '0.5 furlong': 'furlong' is no unit of length"),
+        (("--period", "0mm"), "--period is 0.0: it must be a positive number"),
+        (("--h-rms", "100mm"), "rms slope is "),
+        (("--layer", "5"), "--layer is 5, which would be 5 m: give its unit"),
+    ],
+)
+def test_loop_asks_about_a_length_before_it_computes(
+    words: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["loop", "--hurst", "0.8", *words]) == 2
+    assert capsys.readouterr().err.startswith(f"adhesis loop: {sentence}")
+
+
+# ---------------------------------------------------------------------- campaign files
+
+
+def test_lengths_of_a_campaign_may_have_units() -> None:
+    assert parse_campaign(campaign_text(period='"1 mm"', h_rms='"1 µm"')) == parse_campaign(
+        campaign_text(period="1e-3", h_rms="1e-6")
+    )
+    several = parse_campaign(campaign_text(h_rms='["1 µm", 2e-6]'))
+    assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
+
+
+@pytest.mark.parametrize("value", ['"1"', '"1 kPa"', '"-1 mm"', '"wide"', '["1 mm", "x"]'])
+def test_a_campaign_refuses_other_texts(value: str) -> None:
+    with pytest.raises(InputError, match=r'period is .*: it must be .* or a length as "2 mm"'):
+        parse_campaign(campaign_text(period=value))
+
+
+def test_other_keys_take_no_unit() -> None:
+    with pytest.raises(InputError, match="young is '1 mm': it must be a positive number"):
+        parse_campaign(campaign_text(young='"1 mm"'))
+
+
+def test_lengths_are_shown_in_a_unit_of_their_size() -> None:
+    assert length_text(5e-6) == "5 µm"
+    assert length_text(2e-3) == "2 mm"
+    assert length_with_unit("2 mm") == 2e-3
