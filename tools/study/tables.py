@@ -289,7 +289,7 @@ def turning_point(study: Study) -> Table:
 
 @cache
 def law_of(study: Study, branch: str, name: str) -> jumps.PowerLaw:
-    """A power law of the jumps of one branch, worked out once."""
+    """A power law of the jumps of one branch, computed once."""
     return jumps.power_law(study.jumps.where(branch=branch), name)
 
 
@@ -318,15 +318,19 @@ def power_laws(study: Study) -> Table:
     return header, rows
 
 
+@cache
+def cut_law_of(study: Study, branch: str, name: str) -> jumps.CutPowerLaw:
+    """A power law with a cut-off of the jumps of one branch, computed once."""
+    decades = {"energy_drop": jumps.ENERGY_DECADES, "area": jumps.AREA_DECADES}[name]
+    return jumps.cut_power_law(study.jumps.where(branch=branch), name, decades)
+
+
 def cut_power_laws(study: Study) -> Table:
     """Fits with an exponential cut-off (seen afterwards)."""
     rows = []
     for branch in ("loading", "unloading"):
-        for name, title, decades in (
-            ("energy_drop", "energy (J/m²)", jumps.ENERGY_DECADES),
-            ("area", "area", jumps.AREA_DECADES),
-        ):
-            law = jumps.cut_power_law(study.jumps.where(branch=branch), name, decades)
+        for name, title in (("energy_drop", "energy (J/m²)"), ("area", "area")):
+            law = cut_law_of(study, branch, name)
             rows.append(
                 [
                     *(branch, title, f"{law.exponent:.2f} ({law.low:.2f} … {law.high:.2f})"),
