@@ -16,6 +16,7 @@ from tools.study.table1 import best_of, complete, every_reading
 from tools.study.tables import (
     LOSSES,
     MACHINES,
+    at_paper_gammas,
     cutoff,
     errors,
     law_of,
@@ -284,18 +285,15 @@ def answer_text(study: Study) -> str:
         found = [peak for peak in peaks if peak is not None]
         low, high = min(peak.low for peak in found), max(peak.high for peak in found)
         spans.append(f"{low:.2g} to {high:.2g} µm at Δ~max = {turn:g}")
-    across = [
-        (height, row)
-        for height, row in amplitude.rows_along_hurst(study, "loss")
-        if height in amplitude.OF_PAPER.values()
-    ]
+    across = at_paper_gammas(study)
     verdicts = {
-        turn: Counter(row.verdict for _, row in across if row.turn == turn)
+        turn: Counter(row.verdict for (_, there), row in across.items() if there == turn)
         for turn in amplitude.TURNS
     }
     reported = "; ".join(
         f"at Δ~max = {turn:g} it " + " and ".join(
-            f"{'is ' if v in ('open', 'not monotone') else ''}{v} at {n} γ" for v, n in c.items())
+            f"{'is ' if v in ('open', 'not monotone') else ''}{v} at {n} of 3 γ"
+            for v, n in c.items())
         for turn, c in verdicts.items()
     )  # fmt: skip
     others = "" if len(sure) == len(rows) else f", and is open in {len(rows) - len(sure)}"

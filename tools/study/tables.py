@@ -185,17 +185,28 @@ def through_hurst(study: Study) -> Table:
     return [*header, "verdict", "p"], rows
 
 
+def at_paper_gammas(study: Study) -> dict[tuple[float, float], monotone.Row]:
+    """Steps of the loss in J/m² along H at h_rms = 1 µm, by γ and turning point."""
+    known = {(row.turn, height): row for height, row in amplitude.rows_along_hurst(study, "loss")}
+    found = {}
+    for gamma, height in amplitude.OF_PAPER.items():
+        for turn in amplitude.TURNS:
+            if (turn, height) in known:
+                found[gamma, turn] = known[turn, height]
+            else:
+                first = monotone.series(study, gamma, turn, "loss", monotone.FIRST)
+                found[gamma, turn] = monotone.row_of(gamma, turn, "loss", first)
+    return found
+
+
 def answer(study: Study) -> Table:
     """Whether the loss in J/m² is monotone in m2, at the paper's γ and each turning point."""
     along = {(row.turn, hurst): row for hurst, row in amplitude.rows(study, "loss")}
-    across = {(row.turn, height): row for height, row in amplitude.rows_along_hurst(study, "loss")}
+    across = at_paper_gammas(study)
     rows = []
-    for gamma, height in amplitude.OF_PAPER.items():
+    for gamma in amplitude.OF_PAPER:
         for turn in amplitude.TURNS:
-            row = across.get((turn, height))
-            if row is None:  # not in the amplitude campaigns: as decided first
-                first = monotone.series(study, gamma, turn, "loss", monotone.FIRST)
-                row = monotone.row_of(gamma, turn, "loss", first)
+            row = across[gamma, turn]
             n = min(step.n for step in row.steps)
             ups = [along.get((turn, hurst)) for hurst in amplitude.HURSTS]
             verdicts = Counter(one.verdict for one in ups if one)
