@@ -34,7 +34,7 @@ OF_TEXTS = {
     **dict.fromkeys(("2.4", "2.8"), "the last reading over the paper at γ = 0.01 J/m²"),
     **dict.fromkeys(("2015", "2009", "51", "661", "7", "4", "99", "2,400", "500"), "counts, years"),
     **dict.fromkeys(("1511", "1512"), "seeds"),
-    **dict.fromkeys(("0.2", "0.3"), "rms slopes at 4 and 8 µm"),
+    **dict.fromkeys(("0.28", "0.46"), "rms slopes at 8 µm"),
 }
 
 

@@ -17,7 +17,7 @@ from tools.study import amplitude, jumps, monotone
 from tools.study.data import Array, Study, aligned
 from tools.study.readings import Losses
 from tools.study.table1 import every_reading, is_main
-from tools.study.tables import CUTOFFS, MACHINES, cutoff_place, machine_of
+from tools.study.tables import CUTOFFS, MACHINES, cut_law_of, cutoff_place, machine_of
 
 HURSTS = (0.7, 0.8, 0.9)
 COLOURS = {0.01: "#0072B2", 0.025: "#009E73", 0.04: "#E69F00", 0.07: "#D55E00"}
@@ -281,12 +281,9 @@ def _hurst_steps(study: Study, gamma: float, turn: float) -> Iterable[monotone.S
 def of_jumps(study: Study) -> Figure:
     """Complementary distributions of energies and areas, with power laws that have a cut-off."""
     figure = new_figure(1, 2, TWO_COLUMNS, 70 * MM)
-    for axes, (name, label, decades) in zip(
+    for axes, (name, label) in zip(
         figure.axes,
-        (
-            ("energy_drop", "energy drop $e$ (J/m²)", jumps.ENERGY_DECADES),
-            ("area", r"area $|\Delta A|/A_0$", jumps.AREA_DECADES),
-        ),
+        (("energy_drop", "energy drop $e$ (J/m²)"), ("area", r"area $|\Delta A|/A_0$")),
         strict=True,
     ):
         for branch, colour in (("loading", BLUE), ("unloading", RED)):
@@ -295,7 +292,7 @@ def of_jumps(study: Study) -> Figure:
             values = values[values > 0]
             share = 1 - np.arange(values.size) / values.size
             axes.plot(values, share, color=colour, label=branch)
-            law = jumps.cut_power_law(rows, name, decades)
+            law = cut_law_of(study, branch, name)
             x = np.geomspace(law.smallest, values[-1], 200)
             of_all = law.n / law.of
             curves = [of_all * jumps.share_above(x, law.smallest, *one) for one in law.drawn]

@@ -16,6 +16,7 @@ from tools.study.table1 import best_of, complete, every_reading
 from tools.study.tables import (
     LOSSES,
     MACHINES,
+    at_paper_gammas,
     cutoff,
     errors,
     law_of,
@@ -208,6 +209,7 @@ def amplitude_findings(study: Study) -> Table:
     losses = [row for _, row in amplitude.rows(study, "loss")]
     scaled = [row for _, row in amplitude.rows(study, "loss_dimensionless")]
     worst = max(row.p_not_monotone for row in losses)
+    sure = [row for row in losses if row.p_not_monotone < 1e-3]
     peaks = {
         (turn, hurst): amplitude.maximum(study, hurst, turn)
         for turn in amplitude.TURNS
@@ -233,10 +235,10 @@ def amplitude_findings(study: Study) -> Table:
             "1. through the amplitude, the loss in J/m² rises and then falls, p < 1e-3",
             f"{_counted(row.verdict for row in losses)}; largest p {worst:.1g}",
             "holds"
-            if worst < 1e-3
-            else "not monotone in every row, with a larger p in some"
-            if all(row.verdict == "not monotone" for row in losses)
-            else "open",
+            if len(sure) == len(losses)
+            else "wrong"
+            if any(row.verdict in ("rises", "falls") for row in losses)
+            else f"holds in {len(sure)} of {len(losses)} rows, open in the others",
         ],
         [
             "2. W~ falls with the amplitude",
@@ -284,18 +286,15 @@ def answer_text(study: Study) -> str:
         found = [peak for peak in peaks if peak is not None]
         low, high = min(peak.low for peak in found), max(peak.high for peak in found)
         spans.append(f"{low:.2g} to {high:.2g} µm at Δ~max = {turn:g}")
-    across = [
-        (height, row)
-        for height, row in amplitude.rows_along_hurst(study, "loss")
-        if height in amplitude.OF_PAPER.values()
-    ]
+    across = at_paper_gammas(study)
     verdicts = {
-        turn: Counter(row.verdict for _, row in across if row.turn == turn)
+        turn: Counter(row.verdict for (_, there), row in across.items() if there == turn)
         for turn in amplitude.TURNS
     }
     reported = "; ".join(
         f"at Δ~max = {turn:g} it " + " and ".join(
-            f"{'is ' if v in ('open', 'not monotone') else ''}{v} at {n} γ" for v, n in c.items())
+            f"{'is ' if v in ('open', 'not monotone') else ''}{v} at {n} of 3 γ"
+            for v, n in c.items())
         for turn, c in verdicts.items()
     )  # fmt: skip
     others = "" if len(sure) == len(rows) else f", and is open in {len(rows) - len(sure)}"

@@ -185,17 +185,28 @@ def through_hurst(study: Study) -> Table:
     return [*header, "verdict", "p"], rows
 
 
+def at_paper_gammas(study: Study) -> dict[tuple[float, float], monotone.Row]:
+    """Steps of the loss in J/m² along H at h_rms = 1 µm, by γ and turning point."""
+    known = {(row.turn, height): row for height, row in amplitude.rows_along_hurst(study, "loss")}
+    found = {}
+    for gamma, height in amplitude.OF_PAPER.items():
+        for turn in amplitude.TURNS:
+            if (turn, height) in known:
+                found[gamma, turn] = known[turn, height]
+            else:
+                first = monotone.series(study, gamma, turn, "loss", monotone.FIRST)
+                found[gamma, turn] = monotone.row_of(gamma, turn, "loss", first)
+    return found
+
+
 def answer(study: Study) -> Table:
     """Whether the loss in J/m² is monotone in m2, at the paper's γ and each turning point."""
     along = {(row.turn, hurst): row for hurst, row in amplitude.rows(study, "loss")}
-    across = {(row.turn, height): row for height, row in amplitude.rows_along_hurst(study, "loss")}
+    across = at_paper_gammas(study)
     rows = []
-    for gamma, height in amplitude.OF_PAPER.items():
+    for gamma in amplitude.OF_PAPER:
         for turn in amplitude.TURNS:
-            row = across.get((turn, height))
-            if row is None:  # not in the amplitude campaigns: as decided first
-                first = monotone.series(study, gamma, turn, "loss", monotone.FIRST)
-                row = monotone.row_of(gamma, turn, "loss", first)
+            row = across[gamma, turn]
             n = min(step.n for step in row.steps)
             ups = [along.get((turn, hurst)) for hurst in amplitude.HURSTS]
             verdicts = Counter(one.verdict for one in ups if one)
@@ -289,7 +300,7 @@ def turning_point(study: Study) -> Table:
 
 @cache
 def law_of(study: Study, branch: str, name: str) -> jumps.PowerLaw:
-    """A power law of the jumps of one branch, worked out once."""
+    """A power law of the jumps of one branch, computed once."""
     return jumps.power_law(study.jumps.where(branch=branch), name)
 
 
@@ -318,15 +329,19 @@ def power_laws(study: Study) -> Table:
     return header, rows
 
 
+@cache
+def cut_law_of(study: Study, branch: str, name: str) -> jumps.CutPowerLaw:
+    """A power law with a cut-off of the jumps of one branch, computed once."""
+    decades = {"energy_drop": jumps.ENERGY_DECADES, "area": jumps.AREA_DECADES}[name]
+    return jumps.cut_power_law(study.jumps.where(branch=branch), name, decades)
+
+
 def cut_power_laws(study: Study) -> Table:
     """Fits with an exponential cut-off (seen afterwards)."""
     rows = []
     for branch in ("loading", "unloading"):
-        for name, title, decades in (
-            ("energy_drop", "energy (J/m²)", jumps.ENERGY_DECADES),
-            ("area", "area", jumps.AREA_DECADES),
-        ):
-            law = jumps.cut_power_law(study.jumps.where(branch=branch), name, decades)
+        for name, title in (("energy_drop", "energy (J/m²)"), ("area", "area")):
+            law = cut_law_of(study, branch, name)
             rows.append(
                 [
                     *(branch, title, f"{law.exponent:.2f} ({law.low:.2f} … {law.high:.2f})"),
