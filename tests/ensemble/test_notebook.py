@@ -363,7 +363,7 @@ def test_a_campaign_is_priced_run_resumed_and_opened(campaign, tmp_path, capsys)
 @pytest.mark.mpi
 def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
     alone, ranks = campaign.run(tmp_path / "1.h5"), campaign.run(tmp_path / "2.h5", ranks=2)
-    assert capfd.readouterr() == ("", "")
+    assert not any("tasks" in text for text in capfd.readouterr())
     shown = io.StringIO()  # what a notebook has as stderr is not the process's own
     monkeypatch.setattr("sys.stderr", shown)
     campaign.run(tmp_path / "2.h5", ranks=2, progress=True)

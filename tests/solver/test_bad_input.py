@@ -699,7 +699,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         InputError,
         "campaign: 'sweeps' is unknown; the tables are",
     ),
-    ("load", lambda: adhesis.load(3), TypeError, "source is 3: it must be a path"),
+    ("load", lambda: adhesis.load(3), TypeError, "path is 3: it must be a path"),
     ("load", lambda: adhesis.load("no.nc"), InputError, "path is no.nc: there is no such file"),
     # traces
     (
@@ -853,7 +853,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         "watch is 1: it must be a function, or None",
     ),
     # files
-    ("open", lambda: adhesis.open(3), TypeError, "source is 3: it must be a path"),
+    ("open", lambda: adhesis.open(3), TypeError, "path is 3: it must be a path"),
     (
         "open",
         lambda: adhesis.open("a.h5", beside="b.h5"),
