@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from adhesis.ensemble.loop.saved import load
     from adhesis.ensemble.trace.answer import loss_of_trace
     from adhesis.ensemble.trace.prepare import prepare_trace
-    from adhesis.ensemble.trace.read import read_trace
+    from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.loading.loop_result import LoopResult
     from adhesis.solver.loading.path import MinorLoop, PathResult, run_path
@@ -60,13 +60,14 @@ _MODULES = {
     "PathResult": "solver.loading.path",
     "Problem": "solver.model.problem",
     "Profile": "solver.model.profile",
+    "Trace": "ensemble.trace.reading.measured_trace",
     "load": "ensemble.loop.saved",
     "loss_of_trace": "ensemble.trace.answer",
     "make_method": "solver.registry",
     "open": "_open",
     "prepare_trace": "ensemble.trace.prepare",
     "profile_from_heights": "solver.model.profile",
-    "read_trace": "ensemble.trace.read",
+    "read_trace": "ensemble.trace.reading.measured_trace",
     "run_loop": "solver.loading.loop",
     "run_loops": "solver.loading.turning_points",
     "run_path": "solver.loading.path",
@@ -91,6 +92,7 @@ __all__ = [
     "PathResult",
     "Problem",
     "Profile",
+    "Trace",
     "load",
     "loss_of_trace",
     "make_method",

@@ -7,9 +7,9 @@ import io
 import json
 import os
 import re
-import sys
 import tempfile
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,6 +83,10 @@ class Campaign:
             f"<Campaign: {checks.counted(cells, 'cell')}, {checks.counted(tasks, 'task')}>"
         )
 
+    def _repr_html_(self) -> str:
+        """Return the number of tasks and the campaign file, for notebooks."""
+        return f"<p>{escape(repr(self))}</p><pre>{escape(self.text)}</pre>"
+
     def __eq__(self, other: object) -> bool:
         """Whether both compute the same."""
         return isinstance(other, Campaign) and self.tables == other.tables
@@ -140,7 +144,7 @@ class Campaign:
             1 computes in this process. More start so many MPI ranks on this machine: one more than
             cores is right, as the first only hands out.
         progress : bool
-            Whether a line on stderr shows how far the campaign is.
+            Whether lines on stderr, or in the notebook, show how far the campaign is.
 
         Returns
         -------
@@ -166,27 +170,27 @@ class Campaign:
         if ranks == 1:
             self._run_here(path, progress)
         else:
-            self._run_ranks(path, ranks)
+            self._run_ranks(path, ranks, progress)
         from adhesis._open import open as open_results
 
         return open_results(path)
 
     def _run_here(self, path: Path, progress: bool) -> None:
+        from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run.session import run_campaign
 
         with contextlib.nullcontext() if progress else contextlib.redirect_stderr(io.StringIO()):
-            summary = run_campaign(
-                self.tables, path, say=lambda text: print(text, file=sys.stderr, flush=True)
-            )
+            summary = run_campaign(self.tables, path, say=log)
         if summary.stopped:
             raise RuntimeError(
                 f"the campaign stopped early: {summary.stopped}; {summary.pending} of "
                 f"{summary.total} tasks are left in {path}, and the same call goes on"
             )
 
-    def _run_ranks(self, path: Path, ranks: int) -> None:
+    def _run_ranks(self, path: Path, ranks: int, progress: bool) -> None:
         from adhesis.ensemble.command.campaigns.run import BAD_INPUT, DONE, SOME_FAILED
         from adhesis.ensemble.errors import InputError
+        from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run import launch
 
         mpirun, most = launch.launcher(), launch.largest_number_of_ranks()
@@ -200,7 +204,10 @@ class Campaign:
             file = Path(folder, "campaign.toml")
             file.write_text(self.text, encoding="utf-8")
             code, sentence = launch.run_ranks(
-                mpirun, ranks, ["run", str(file), "--out", str(path.absolute())]
+                mpirun,
+                ranks,
+                ["run", str(file), "--out", str(path.absolute())],
+                output=log if progress else lambda line: None,
             )
         if code == BAD_INPUT:
             raise InputError(sentence.removeprefix("adhesis run: ") or "the ranks refused the run")

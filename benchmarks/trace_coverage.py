@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from adhesis.ensemble.trace.answer import QUANTITIES, loss_of_trace
 from adhesis.ensemble.trace.prepare import prepare_trace
-from adhesis.ensemble.trace.read import read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem

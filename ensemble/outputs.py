@@ -7,6 +7,7 @@ written in place. A failure while writing does not keep the other outputs from b
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -16,7 +17,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from adhesis.ensemble.errors import InputError, WriteError
 
@@ -234,6 +235,12 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write a document whole or not at all (OSError)."""
+    with whole_file(path) as stream:
+        stream.write((json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Units of the numbers that commands write, and the loss in units of the work of adhesion."""
+"""Units of the numbers that results and commands state; the loss over the work of adhesion."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Any
 _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range position step length "
     "height_range tip_radius cut_off noise longest highest rise form_height rms_level noise_rms "
-    "limit_step limit_noise limit_tip coefficient_real coefficient_imag",
+    "limit_step limit_noise limit_tip coefficient_real coefficient_imag narrowest_length",
     "m²": "m0",
     "1/m²": "m4",
     "m³": "power floor",
     "rad/m": "wave_number",
-    "Pa": "young mean_stress pull_off_stress stress_change max_stress tension "
+    "Pa": "young modulus mean_stress pull_off_stress stress_change max_stress tension "
     "largest_interior_tension",
     "Pa/m": "stiffness",
-    "J/m": "energy elastic_energy adhesion_energy potential",
+    "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
     "J/m²": "work_of_adhesion loss loss_from_drops loss_error energy_drop at_stake energy_at_stake "
-    "energy_change work_gained work_spent effective_work_of_approach effective_work_of_separation "
-    "full_contact_energy",
+    "energy_change work work_gained work_spent effective_work_of_approach "
+    "effective_work_of_separation full_contact_energy",
     "s": "seconds expected_seconds wall",
 }
 UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
@@ -79,3 +79,9 @@ def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
     """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
     ratio = loss_over_work_of_adhesion(loss, work_of_adhesion)
     return "" if ratio is None else f", {ratio:.4g} γ"
+
+
+def with_units(table: Any) -> Any:
+    """Return a DataFrame with the unit of every column in ``attrs["units"]``."""
+    table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
+    return table

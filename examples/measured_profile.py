@@ -21,7 +21,6 @@ from adhesis import (
     read_trace,
     self_affine_profile,
 )
-from adhesis.ensemble.trace.page import summary, write_page
 
 MATERIAL = HalfSpace(young=1e6, poisson=0.5)  # a soft elastomer
 WORK_OF_ADHESION = 0.04  # J/m²
@@ -57,10 +56,10 @@ def main() -> None:
     trace = read_trace(args.trace)
     prepared = prepare_trace(trace)
     for step in prepared.steps:
-        print(f"{step.name:<11} {step.said}")
+        print(f"{step.name:<11} {step.description}")
     answer = loss_of_trace(prepared, half_space=MATERIAL, work_of_adhesion=WORK_OF_ADHESION)
-    write_page(answer, args.to)
-    print(summary(answer))
+    answer.page(args.to)
+    print(answer)
 
 
 if __name__ == "__main__":

@@ -45,6 +45,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.runtime.threads import new_lock
 from adhesis.solver.values import ByValue
+from adhesis.solver.views import Shown
 
 __all__ = [
     "BRANCHES",
@@ -180,7 +181,7 @@ class MethodReport:
     chosen: str | None
 
 
-class Method(ABC):
+class Method(Shown, ABC):
     """Base of methods that follow contact states of one problem; see the module's contract.
 
     Parameters

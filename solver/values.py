@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from adhesis.solver.views import Shown
+
 _MANY = 4  # entries of a tuple that are shown
 
 
@@ -16,7 +18,7 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-class ByValue:
+class ByValue(Shown):
     """Read-only arrays, equality by value and a short repr, for a frozen dataclass.
 
     The dataclass is declared with ``eq=False, repr=False``. Two objects are equal if they have the
@@ -55,7 +57,7 @@ class ByValue:
     def __repr__(self) -> str:
         """Return one line, with only the size of arrays and long tuples."""
         shown = (
-            f"{entry.name}={_brief(getattr(self, entry.name))}"
+            f"{entry.name}={brief(getattr(self, entry.name))}"
             for entry in fields(self)  # type: ignore[arg-type]  # every subclass is a dataclass
             if entry.repr
         )
@@ -84,7 +86,8 @@ def _hashable(value: Any) -> Any:
     return value
 
 
-def _brief(value: Any) -> str:
+def brief(value: Any) -> str:
+    """Return a value as text, of arrays and long tuples only the size."""
     if isinstance(value, np.ndarray):
         return f"<array of {' × '.join(map(str, value.shape))}>"
     if isinstance(value, tuple) and len(value) > _MANY:

@@ -1,4 +1,4 @@
-"""Figures, films, tables and files of a result: declared here, made outside of the mechanics.
+"""Figures, films, tables and files of results, and displays: declared here, made elsewhere.
 
 ``adhesis`` names the module that makes them in :data:`maker` when it is imported; that module, and
 matplotlib with it, is loaded when a result is first shown.
@@ -19,12 +19,16 @@ maker: Callable[[], Any] = _unset
 """Return the module that makes them; ``adhesis/__init__.py`` sets it."""
 
 
-class Viewed:
-    """Figure, film, tables and file of a loop or path."""
+class Shown:
+    """Display in a notebook."""
 
     def _repr_html_(self) -> str:
-        """Return the main numbers and the figure, for notebooks."""
+        """Return the main numbers, and the figure if there is one, for notebooks."""
         return str(maker().page(self))
+
+
+class Viewed(Shown):
+    """Figure, film, tables and file of a loop or path."""
 
     def plot(self) -> Any:
         """Draw mean stress and contact fraction against penetration.
@@ -53,7 +57,7 @@ class Viewed:
         path: str | Path | None = None,
         *,
         frames: int = 120,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Callable[[int, int], None] | bool | None = None,
     ) -> Any:
         """Make a film: the deformed surface over the profile, and the point on the curve.
 
@@ -66,8 +70,9 @@ class Viewed:
             States that are evenly spaced along the path, from 2 to 1000. Beside them stand the
             states before and after each jump, those with the largest energy drops first, up to
             1000 frames in all.
-        progress : callable, optional
-            Called with the number of frames that are drawn and that of all.
+        progress : bool or callable, optional
+            True shows a bar; a callable is called with the number of frames that are drawn and
+            that of all.
 
         Returns
         -------
@@ -82,7 +87,7 @@ class Viewed:
         ValueError
             If ``frames`` is out of range, or the result holds no contact states.
         TypeError
-            If ``frames`` is no whole number, or ``path`` no path.
+            If ``frames`` is no whole number, ``path`` no path, or ``progress`` no function.
 
         References
         ----------

@@ -19,9 +19,9 @@ import numpy as np
 
 from adhesis.ensemble.aggregate.cells import Cell, read_cells, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion, read_companion
-from adhesis.ensemble.aggregate.curves import average_curves
-from adhesis.ensemble.aggregate.fields import FieldStatistics, aggregate_fields
 from adhesis.ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
+from adhesis.ensemble.aggregate.mean_curves import average_curves
+from adhesis.ensemble.aggregate.mean_fields import FieldStatistics, aggregate_fields
 from adhesis.ensemble.aggregate.statistics import Estimate, estimates
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import Campaign

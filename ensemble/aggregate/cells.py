@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.aggregate.curves import Curve
+from adhesis.ensemble.aggregate.mean_curves import Curve
 from adhesis.ensemble.aggregate.statistics import Estimate, estimates
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
-from adhesis.ensemble.ticker import log, ticking
+from adhesis.ensemble.reporter import log, ticking
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from adhesis.ensemble.bench.compare import Line
+    from adhesis.ensemble.bench.equal_error import Line
 
 _DEFAULT = Path("out/benchmark")
 _WIDTH = 120
@@ -57,14 +57,14 @@ def execute(args: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from adhesis.ensemble.bench.compare import FULL, QUICK, benchmark, exponents, growth, ratios
-    from adhesis.ensemble.bench.page import (
+    from adhesis.ensemble.bench.bench_page import (
         GROWTH_COLUMNS,
         LINE_COLUMNS,
         growth_cells,
         line_cells,
         page,
     )
+    from adhesis.ensemble.bench.equal_error import FULL, QUICK, benchmark, exponents, growth, ratios
     from adhesis.ensemble.warm import warm_missing
     from adhesis.solver.precompile import COMPILED_METHODS
 
@@ -123,7 +123,7 @@ def _table(title: str, columns: tuple[str, ...], rows: list[list[str]]) -> Table
 
 
 def _write_csv(path: Path, lines: list[Line]) -> None:
-    from adhesis.ensemble.bench.page import record
+    from adhesis.ensemble.bench.bench_page import record
 
     records = [record(line) for line in lines]
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -133,7 +133,9 @@ def _write_csv(path: Path, lines: list[Line]) -> None:
 
 
 def _draw(lines: list[Line], stem: Path) -> None:
-    from adhesis.ensemble.bench.figure import draw  # matplotlib only when everything is measured
+    from adhesis.ensemble.bench.bench_figure import (
+        draw,  # matplotlib only when everything is measured
+    )
     from adhesis.ensemble.report.figures.style import save
 
     save(draw(lines), stem)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -13,21 +12,20 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, one_of, refused_as_input
-from adhesis.ensemble.loop.arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.cycle import Cycle, cycle_of
 from adhesis.ensemble.loop.heights import closure_warning, read_heights
+from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
     FieldStates,
     loop_summary,
     loops_document,
     path_document,
     path_summary,
-    write_json,
     write_npz,
 )
-from adhesis.ensemble.outputs import Writing, check_outputs, whole_file
+from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.ticker import log, ticking
+from adhesis.ensemble.reporter import StatusLine, log, ticking
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -314,7 +312,7 @@ def _document(
 
 
 def _draw(results: tuple[LoopResult, ...] | PathResult, path: Path) -> None:
-    from adhesis.ensemble.loop.figure import draw_loops
+    from adhesis.ensemble.loop.loop_figure import draw_loops
 
     figure = draw_loops(results)
     with whole_file(path) as stream:
@@ -343,24 +341,18 @@ def _quiet(_: str) -> None:
 
 
 def _progress(step: float, load: bool) -> Progress:
-    """Progress lines on stderr: one that is rewritten on a terminal, else one every few seconds."""
-    live = sys.stderr.isatty()
+    """Return what reports the branch, the load step, the contact and the time on stderr."""
+    line = StatusLine(_SECONDS_BETWEEN_LINES)
     name = "p̄ in Pa" if load else "Δ/h_max"
-    started = last = time.monotonic()
 
     def show(branch: Branch, drive: float, state: ContactState) -> None:
-        nonlocal last
-        now = time.monotonic()
-        done = branch == "unloading" and not state.patches
-        if not live and not done and now - last < _SECONDS_BETWEEN_LINES:
-            return
-        last = now
-        line = (
-            f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  "
-            f"A/A0 {state.contact_fraction:.4f}  patches {state.patches:>4}  "
-            f"{now - started:.0f} s"
+        line.show(
+            lambda: (
+                f"{branch:<9} step {round(drive / step):>4}  {name} {drive:+.4g}  "
+                f"A/A0 {state.contact_fraction:.4f}  patches {state.patches:>4}  "
+                f"{line.seconds:.0f} s"
+            ),
+            last=branch == "unloading" and not state.patches,
         )
-        end = "\n" if done or not live else ""
-        print(f"\r{line}" if live else line, end=end, file=sys.stderr, flush=True)
 
     return show

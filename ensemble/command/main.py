@@ -46,7 +46,10 @@ EXAMPLES = (
 )
 _CAMPAIGNS = ("new", "run", "status", "verify", "merge", "report")
 # Modules that declare options without loading the solver; those of other commands do so themselves.
-_OPTIONS = {"loop": "adhesis.ensemble.loop.arguments", "trace": "adhesis.ensemble.trace.arguments"}
+_OPTIONS = {
+    "loop": "adhesis.ensemble.loop.loop_arguments",
+    "trace": "adhesis.ensemble.trace.trace_arguments",
+}
 # What several processes of a launcher do with a command: the ranks of `run` share its work, and
 # these are independent of one another (of other profiles, on other nodes). Rank 0 alone runs the
 # rest.

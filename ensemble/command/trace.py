@@ -8,13 +8,13 @@ import time
 
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.loop.cycle import control_of, turning_points_of
-from adhesis.ensemble.loop.record import write_json
-from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
+from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
+from adhesis.ensemble.reporter import StatusLine
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
-from adhesis.ensemble.trace.plan import Plan, clock, make_plan
 from adhesis.ensemble.trace.pool import Pool
+from adhesis.ensemble.trace.variants import Plan, clock, make_plan
 from adhesis.solver.model.half_space import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
@@ -49,7 +49,7 @@ def execute(args: argparse.Namespace) -> int:
     print(what_was_read(prepared))
     for warning in prepared.warnings:
         print(f"WARNING     {warning}")
-    print(plan.said, flush=True)
+    print(plan.text, flush=True)
     if args.plan:
         return 0
     try:
@@ -57,7 +57,7 @@ def execute(args: argparse.Namespace) -> int:
     except NoAnswer as error:
         print(f"adhesis trace: {error}", file=sys.stderr)
         return 1
-    from adhesis.ensemble.trace.page import summary, write_page
+    from adhesis.ensemble.trace.trace_page import summary, write_page
 
     writing = Writing()
     with writing.output("--to", args.to / "trace.json"):
@@ -91,32 +91,25 @@ class _Progress:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.started = self.last = time.monotonic()
-        self.live = sys.stderr.isatty()
+        self.line = StatusLine(_SECONDS_BETWEEN_LINES)
 
     def __call__(self, pool: Pool) -> None:
-        now = time.monotonic()
         finished = not pool.running and not pool.waiting
-        if not self.live and now - self.last < _SECONDS_BETWEEN_LINES:
-            return
-        self.last = now
+        self.line.show(lambda: self._text(pool, finished), last=finished)
+
+    def _text(self, pool: Pool, finished: bool) -> str:
+        now = time.monotonic()
         running = ", ".join(
             f"{name} ({branch} {drive:+.3g})" for name, (_, branch, drive) in pool.running.items()
         )
         left = self._left(pool, now)
         line = f"{len(pool.done)} of {len(self.plan.runs)} loops"
-        if not pool.done and now - self.started > 8:
+        if not pool.done and self.line.seconds > 8:
             running += "; the first loop of an installation waits a minute or two for machine code"
         if running:
             line += f"; running {running}"
-        line += f"; {now - self.started:.0f} s so far"
-        line += f", about {clock(left)} left" if pool.done and not finished else ""
-        if self.live:
-            print(
-                f"\r\x1b[K{line[:150]}", end="\n" if finished else "", file=sys.stderr, flush=True
-            )
-        else:
-            print(line, file=sys.stderr, flush=True)
+        line += f"; {self.line.seconds:.0f} s so far"
+        return line + (f", about {clock(left)} left" if pool.done and not finished else "")
 
     def _left(self, pool: Pool, now: float) -> float:
         """Expected wall seconds, corrected by what the loops have taken so far."""

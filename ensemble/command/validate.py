@@ -14,7 +14,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.ticker import log, ticking
+from adhesis.ensemble.reporter import log, ticking
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from functools import cached_property
@@ -25,10 +26,11 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from adhesis.ensemble.errors import InputError, one_of
-from adhesis.ensemble.loop.film_page import PAGE
-from adhesis.ensemble.loop.scenes import Scene, Scenes, jump_places, scenes_of
+from adhesis.ensemble.loop.film_page import BODY, STYLE
+from adhesis.ensemble.loop.film_scenes import Scene, Scenes, jump_places, scenes_of
 from adhesis.ensemble.outputs import whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
+from adhesis.ensemble.report.html import whole_page
 from adhesis.solver import checks
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
@@ -159,13 +161,15 @@ class Film:
         shown = self._scenes.jumps_shown
         if shown < len(self._result.jumps):
             jumps += f", of which the {shown} with the largest drops have frames of their own"
-        return (
-            PAGE.replace("@SVG@", drawing.svg())
-            .replace("@TITLE@", escape(self._title))
-            .replace("@JUMPS@", escape(jumps))
-            .replace("@LAST@", str(len(self) - 1))
-            .replace("@DATA@", data.replace("<", "\\u003c"))
-        )
+        parts = {
+            "@SVG@": drawing.svg(),
+            "@TITLE@": escape(self._title),
+            "@JUMPS@": escape(jumps),
+            "@LAST@": str(len(self) - 1),
+            "@DATA@": data.replace("<", "\\u003c"),
+        }
+        body = re.sub("@[A-Z]+@", lambda found: parts[found[0]], BODY)
+        return whole_page(self._title, STYLE, body)
 
     @property
     def _title(self) -> str:

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>@TITLE@</title>
-<style>
+STYLE = """
 body { font: 15px/1.4 system-ui, sans-serif; color: #111; background: #fff;
        max-width: 60rem; margin: 0 auto; padding: 0.5rem; }
 h1 { font-size: 1.1rem; margin: 0.2rem 0; }
@@ -17,9 +11,9 @@ svg { width: 100%; height: auto; }
 #controls { display: flex; gap: 0.6rem; align-items: center; }
 #slider { flex: 1; }
 #jump { color: #b04a00; font-weight: bold; min-height: 1.4em; }
-</style>
-</head>
-<body>
+"""
+
+BODY = """
 <h1>@TITLE@</h1>
 <p>@JUMPS@</p>
 @SVG@
@@ -92,6 +86,4 @@ button.addEventListener("click", () => {
 slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
 show(0);
 </script>
-</body>
-</html>
 """

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import re
-from pathlib import Path
 
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
-from adhesis.ensemble.trace.containers import container
-from adhesis.ensemble.trace.read import holds_numbers, load_array
-from adhesis.ensemble.trace.text import Table, read_column
-from adhesis.ensemble.trace.units import parse_units, units_of_header
+from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_header
+from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
+from adhesis.ensemble.trace.reading.source import Source, source_of
+from adhesis.ensemble.trace.reading.text_table import Table, read_column
 from adhesis.solver.model.profile import Array
 
 # A word in brackets that may be a unit: "z [æm]" after a wrong conversion.
@@ -29,7 +29,7 @@ _STRAIGHT = 1e-3
 
 
 def read_heights(
-    path: Path,
+    path: str | os.PathLike[str],
     *,
     unit: str | None = None,
     delimiter: str | None = None,
@@ -39,7 +39,7 @@ def read_heights(
 
     Parameters
     ----------
-    path : Path
+    path : path
     unit : str, optional
         Unit of the heights; without it that of the header. Without either they are in metres if
         they range over at most 1 mm, and otherwise refused.
@@ -58,33 +58,34 @@ def read_heights(
         unclear.
     """
     given = None if unit is None else _unit(unit)
-    if not holds_numbers(path):
+    source = source_of(path)
+    if not holds_numbers(source):
         raise InputError(
-            container(path)
+            source.container()
             or f"{path} is neither text nor .npy: --trace reads files of instruments, as adhesis "
             "trace does"
         )
-    if path.suffix.lower() == ".npy":
-        array = load_array(path)
+    if source.is_npy:
+        array = load_array(source)
         if array.ndim == 2 and 1 not in array.shape:
-            raise InputError(_not_one_column(path, *array.shape))
-        return _in_metres(path, array.reshape(-1), given)
-    table = read_column(path, delimiter, decimal)
+            raise InputError(_not_one_column(source, *array.shape))
+        return _in_metres(source, array.reshape(-1), given)
+    table = read_column(source, delimiter, decimal)
     if len(table.columns) > 1:
-        raise InputError(_not_one_column(path, table.columns.shape[1], len(table.columns)))
-    unit = _unit_of(path, table, given)
+        raise InputError(_not_one_column(source, table.columns.shape[1], len(table.columns)))
+    unit = _unit_of(source, table, given)
     missing = np.flatnonzero(~np.isfinite(table.columns[0]))
     if missing.size:
         raise InputError(
             f"{path} has no finite height on line {table.lines[missing[0]]}: --heights needs every "
             "height of the period (adhesis trace fills gaps)"
         )
-    return _in_metres(path, table.columns[0], unit)
+    return _in_metres(source, table.columns[0], unit)
 
 
-def _not_one_column(path: Path, rows: int, columns: int) -> str:
+def _not_one_column(source: Source, rows: int, columns: int) -> str:
     return (
-        f"{path} holds {rows} × {columns} numbers: --heights takes one column (or one row), the "
+        f"{source} holds {rows} × {columns} numbers: --heights takes one column (or one row), the "
         "heights of one period; adhesis trace reads positions and heights"
     )
 
@@ -95,26 +96,26 @@ def _unit(text: str) -> str:
     return parse_units(text)[1]
 
 
-def _in_metres(path: Path, heights: Array, unit: str | None) -> Array:
+def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
     """Convert heights to m; without a unit they are taken as metres, if they can be."""
     if unit is not None:
         return np.asarray(heights * METRES[unit])
     size = float(np.ptp(heights)) if heights.size else 0.0
     if HIGHEST_IN_METRES < size < np.inf:
         raise InputError(
-            f"{path} states no unit, and its heights would range over {length_text(size, 4)}: give "
-            "--unit, as in --unit um (--unit m, if metres are meant)"
+            f"{source} states no unit, and its heights would range over {length_text(size, 4)}: "
+            "give --unit, as in --unit um (--unit m, if metres are meant)"
         )
     return heights
 
 
-def _unit_of(path: Path, table: Table, given: str | None) -> str | None:
+def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
     """Return the unit of the heights, of the option or of the header; None without either."""
     found = units_of_header(table.header, table.fields)[-1]
     if given is not None:
         if found not in (None, given):
             raise InputError(
-                f"--unit is {given} and the header of {path} has heights in {found}: correct the "
+                f"--unit is {given} and the header of {source} has heights in {found}: correct the "
                 "wrong one"
             )
         return given
@@ -124,8 +125,8 @@ def _unit_of(path: Path, table: Table, given: str | None) -> str | None:
         word = _POSSIBLE_UNIT.search(line)
         if word is not None:
             raise InputError(
-                f"the header of {path} has {word[0]!r}, from which the unit of the heights is not "
-                "clear: give --unit, as in --unit um"
+                f"the header of {source} has {word[0]!r}, from which the unit of the heights is "
+                "not clear: give --unit, as in --unit um"
             )
     return None
 

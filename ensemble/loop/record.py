@@ -5,7 +5,6 @@ How files are written is in :mod:`adhesis.ensemble.outputs`.
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -21,54 +20,40 @@ from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.loading.zero_range import range_summary
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
-from adhesis.solver.model.jump import Jump
-from adhesis.solver.model.problem import Problem
-from adhesis.solver.values import finite
-
-_STATE_KEYS = ("branch", "penetration", "mean_stress", "contact_fraction", "patches", "energy")
-_MORE_STATE_KEYS = ("separation", "elastic_energy", "adhesion_energy", "load_step")
 
 
-def loop_document(result: LoopResult) -> dict[str, Any]:
-    """Return the JSON document of a loop; see the README for its keys and units.
+def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
+    """Return the JSON document of a loop or path; see the README for its keys and units.
 
-    The states are there twice: ``states`` is a list of objects, one per state, and each of its
-    keys is also a list of its own at the top level, for readers that want columns.
+    The states of a loop are there twice: ``states`` is a list of objects, one per state, and each
+    of its keys is also a list of its own at the top level, for readers that want columns.
     """
-    columns = {key: getattr(result, key).tolist() for key in _STATE_KEYS + _MORE_STATE_KEYS}
-    rows = zip(*columns.values(), strict=True)
-    details = asdict(result.method)
-    return {
-        **_scene(result.problem),
-        **_held(result),
-        "turning_point": result.turning_point,
-        "max_penetration": result.max_penetration,
-        "load_steps": result.load_steps,
-        "loss": result.loss,
-        **_relative(result.loss, result.problem),
-        "loss_dimensionless": result.loss_dimensionless,
-        "loss_from_drops": result.loss_from_drops,
-        "audit_residual": result.audit_residual,
-        "loss_error": result.loss_error,
-        "races": result.races,
-        **_ranges(result),
+    columns = {name: values.tolist() for name, values in result.columns().items()}
+    interior, details = result.interior, asdict(result.method)
+    del details["name"]
+    document = {
+        **result.numbers(),
+        "loss_over_work_of_adhesion": loss_over_work_of_adhesion(
+            result.loss, result.problem.work_of_adhesion
+        ),
+        **_displacement(result),
+        "interior_tension": None if interior is None else asdict(interior),
         "warnings": list(result.warnings),
-        "energy_at_stake": result.energy_at_stake,
-        "work_gained": result.work_gained,
-        "work_spent": result.work_spent,
-        "largest_contact_fraction": result.largest_contact_fraction,
-        "effective_work_of_approach": result.effective_work_of_approach,
-        "effective_work_of_separation": result.effective_work_of_separation,
-        "full_contact_energy": result.problem.full_contact_energy,
-        "pull_off_stress": result.pull_off_stress,
-        "pull_off_penetration": result.pull_off_penetration,
-        "seconds": result.seconds,
-        "method": details.pop("name"),
         "method_details": {key: _plain(value) for key, value in details.items()},
-        "jumps": _catalogue(result.problem, result.jumps),
-        "states": [dict(zip(columns, row, strict=True)) for row in rows],
+        "jumps": result.jump_rows(),
         **columns,
     }
+    if isinstance(result, PathResult):
+        return document | {
+            "turning_points": list(result.turning_points),
+            "out": result.ends_out,
+            "minor_loops": [
+                asdict(part) | {"audit_residual": part.audit_residual}
+                for part in result.minor_loops
+            ],
+        }
+    rows = zip(*columns.values(), strict=True)
+    return document | {"states": [dict(zip(columns, row, strict=True)) for row in rows]}
 
 
 def loops_document(results: Sequence[LoopResult], warnings: Sequence[str] = ()) -> dict[str, Any]:
@@ -85,99 +70,17 @@ def loops_document(results: Sequence[LoopResult], warnings: Sequence[str] = ()) 
 
 def path_document(result: PathResult, warnings: Sequence[str] = ()) -> dict[str, Any]:
     """Return the JSON document of a path; the keys are those of a loop where they mean the same."""
-    details = asdict(result.method)
-    columns = {
-        key: getattr(result, key).tolist() for key in (*_STATE_KEYS, *_MORE_STATE_KEYS, "leg")
-    }
-    return {
-        **_scene(result.problem),
-        **_held(result),
-        "turning_points": list(result.turning_points),
-        "out": result.ends_out,
-        "load_steps": result.load_steps,
-        "loss": result.work,
-        **_relative(result.work, result.problem),
-        "loss_dimensionless": result.work / result.problem.loss_scale,
-        "loss_from_drops": result.loss_from_drops,
-        "energy_change": result.energy_change,
-        "audit_residual": result.audit_residual,
-        "loss_error": result.loss_error,
-        **_ranges(result),
-        "warnings": [*warnings, *result.warnings],
-        "minor_loops": [
-            asdict(part) | {"audit_residual": part.audit_residual} for part in result.minor_loops
-        ],
-        "seconds": result.seconds,
-        "method": details.pop("name"),
-        "method_details": {key: _plain(value) for key, value in details.items()},
-        "jumps": [
-            jump | {"leg": int(leg)}
-            for jump, leg in zip(
-                _catalogue(result.problem, result.jumps), result.jump_leg, strict=True
-            )
-        ],
-        **columns,
-    }
+    document = loop_document(result)
+    return document | {"warnings": [*warnings, *document["warnings"]]}
 
 
-def _scene(problem: Problem) -> dict[str, Any]:
-    """Profile and material."""
-    profile = problem.profile
-    return {
-        "h_max": profile.h_max,
-        "h_rms": profile.h_rms,
-        "m0": profile.m0,
-        "m2": profile.m2,
-        "m4": profile.m4,
-        "period": profile.period,
-        "young": problem.half_space.young,
-        "poisson": problem.half_space.poisson,
-        "work_of_adhesion": problem.work_of_adhesion,
-    }
-
-
-def _relative(loss: float, problem: Problem) -> dict[str, Any]:
-    ratio = loss_over_work_of_adhesion(loss, problem.work_of_adhesion)
-    return {"loss_over_work_of_adhesion": ratio}
-
-
-def _ranges(result: LoopResult | PathResult) -> dict[str, Any]:
-    """Ranges of adhesion below which the zero-range limit holds; None where nothing bounds them."""
-    interior = result.interior
-    return {
-        "valid_range": finite(result.valid_range),
-        "edge_range": finite(result.edge_range),
-        "largest_interior_tension": result.largest_interior_tension,
-        "interior_tension": None if interior is None else asdict(interior),
-    }
-
-
-def _held(result: LoopResult | PathResult) -> dict[str, Any]:
-    """Stiffness in Pa/m (None: fixed separation) and, where there is one, the far side's path."""
-    control, profile = result.problem.control, result.problem.profile
+def _displacement(result: LoopResult | PathResult) -> dict[str, Any]:
+    """Path of the far side in h_max; none at fixed separation."""
+    control, h_max = result.problem.control, result.problem.profile.h_max
     if control.is_fixed:
-        return {"stiffness": None}
-    far = control.displacement(result.separation, result.mean_stress, profile.h_max)
-    return {"stiffness": control.stiffness, "displacement": (far / profile.h_max).tolist()}
-
-
-def _catalogue(problem: Problem, jumps: Sequence[Jump]) -> list[dict[str, Any]]:
-    return [
-        {
-            "branch": jump.branch,
-            "penetration": problem.penetration(jump.separation),
-            "energy_drop": jump.energy_drop,
-            "kind": jump.kind,
-            "patches_before": jump.patches_before,
-            "patches_after": jump.patches_after,
-            "contact_before": jump.contact_before,
-            "contact_after": jump.contact_after,
-            "patch_length": jump.patch_length,
-            "raced": jump.raced,
-            "at_stake": jump.at_stake,
-        }
-        for jump in jumps
-    ]
+        return {}
+    far = control.displacement(result.separation, result.mean_stress, h_max)
+    return {"displacement": (far / h_max).tolist()}
 
 
 def path_summary(result: PathResult) -> str:
@@ -336,17 +239,8 @@ class FieldStates:
         return self.method.follow(before, separation).states[-1]
 
 
-# ---------------------------------------------------------------------- files
-
-
-def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write ``document`` whole or not at all (OSError)."""
-    with whole_file(path) as stream:
-        stream.write((json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
-
-
 def write_npz(path: Path, arrays: dict[str, Any]) -> None:
-    """Write ``arrays`` as a compressed .npz, whole or not at all (OSError)."""
+    """Write arrays as a compressed .npz, whole or not at all (OSError)."""
     save: Callable[..., None] = np.savez_compressed
     with whole_file(path) as stream:
         save(stream, **arrays)

@@ -17,7 +17,7 @@ import xarray as xr
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import whole_file
-from adhesis.ensemble.quantities import UNITS
+from adhesis.ensemble.quantities import UNITS, with_units
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import MinorLoop, PathResult
@@ -34,7 +34,6 @@ _KINDS: dict[str, type[Result]] = {"loop": LoopResult, "path": PathResult}
 _KIND = "adhesis_result"
 _NOT_KEPT = {"problem", "method", "contact_states", "new_method"}
 _PARTS: dict[str, tuple[str, type]] = {"jumps": ("jump", Jump), "minor_loops": ("minor", MinorLoop)}
-_COLUMNS = ("penetration", "separation", "mean_stress", "contact_fraction", "patches")
 
 
 @dataclass(frozen=True)
@@ -59,23 +58,14 @@ class SavedReport(MethodReport):
 # ---------------------------------------------------------------------- tables
 
 
-def to_dataframe(result: Result, of: str) -> pd.DataFrame:
+def to_dataframe(result: Result, of: str) -> Any:
     """Return states or jumps as a table; see :meth:`adhesis.LoopResult.to_dataframe`."""
     checks.choice("of", of, ("states", "jumps"))
     if of == "jumps":
-        columns = _columns(Jump, result.jumps)
-        h_max = result.problem.profile.h_max
-        columns["penetration"] = 1.0 - np.asarray(columns["separation"], dtype=float) / h_max
-        if isinstance(result, PathResult):
-            columns["leg"] = result.jump_leg
-    else:
-        names = ("branch", "load_step", *_COLUMNS, "elastic_energy", "adhesion_energy", "energy")
-        columns = {name: getattr(result, name) for name in names}
-        if isinstance(result, PathResult):
-            columns |= {"potential": result.potential, "leg": result.leg}
-    table = pd.DataFrame(columns)
-    table.attrs["units"] = {name: UNITS.get(name, "") for name in columns}
-    return table
+        names = [*(entry.name for entry in fields(Jump)), "penetration"]
+        names += ["leg"] if isinstance(result, PathResult) else []
+        return with_units(pd.DataFrame(result.jump_rows(), columns=names))
+    return with_units(pd.DataFrame(result.columns()))
 
 
 def _columns(kind: type, parts: tuple[Any, ...]) -> dict[str, Any]:
@@ -107,12 +97,8 @@ def to_xarray(result: Result) -> xr.Dataset:
     for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
         name = f"coefficient_{name}"
         variables[name] = _variable("harmonic", name, np.array(values))
-    half_space = problem.half_space
+    about |= {name: value for name, value in result.numbers().items() if value is not None}
     about |= {
-        "period": problem.profile.period,
-        "young": half_space.young,
-        "poisson": half_space.poisson,
-        "work_of_adhesion": problem.work_of_adhesion,
         "stiffness": problem.control.stiffness,
         "method": json.dumps(asdict(result.method), default=lambda v: v.tolist()),
     }

@@ -5,19 +5,22 @@ The mechanics find this module by :data:`adhesis.solver.views.maker`. A call loa
 
 from __future__ import annotations
 
-import base64
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from html import escape
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adhesis.ensemble.quantities import in_works_of_adhesion
+from adhesis.ensemble.quantities import UNITS, in_works_of_adhesion, with_units
+from adhesis.ensemble.reporter import bar
+from adhesis.solver import checks
 from adhesis.solver.loading.loop import Progress
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
-from adhesis.solver.method import Branch, ContactState
+from adhesis.solver.method import Branch, ContactState, Method
+from adhesis.solver.values import brief
 
 if TYPE_CHECKING:
     from adhesis.ensemble.loop.film import Film
@@ -28,7 +31,7 @@ Result = LoopResult | PathResult
 
 def plot(result: Result) -> Any:
     """Draw mean stress and contact fraction; see :meth:`adhesis.LoopResult.plot`."""
-    from adhesis.ensemble.loop.figure import draw_loops
+    from adhesis.ensemble.loop.loop_figure import draw_loops
 
     return draw_loops(result if isinstance(result, PathResult) else [result])
 
@@ -38,14 +41,18 @@ def film(
     path: str | os.PathLike[str] | None,
     *,
     frames: int,
-    progress: Callable[[int, int], None] | None,
+    progress: Callable[[int, int], None] | bool | None,
 ) -> Film:
     """Make a film, and write it where a path is given; see :meth:`adhesis.LoopResult.film`."""
     from adhesis.ensemble.loop.film import check_film, film_of
 
     if path is not None:
         path = check_film("path", path)
-    made = film_of(result, frames=frames, progress=progress)
+    if isinstance(progress, bool):
+        with bar("frames") if progress else nullcontext() as shown:
+            made = film_of(result, frames=frames, progress=shown)
+    else:
+        made = film_of(result, frames=frames, progress=progress)
     if path is not None:
         made.save(path)
     return made
@@ -72,54 +79,114 @@ def save(result: Result, path: str | os.PathLike[str]) -> None:
     save(result, path)
 
 
-def page(result: Result) -> str:
-    """Return the main numbers and the figure of a result as HTML, for notebooks."""
+# ---------------------------------------------------------------------- in notebooks
+
+
+def page(shown: Any) -> str:
+    """Return the numbers of an object with their units, and its figure if it has one, as HTML."""
+    from adhesis.ensemble.loop.loop_figure import draw_shape
+    from adhesis.ensemble.report.html import table_of
+
+    if isinstance(shown, LoopResult | PathResult):
+        return table_of(_rows_of_result(shown)) + picture_of(plot(shown))
+    figure = draw_shape(shown)
+    return table_of(_rows(shown)) + ("" if figure is None else picture_of(figure))
+
+
+def trace_summary(answer: Answer) -> str:
+    """Return the summary of an answer as text."""
+    from adhesis.ensemble.trace.trace_page import summary
+
+    return summary(answer)
+
+
+def trace_page(answer: Answer) -> str:
+    """Return the summary of a trace's answer and the figure of its loop as HTML."""
+    from adhesis.ensemble.report.html import table_of
+    from adhesis.ensemble.trace.figures import draw_loop
+
+    rows = [line.split(maxsplit=1) for line in str(answer).splitlines()]
+    return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
+
+
+def write_trace_page(answer: Answer, folder: str | os.PathLike[str]) -> Path:
+    """Write page, figures and numbers of an answer; see its method ``page``."""
+    from adhesis.ensemble.trace.trace_page import write_all
+
+    return write_all(answer, checks.path("folder", folder))
+
+
+def table_of_runs(answer: Answer) -> Any:
+    """Return the loops of an answer as a table; see its method ``to_dataframe``."""
+    import pandas as pd
+
+    from adhesis.ensemble.trace.answer import run_rows
+
+    hidden = ("range_warnings", "failed")
+    rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
+    return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
+
+
+def _rows_of_result(result: Result) -> list[tuple[str, str]]:
+    """Return the main numbers of a loop or path."""
     problem = result.problem
-    name = "loss"
-    if isinstance(result, PathResult):
-        name, value = "work", result.work
-    else:
-        value = result.loss
+    is_loop = isinstance(result, LoopResult)
     rows = [
         (
-            name,
-            f"{value:.5g} ± {result.loss_error:.1g} J/m²"
-            f"{in_works_of_adhesion(value, problem.work_of_adhesion)}",
+            "loss" if is_loop else "work",
+            f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²"
+            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)}",
         ),
         ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
         ("jumps", str(len(result.jumps))),
         ("work of adhesion γ", f"{problem.work_of_adhesion:g} J/m²"),
         ("h_max", f"{problem.profile.h_max:.4g} m"),
-        ("largest contact fraction A/A0", f"{result.contact_fraction.max():.4g}"),
+        ("largest contact fraction A/A0", f"{result.largest_contact_fraction:.4g}"),
         ("method", result.method.name),
     ]
     if isinstance(result, LoopResult):
         rows.insert(3, ("pull-off stress", f"{result.pull_off_stress:.4g} Pa"))
-        rows += [("warning", text) for text in result.warnings]
-    return table_of(rows) + picture_of(plot(result))
+    return rows + [("warning", text) for text in result.warnings]
 
 
-def trace_page(answer: Answer) -> str:
-    """Return the summary of a trace's answer and the figure of its loop as HTML."""
-    from adhesis.ensemble.trace.figures import draw_loop
-    from adhesis.ensemble.trace.page import summary
+# By class: what the figure shows, and what is shown beside the fields.
+_DRAWN = {"Profile": ("coefficients",), "Trace": ("heights",)}
+_ALSO_SHOWN = {
+    "Profile": ("h_max", "h_rms", "m2"),
+    "HalfSpace": ("modulus",),
+    "ContactState": ("patches", "energy"),
+    "Trace": ("points", "length", "height_range", "drop_outs"),
+}
 
-    rows = [line.split(maxsplit=1) for line in summary(answer).splitlines()]
-    return table_of((name, text) for name, text in rows) + picture_of(draw_loop(answer))
 
+def _rows(shown: Any) -> list[tuple[str, str]]:
+    """Return the fields of an object with their units, without what is drawn, unknown or empty."""
+    from adhesis.ensemble.trace.prepare import Prepared
 
-def table_of(rows: Iterable[tuple[str, str]]) -> str:
-    """Return rows of a name and a value as a table in HTML."""
-    cells = (f"<th>{escape(name)}</th><td>{escape(text)}</td>" for name, text in rows)
-    return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+    if isinstance(shown, Prepared):
+        steps = ((step.name, step.description) for step in shown.steps)
+        return [("trace", repr(shown.trace)), *steps, *(("warning", w) for w in shown.warnings)]
+    names = [entry.name for entry in fields(shown) if entry.repr] if is_dataclass(shown) else []
+    if isinstance(shown, Method):
+        names = ["name", "problem", "chosen"]
+    names += _ALSO_SHOWN.get(type(shown).__name__, ())
+    values = {name: getattr(shown, name) for name in names}
+    drawn = _DRAWN.get(type(shown).__name__, ())
+    texts = {
+        name: value if isinstance(value, str) else brief(value)
+        for name, value in values.items()
+        if not (value is None or (isinstance(value, tuple) and not value) or name in drawn)
+    }
+    return [(name, f"{text} {UNITS.get(name, '')}".rstrip()) for name, text in texts.items()]
 
 
 def picture_of(figure: Any) -> str:
     """Return a figure as a picture in HTML."""
+    from adhesis.ensemble.report.html import picture
+
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=110)
-    data = base64.b64encode(stream.getvalue()).decode()
-    return f'<img alt="loop" src="data:image/png;base64,{data}">'
+    return picture(stream.getvalue(), "figure")
 
 
 @contextmanager
@@ -128,23 +195,13 @@ def progress_bar(top: float) -> Iterator[Progress]:
 
     It is full at the turning point ``top``; unloading has no end that is known ahead.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("loading", total=1.0)
+    with bar("loading") as shown:
 
         def show(branch: Branch, drive: float, state: ContactState) -> None:
-            loading = branch == "loading"
-            done = drive / top if loading else None
-            over = not loading and not state.patches
             text = f"{branch:<9} {drive:+.3f} of {top:g}, {state.patches} patches"
-            bar.update(
-                task,
-                description=text,
-                completed=1.0 if over else done,
-                total=1.0 if loading or over else None,
-            )
+            if branch == "loading":
+                shown(drive / top, 1.0, text)
+            else:
+                shown(None if state.patches else 1.0, None if state.patches else 1.0, text)
 
         yield show

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.curves import QUANTILES
+from adhesis.ensemble.aggregate.mean_curves import QUANTILES
 from adhesis.ensemble.report.tables.key import key
 from adhesis.solver.method import BRANCHES
 

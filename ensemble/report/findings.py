@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
-from adhesis.ensemble.aggregate.fields import fitted_slope
+from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.precision import as_percent
 from adhesis.ensemble.report import paper

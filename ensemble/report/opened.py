@@ -6,9 +6,10 @@ run may go on writing to it.
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Iterable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,7 +20,9 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate, aggregate
 from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.quantities import with_units
 from adhesis.ensemble.report.curves_dataset import curves_dataset
+from adhesis.ensemble.report.html import picture, table_of
 from adhesis.ensemble.report.plots import Plots
 from adhesis.ensemble.report.tables import loss_tables, mechanisms
 from adhesis.ensemble.report.tables.table import Table
@@ -91,7 +94,7 @@ class CampaignResults:
         self._counts = {name: int(np.sum(status == state)) for name, state in states.items()}
         if DAMAGED in status:
             self._counts["damaged"] = int(np.sum(status == DAMAGED))
-        self.plot = Plots(lambda: self.averages)
+        self.plot = Plots(partial(getattr, self, "averages"))  # which can be pickled
 
     def __enter__(self) -> Self:
         return self
@@ -104,6 +107,19 @@ class CampaignResults:
     def __repr__(self) -> str:
         counts = ", ".join(f"{number} {name}" for name, number in self._counts.items())
         return f"<CampaignResults {self.path}: {counts}>"
+
+    def _repr_html_(self) -> str:
+        """Return counts, mean losses and their figure, for notebooks."""
+        rows = [("file", str(self.path)), *((k, str(n)) for k, n in self._counts.items())]
+        page = table_of([*rows, ("axes", ", ".join(self.axes))])
+        if not self._counts["done"]:
+            return page
+        figure: Any = self.plot.loss_against_adhesion()[0].figure
+        stream = io.BytesIO()
+        figure.savefig(stream, format="png", dpi=110)
+        names = [f"loss_dimensionless_{part}" for part in ("mean", "ci_low", "ci_high")]
+        table: str = self.losses[names].to_html(float_format="{:.4g}".format)
+        return page + table + picture(stream.getvalue(), "losses")
 
     @cached_property
     def averages(self) -> Aggregate:
@@ -186,7 +202,7 @@ class CampaignResults:
                 out[d.name.removeprefix("jump_")] = results.column(d.name, rows)[used]
         out["branch"] = np.array(BRANCHES)[out["branch"]]
         out["kind"] = np.array(JUMP_KINDS)[out["kind"]]
-        return pd.DataFrame(out)
+        return with_units(pd.DataFrame(out))
 
     # ------------------------------------------------------------------ inside
 
@@ -248,4 +264,8 @@ def _frame(table: Table, index: Sequence[str]) -> pd.DataFrame:
     plain = {column.name: column.name.partition(" [")[0] for column in table.columns}
     names = [plain[name] if plain[name] in index else name for name in plain]
     frame = pd.DataFrame([list(row) for row in table.rows], columns=names)
-    return frame.set_index(list(index)) if index else frame
+    frame = frame.set_index(list(index)) if index else frame
+    bracketed = (column.name.partition(" [")[2].rstrip("]") for column in table.columns)
+    units = (unit.replace("^2", "²") for unit in bracketed)
+    frame.attrs["units"] = dict(zip(names, units, strict=True))
+    return frame

@@ -22,6 +22,10 @@ class Plots:
     def __init__(self, averages: Callable[[], Aggregate]) -> None:
         self._averages = averages
 
+    def __repr__(self) -> str:
+        names = (name for name in vars(type(self)) if not name.startswith("_"))
+        return f"<Plots: {', '.join(names)}>"
+
     def _draw(self, name: str) -> list[Axes]:
         from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
         from adhesis.ensemble.report.figures.style import say_below, style

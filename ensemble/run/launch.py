@@ -17,7 +17,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -139,7 +139,11 @@ def hand_over(code: int, sentence: str = "") -> bool:
 
 
 def run_ranks(
-    launcher: str, ranks: int, words: Sequence[str], program: Sequence[str] | None = None
+    launcher: str,
+    ranks: int,
+    words: Sequence[str],
+    program: Sequence[str] | None = None,
+    output: Callable[[str], None] | None = None,
 ) -> tuple[int, str]:
     """Start ranks with a command of adhesis and wait for their end.
 
@@ -158,6 +162,8 @@ def run_ranks(
         Arguments of ``adhesis``.
     program : sequence of str, optional
         Program that a rank runs instead of adhesis, with these arguments.
+    output : callable, optional
+        Takes each line that the ranks print; without it they print where this process does.
     """
     # With -m mpi4py, an error that a rank does not handle ends the others, too.
     program = program or python("-m", "mpi4py", "-m", "adhesis")
@@ -168,11 +174,18 @@ def run_ranks(
         [launcher, "-n", str(ranks), *program, *words],
         env=env,
         stdin=subprocess.DEVNULL,
+        stdout=None if output is None else subprocess.PIPE,
+        stderr=None if output is None else subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
         process_group=0,  # else Ctrl-C reaches mpirun, which ends its ranks without a stop in order
         preexec_fn=end_with_parent,  # else ranks would continue and keep the results file locked
     )
     with _signals_passed_to(process), open(handle, encoding="utf-8") as stream:
         try:
+            if process.stdout is not None and output is not None:
+                for line in process.stdout:
+                    output(line.rstrip("\n"))
             code = process.wait()
         finally:
             os.unlink(handed_over)
@@ -181,7 +194,7 @@ def run_ranks(
 
 
 @contextmanager
-def _signals_passed_to(process: subprocess.Popen[bytes]) -> Iterator[None]:
+def _signals_passed_to(process: subprocess.Popen[str]) -> Iterator[None]:
     """Turn signals to this process into stops of the ranks, by SIGUSR1, which mpirun passes on."""
     interrupted = False
 

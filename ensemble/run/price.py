@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,7 @@ class CellPrice:
     measured: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Price:
     """What a campaign costs.
 
@@ -97,6 +98,13 @@ class Price:
     def __str__(self) -> str:
         """Return the lines of ``adhesis run --dry-run``."""
         return as_text(self)
+
+    def __repr__(self) -> str:
+        return f"<Price: {self.left} of {self.tasks} tasks to do, {duration(self.seconds)} of CPU>"
+
+    def _repr_html_(self) -> str:
+        """Return the same lines, for notebooks."""
+        return f"<pre>{escape(str(self))}</pre>"
 
     @property
     def left(self) -> int:

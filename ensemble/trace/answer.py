@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.trace.plan import Cycle, Plan, default_tables, make_plan
+from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.pool import Pool, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.ensemble.trace.variants import Cycle, Plan, default_tables, make_plan
 from adhesis.solver import views
 from adhesis.solver.checks import (
     ACCURACY,
@@ -47,7 +50,7 @@ _LEAST = 0.02
 
 _NOT_CONVERGED = 0.10
 _PROCESSES = Bounds(0, 4096, whole=True)
-_DOUBTS = {
+DOUBTS = {
     "cut-off": "the shortest wave kept",
     "continuation": "how the period is closed",
     "form": "what is form and what roughness",
@@ -120,9 +123,47 @@ class Answer(ByValue):
             f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
         )
 
+    def __str__(self) -> str:
+        """Summarise the answer for a terminal: loss, pull-off, contact, doubts, warnings."""
+        return str(views.maker().trace_summary(self))
+
     def _repr_html_(self) -> str:
         """Return the main numbers and the figure of the loop, for notebooks."""
         return str(views.maker().trace_page(self))
+
+    def page(self, folder: str | os.PathLike[str]) -> Path:
+        """Write what ``adhesis trace --to`` writes: the page, its figures, and every number.
+
+        Parameters
+        ----------
+        folder : path
+            For ``trace.html`` (which needs no other file), ``trace.md``, ``trace.json`` and the
+            figures; it is made if it is not there.
+
+        Returns
+        -------
+        path
+            That of ``trace.html``.
+
+        Raises
+        ------
+        OSError
+            If a file cannot be written.
+        TypeError
+            If ``folder`` is no path.
+        """
+        return Path(views.maker().write_trace_page(self, folder))
+
+    def to_dataframe(self) -> Any:
+        """Return the numbers of every loop, that of the answer and the others.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each loop; ``group`` is the doubt or the table that it belongs to.
+            ``attrs["units"]`` holds the unit of every column.
+        """
+        return views.maker().table_of_runs(self)
 
     def result(self, name: str) -> Result | None:
         """Numbers of a loop, or None if it failed or was not run."""
@@ -163,7 +204,7 @@ class Answer(ByValue):
         for run in self.plan.runs:
             found = self.result(run.name)
             if run.group == name and found is not None:
-                rows.append((run.name, run.said, found))
+                rows.append((run.name, run.description, found))
         return rows
 
     def change(self, name: str, quantity: str = "loss") -> float | None:
@@ -253,10 +294,15 @@ def loss_of_trace(
     plan = make_plan(prepared, cycle, quick=quick, processes=processes)
     if not flag("progress", progress):
         return run_plan(prepared, cycle, plan, watch)
-    from adhesis.ensemble.trace.progress_bar import bar_of
+    with bar("loops") as shown:
 
-    with bar_of(len(plan.runs), watch) as shown:
-        return run_plan(prepared, cycle, plan, shown)
+        def both(pool: Pool) -> None:
+            done, runs = len(pool.done), len(plan.runs)
+            shown(done, runs, f"{done}/{runs} loops")
+            if watch is not None:
+                watch(pool)
+
+        return run_plan(prepared, cycle, plan, both)
 
 
 def _turns(
@@ -307,7 +353,7 @@ def make_cycle(
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
     """Refuse a prepared trace that the solver would refuse, before any work."""
-    instance("prepared", prepared, Prepared, "prepare_trace(read_trace(path))")
+    instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
         Problem(profile, cycle.half_space, gamma)
@@ -347,7 +393,7 @@ def _several(name: str, value: Several) -> Sequence[float]:
 def _quantity(answer: Answer, name: str) -> Quantity:
     value = float(answer.main[name])
     doubts = {}
-    for doubt in _DOUBTS:
+    for doubt in DOUBTS:
         changes = []
         for run in answer.plan.runs:
             if run.group != doubt or not _counts(run.name):
@@ -400,14 +446,13 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     return found
 
 
-def document(answer: Answer) -> dict[str, Any]:
-    """Return every number of the answer as one JSON document, in SI units."""
-    prepared, trace, cycle, plan = answer.prepared, answer.prepared.trace, answer.cycle, answer.plan
-    spectrum = prepared.spectrum
+def run_rows(answer: Answer) -> list[dict[str, Any]]:
+    """Return the numbers of every loop of the plan, or why it failed."""
+    plan = answer.plan
     runs = []
     for run in plan.runs:
         found = answer.results.get(run.name)
-        row: dict[str, Any] = {"name": run.name, "group": run.group, "said": run.said}
+        row: dict[str, Any] = {"name": run.name, "group": run.group, "said": run.description}
         row["reference"] = run.reference
         row["expected_seconds"] = plan.seconds[run.name]
         if isinstance(found, dict):
@@ -416,10 +461,17 @@ def document(answer: Answer) -> dict[str, Any]:
         else:
             row["failed"] = found
         runs.append(row)
+    return runs
+
+
+def document(answer: Answer) -> dict[str, Any]:
+    """Return every number of the answer as one JSON document, in SI units."""
+    prepared, trace, cycle, plan = answer.prepared, answer.prepared.trace, answer.cycle, answer.plan
+    spectrum = prepared.spectrum
     return {
-        "file": str(trace.path),
+        "file": trace.source,
         "read": {
-            "said": list(trace.said),
+            "said": list(trace.notes),
             "points": trace.points,
             "step": trace.step,
             "length": trace.length,
@@ -428,7 +480,7 @@ def document(answer: Answer) -> dict[str, Any]:
             "tip_radius": trace.tip_radius,
         },
         "preparation": [
-            {"name": step.name, "said": step.said, **step.numbers} for step in prepared.steps
+            {"name": step.name, "said": step.description, **step.numbers} for step in prepared.steps
         ],
         "cut_off": prepared.cut_off,
         "cut_off_limits": prepared.limits,
@@ -453,7 +505,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "valid_range": answer.valid_range,
         "largest_interior_tension": answer.largest_interior_tension,
         "loop": dict(answer.main),
-        "runs": runs,
+        "runs": run_rows(answer),
         "plan": {
             "waves": plan.waves,
             "patches": plan.patches,

@@ -21,7 +21,7 @@ from adhesis.ensemble.report.figures.style import (
     style,
 )
 from adhesis.ensemble.trace.answer import Answer
-from adhesis.ensemble.trace.plan import Cycle
+from adhesis.ensemble.trace.variants import Cycle
 from adhesis.solver.model.measured_profile import trace_spectrum
 from adhesis.solver.model.profile import Array
 

@@ -7,11 +7,9 @@ from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.escape import printable
-from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.read import Trace, read_trace
-from adhesis.ensemble.trace.text import DELIMITERS
-from adhesis.solver.checks import counted
+from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.ensemble.trace.reading.text_table import DELIMITERS
 
 _NAMES = (
     *("unit", "step", "columns", "delimiter", "decimal", "row", "channel", "degree", "cut_off"),
@@ -68,12 +66,10 @@ def what_was_read(prepared: Prepared) -> str:
     """Describe reading and preparation, line by line, for the terminal."""
     trace = prepared.trace
     lines = [
-        f"read        {trace.path}: {trace.points} points, step {length_text(trace.step, 5)}, "
-        f"length {length_text(trace.length, 5)}, range {length_text(trace.height_range, 4)}, "
-        f"{counted(trace.drop_outs, 'drop-out')}"
+        f"read        {trace.source}: {trace.summary}",
+        *(f"            {note}" for note in trace.notes),
+        *(f"{step.name:<11} {step.description}" for step in prepared.steps),
     ]
-    lines += [f"            {said}" for said in trace.said]
-    lines += [f"{step.name:<11} {step.said}" for step in prepared.steps]
     return printable("\n".join(lines))
 
 

@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.lengths import length_text
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
 from adhesis.solver.model.measured_profile import (
     Continuation,
@@ -50,7 +50,7 @@ class Step:
     """One step of the preparation, described in words and in numbers (SI)."""
 
     name: str
-    said: str
+    description: str
     numbers: dict[str, float] = field(default_factory=dict)
 
 
@@ -92,7 +92,7 @@ class Prepared(ByValue):
     def __repr__(self) -> str:
         """Return one line: the file, its number of points, and the decisions."""
         return (
-            f"Prepared({str(self.trace.path)!r}, {self.filled.size} points, degree={self.degree}, "
+            f"Prepared({self.trace.source!r}, {self.filled.size} points, degree={self.degree}, "
             f"cut_off={length_text(self.cut_off)}, {counted(len(self.warnings), 'warning')})"
         )
 
@@ -167,7 +167,7 @@ def prepare_trace(
     ----------
     docs/measured-profile.md, "Preparation"
     """
-    instance("trace", trace, Trace, "read_trace(path)")
+    instance("trace", trace, Trace, "read_trace(source)")
     flag(parameter("keep_outliers"), keep_outliers)
     flag(parameter("invert"), invert)
     with refused_as_input():
@@ -191,7 +191,7 @@ def prepare_trace(
     rms = float(np.sqrt(np.mean(level**2)))
     steps[-1].numbers["rms_level"] = rms
     if rms <= 1e-12 * float(np.ptp(filled)):
-        raise InputError(f"{trace.path} is flat when level: nothing is left but rounding")
+        raise InputError(f"{trace.source} is flat when level: nothing is left but rounding")
     spectrum = trace_spectrum(level, trace.step)
     radius = trace.tip_radius if tip_radius is None else tip_radius
     limits = trusted_wavelength(spectrum, trace.step, radius or 0.0)
@@ -223,7 +223,7 @@ def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
     """Cut missing heights off both ends, where interpolation is impossible."""
     good = np.flatnonzero(np.isfinite(heights))
     if good.size < 2:
-        raise InputError(f"{trace.path} has {counted(good.size, 'height')}: a trace needs more")
+        raise InputError(f"{trace.source} has {counted(good.size, 'height')}: a trace needs more")
     first, last = int(good[0]), int(good[-1]) + 1
     lost = heights.size - (last - first)
     if lost:
@@ -290,14 +290,14 @@ def _filled(
     if longest_here > allowed * (1 + 1e-9):
         at = int(starts[np.argmax(ends - starts)]) * trace.step
         raise InputError(
-            f"{trace.path} has a gap of {length_text(longest_here)} at {length_text(at)}: "
+            f"{trace.source} has a gap of {length_text(longest_here)} at {length_text(at)}: "
             f"up to {length_text(allowed)} "
             f"is interpolated ({parameter('longest_gap')} allows more)"
         )
     share = float(gaps.mean())
     if share > _MAX_MISSING:
         raise InputError(
-            f"{trace.path} lacks {100 * share:.1f} % of its heights: up to "
+            f"{trace.source} lacks {100 * share:.1f} % of its heights: up to "
             f"{100 * _MAX_MISSING:.0f} % may lack"
         )
     index = np.arange(heights.size)
@@ -414,13 +414,13 @@ def _cut_off(
         why = reasons[by]
         if shortest > length / 4 and by != "noise":
             raise InputError(
-                f"{trace.path} is {length_text(length)} long, and waves can be trusted from "
+                f"{trace.source} is {length_text(length)} long, and waves can be trusted from "
                 f"{length_text(shortest)} on ({why}): give {parameter('cut_off')} to go on all the "
                 "same"
             )
         if shortest > length / 4 or rms < _MIN_TO_NOISE * spectrum.noise:
             raise InputError(
-                f"{trace.path} holds no roughness above its noise: of {length_text(rms)} rms "
+                f"{trace.source} holds no roughness above its noise: of {length_text(rms)} rms "
                 f"{length_text(spectrum.noise)} are noise, waves can be trusted from "
                 f"{length_text(shortest)} on, and it is {length_text(length)} long "
                 f"(give {parameter('cut_off')} to go on)"

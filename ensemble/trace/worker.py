@@ -84,7 +84,6 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     from adhesis.solver.model.problem import Problem
     from adhesis.solver.model.profile import Profile
     from adhesis.solver.registry import make_method
-    from adhesis.solver.values import finite
 
     last = time.monotonic()
 
@@ -102,47 +101,18 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     turn: Any = {name: job.turning_point}
     loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
-    return {
-        "loss": loop.loss,
+    return loop.numbers() | {
         "loss_over_work_of_adhesion": loss_over_work_of_adhesion(loop.loss, job.work_of_adhesion),
-        "loss_dimensionless": loop.loss_dimensionless,
-        "loss_from_drops": loop.loss_from_drops,
-        "audit_residual": loop.audit_residual,
-        "loss_error": _number(loop, "loss_error"),
-        "races": _number(loop, "races"),
-        "valid_range": finite(loop.valid_range),
-        "edge_range": finite(loop.edge_range),
-        "largest_interior_tension": loop.largest_interior_tension,
         "range_warnings": range_warnings(
             problem, loop.valid_range, loop.loss, loop.contact_fraction
         ),
-        "energy_at_stake": _number(loop, "energy_at_stake"),
-        "pull_off_stress": loop.pull_off_stress,
-        "pull_off_penetration": loop.pull_off_penetration,
-        "contact_fraction": float(loop.contact_fraction.max()),
+        "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),
         "small_scale_share": small / loop.loss_from_drops if loop.loss_from_drops > 0 else 0.0,
-        "h_max": profile.h_max,
-        "h_rms": profile.h_rms,
-        "m2": profile.m2,
         "waves": profile.highest_harmonic,
-        "period": profile.period,
-        "seconds": loop.seconds,
-        "states": {
-            "branch": loop.branch.tolist(),
-            "penetration": loop.penetration.tolist(),
-            "mean_stress": loop.mean_stress.tolist(),
-            "contact_fraction": loop.contact_fraction.tolist(),
-            "patches": loop.patches.tolist(),
-        },
+        "states": {name: values.tolist() for name, values in loop.columns().items()},
     }
-
-
-def _number(loop: Any, name: str) -> float | None:
-    """Return an estimate of error of a loop, None if its method has none."""
-    value = getattr(loop, name, None)
-    return None if value is None else float(value)
 
 
 if __name__ == "__main__":

@@ -8,31 +8,20 @@ of the energy drops at the jumps are the same energy. They are computed independ
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from time import process_time
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import choice, counted, reals
+from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.loading.zero_range import (
-    InteriorTension,
-    edge_range,
-    interior_tension,
-    narrowest_length,
-    range_summary,
-    range_warnings,
-    valid_range,
-)
-from adhesis.solver.method import ContactState, Method, MethodReport
+from adhesis.solver.loading.zero_range import range_summary, range_warnings
+from adhesis.solver.method import Method
 from adhesis.solver.model.control import Control
-from adhesis.solver.model.jump import BRANCHES, Branch, Jump
+from adhesis.solver.model.jump import BRANCHES, Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.values import ByValue
-from adhesis.solver.views import Viewed
 
 STEEP = 0.3
 """Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
@@ -42,96 +31,46 @@ STEEP = 0.3
 _LARGE = 0.02
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class LoopResult(ByValue, Viewed):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class LoopResult(EquilibriumPath):
     """A complete loop; arrays have the shape (states,), in the order of the path.
 
-    Immutable; two loops are equal if all fields except ``seconds``, ``method``, ``contact_states``
-    and ``new_method`` are: one method gives equal loops each time for the same problem.
+    Its states and jumps are the attributes of :class:`EquilibriumPath`: ``branch``,
+    ``penetration``, ``separation``, ``mean_stress``, ``contact_fraction``, ``patches``, ``jumps``,
+    ``contact_states`` …
 
     Attributes
     ----------
-    problem : Problem
     turning_point : float
         As prescribed: Δ/h_max, u_tot/h_max if the control is a stiffness, p̄ in Pa under a load.
     max_penetration : float
         Δ/h_max at the turning point: prescribed, or computed if the control does not fix it.
-    load_steps : int
-        Equal steps of the loading branch.
-    branch : array of str, shape (states,)
-        "loading" or "unloading".
-    load_step : bool array
-        True at the states on the uniform axis of load steps, False at those that the method added
-        in between (before and after jumps, and where the curve bends).
-    penetration : array
-        Δ/h_max.
-    separation : array
-        s in m.
-    mean_stress : array
-        p̄ in Pa, compression positive.
-    contact_fraction : array
-        A/A0.
-    patches : int array
-    elastic_energy, adhesion_energy : array
-        In J/m, per period.
-    jumps : tuple of Jump
     loss : float
         ∮ p̄ dΔ in J/m² of nominal area, over all states
         (:func:`adhesis.solver.loading.path_record.integral`).
     loss_dimensionless : float
         W~ = ∮ σ~ dΔ~ with Δ~ = Δ/h_max and σ~ = 2p̄/(E* q0 h_max).
-    loss_from_drops : float
-        Sum of the energy drops at the jumps, in J/m².
-    loss_error : float
-        Estimated numerical error of the loss, in J/m² (docs/methods.md, "Error of the loss").
     work_gained, work_spent : float
         Work that is gained on loading and spent on unloading, in J/m² of nominal area: ∓∫ p̄ du_tot
         along the branch. Their difference is the loss.
-    seconds : float
-        CPU time of this process, in s.
-    method : MethodReport
-        Name, resolution and counters of the method.
-    contact_states : tuple of ContactState
-        The states themselves, with the edges of every patch; empty for a loop from a file.
-    new_method : callable or None
-        Builds the method anew, whose ``fields`` and ``openings`` take these states.
-    interior : InteriorTension or None
-        Largest local maximum of tension inside patches, and where it occurred; None if no patch
-        has one (docs/zero-range.md).
-    narrowest_length : float
-        Shortest length in m that decides where edges stand (``zero_range``).
 
     References
     ----------
     docs/theory.md, "3. The loop"
     """
 
-    problem: Problem = field(repr=False)
     turning_point: float
     max_penetration: float
-    load_steps: int
-    branch: NDArray[np.str_]
-    load_step: NDArray[np.bool_]
-    penetration: Array
-    separation: Array
-    mean_stress: Array
-    contact_fraction: Array
-    patches: NDArray[np.int64]
-    elastic_energy: Array
-    adhesion_energy: Array
-    jumps: tuple[Jump, ...]
     loss: float
     loss_dimensionless: float
-    loss_from_drops: float
-    loss_error: float
     work_gained: float
     work_spent: float
-    seconds: float = field(compare=False)
-    method: MethodReport = field(compare=False)
-    contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
-    new_method: Callable[[], Method] | None = field(default=None, compare=False)
-    interior: InteriorTension | None = None
-    narrowest_length: float = float("nan")
+
+    _numbers = (
+        *("turning_point", "max_penetration", "loss", "loss_dimensionless", "work_gained"),
+        *("work_spent", "effective_work_of_approach", "effective_work_of_separation"),
+        *("pull_off_stress", "pull_off_penetration"),
+    )
 
     def __repr__(self) -> str:
         """Return two lines with the loop and its loss, and the number of warnings."""
@@ -142,11 +81,6 @@ class LoopResult(ByValue, Viewed):
             f"valid_range={self.valid_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
             f"{counted(len(self.warnings), 'warning')})"
         )
-
-    @property
-    def energy(self) -> Array:
-        """U in J/m, per period, shape (states,)."""
-        return self.elastic_energy + self.adhesion_energy
 
     @property
     def audit_residual(self) -> float:
@@ -186,34 +120,6 @@ class LoopResult(ByValue, Viewed):
         return tuple(found)
 
     @property
-    def largest_interior_tension(self) -> float:
-        """Largest local maximum of tension inside patches, in Pa; 0 if there is none."""
-        return self.interior.tension if self.interior is not None else 0.0
-
-    @property
-    def valid_range(self) -> float:
-        """Range of adhesion in m below which the zero-range limit holds, γ/σ_in.
-
-        Infinite if no patch is in tension inside (docs/zero-range.md).
-        """
-        return valid_range(self.problem, self.interior)
-
-    @property
-    def edge_range(self) -> float:
-        """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
-        return edge_range(self.problem, self.narrowest_length)
-
-    @property
-    def races(self) -> int:
-        """Number of jumps whose end state depends on the assumed edge kinetics."""
-        return sum(jump.raced for jump in self.jumps)
-
-    @property
-    def energy_at_stake(self) -> float:
-        """Sum over the jumps of the energy that depends on the assumed kinetics, in J/m²."""
-        return float(sum(jump.at_stake for jump in self.jumps))
-
-    @property
     def pull_off_penetration(self) -> float:
         """Δ/h_max of the state that has lost all contact."""
         return float(self.penetration[-1])
@@ -222,11 +128,6 @@ class LoopResult(ByValue, Viewed):
     def pull_off_stress(self) -> float:
         """Largest mean tension on unloading, -min p̄, in Pa."""
         return float(0.0 - self.mean_stress[self.branch == "unloading"].min())
-
-    @property
-    def largest_contact_fraction(self) -> float:
-        """Largest A/A0 on the loop."""
-        return float(self.contact_fraction.max())
 
     @property
     def effective_work_of_approach(self) -> float:
@@ -354,43 +255,23 @@ def result_of(
 ) -> LoopResult:
     """Make the result from the record of a loop; ``started`` is its first CPU time, in s."""
     problem = method.problem
-    separation = record.column("separation")
+    fields = path_fields(method, record, started)
     loss = record.work(problem)
     turn = record.branches.index("unloading")  # the turning point's state stands in both branches
     gained = -record.slice(0, turn).work(problem)
     max_penetration = turning_point
     if not problem.control.is_fixed:
-        max_penetration = problem.penetration(separation[turn])
-    drops = float(sum(jump.energy_drop for jump in record.jumps))
-    report = method.report()  # of the path alone
-    interior = interior_tension(method, record)
+        max_penetration = float(fields["penetration"][turn])
     return LoopResult(
-        problem=problem,
         turning_point=turning_point,
         max_penetration=max_penetration,
         load_steps=load_steps,
-        branch=np.array(record.branches),
-        load_step=np.array(record.on_axis),
-        penetration=problem.penetration(separation),
-        separation=separation,
-        mean_stress=record.column("mean_stress"),
-        contact_fraction=record.column("contact_fraction"),
-        patches=record.column("patches").astype(np.int64),
-        elastic_energy=record.column("elastic_energy"),
-        adhesion_energy=record.column("adhesion_energy"),
-        jumps=tuple(record.jumps),
         loss=loss,
         loss_dimensionless=loss / problem.loss_scale,
-        loss_from_drops=drops,
-        loss_error=estimated_error(record, loss - drops, problem),
+        loss_error=estimated_error(record, loss - fields["loss_from_drops"], problem),
         work_gained=gained,
         work_spent=loss + gained,
-        seconds=process_time() - started,
-        method=report,
-        contact_states=tuple(record.states),
-        new_method=method.recipe,
-        interior=interior,
-        narrowest_length=narrowest_length(problem, record),
+        **fields,
     )
 
 

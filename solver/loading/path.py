@@ -14,37 +14,31 @@ with ΔW the change of the potential from its start to its end (:mod:`adhesis.so
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from time import process_time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
+from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
 from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
 from adhesis.solver.loading.loop_result import estimated_error
 from adhesis.solver.loading.path_record import Axis, Record
-from adhesis.solver.loading.zero_range import (
-    InteriorTension,
-    edge_range,
-    interior_tension,
-    narrowest_length,
-    range_warnings,
-    valid_range,
-)
-from adhesis.solver.method import ContactState, Method, MethodReport, PathError
-from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.loading.zero_range import range_warnings
+from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.values import ByValue
-from adhesis.solver.views import Viewed
+from adhesis.solver.views import Shown
 
 _SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # least change of stress or contact, relative to its range on the loop, that counts
 
 
 @dataclass(frozen=True)
-class MinorLoop:
+class MinorLoop(Shown):
     """Part of a path that leaves a turning point and comes back to it.
 
     Attributes
@@ -89,90 +83,47 @@ class MinorLoop:
         return self.loss - self.energy_change - self.loss_from_drops
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PathResult(ByValue, Viewed):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class PathResult(EquilibriumPath):
     """A path of several legs; arrays have the shape (states,), in the order of the path.
 
-    Immutable; two paths are equal if all fields except ``seconds``, ``method``, ``contact_states``
-    and ``new_method`` are.
+    Its states and jumps are the attributes of :class:`EquilibriumPath`: ``branch``,
+    ``penetration``, ``separation``, ``mean_stress``, ``contact_fraction``, ``patches``, ``jumps``,
+    ``contact_states`` …
 
     Attributes
     ----------
-    problem : Problem
     turning_points : tuple of float
         Ends of the legs: Δ/h_max, u_tot/h_max if the control is a stiffness, p̄ in Pa under a load.
         A path that ends out of contact has one more leg.
-    load_steps : int
-        Equal steps up to the largest turning point.
     leg : int array
         Number of the leg, from 0.
-    branch : array of str
-        "loading" or "unloading".
-    load_step : bool array
-        True at load steps and at turning points.
-    penetration, separation, mean_stress, contact_fraction : array
-        Δ/h_max, s in m, p̄ in Pa, A/A0.
-    patches : int array
-    elastic_energy, adhesion_energy, potential : array
-        In J/m, per period; the potential is W of :mod:`adhesis.solver.model.control`.
-    jumps : tuple of Jump
+    potential : array
+        W of :mod:`adhesis.solver.model.control`, in J/m per period.
     jump_leg : int array, shape (jumps,)
     minor_loops : tuple of MinorLoop
         In the order in which they end.
     work : float
         -∫ Y dx over the whole path, in J/m² of nominal area: the loss if it ends out of contact.
-    loss_from_drops : float
-        Sum of all energy drops, in J/m².
     energy_change : float
         (W at the end - W at the start) per nominal area, in J/m²; 0 for a path that ends out of
         contact.
-    loss_error : float
-        Estimated numerical error of the work, in J/m².
-    seconds : float
-        CPU time of this process, in s.
-    method : MethodReport
-    contact_states : tuple of ContactState
-        The states themselves, with the edges of every patch; empty for a path from a file.
-    new_method : callable or None
-        Builds the method anew, whose ``fields`` and ``openings`` take these states.
-    interior : InteriorTension or None
-        Largest local maximum of tension inside patches, and where it occurred; None if no patch
-        has one (docs/zero-range.md).
-    narrowest_length : float
-        Shortest length in m that decides where edges stand (``zero_range``).
 
     References
     ----------
     docs/theory.md, "8. Paths and controls"
     """
 
-    problem: Problem = field(repr=False)
     turning_points: tuple[float, ...]
-    load_steps: int
     leg: NDArray[np.int64]
-    branch: NDArray[np.str_]
-    load_step: NDArray[np.bool_]
-    penetration: Array
-    separation: Array
-    mean_stress: Array
-    contact_fraction: Array
-    patches: NDArray[np.int64]
-    elastic_energy: Array
-    adhesion_energy: Array
     potential: Array
-    jumps: tuple[Jump, ...]
     jump_leg: NDArray[np.int64]
     minor_loops: tuple[MinorLoop, ...]
     work: float
-    loss_from_drops: float
     energy_change: float
-    loss_error: float
-    seconds: float = field(compare=False)
-    method: MethodReport = field(compare=False)
-    contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
-    new_method: Callable[[], Method] | None = field(default=None, compare=False)
-    interior: InteriorTension | None = None
-    narrowest_length: float = float("nan")
+
+    _columns = ("potential", "leg")
+    _numbers = ("loss", "loss_dimensionless", "energy_change")
 
     def __repr__(self) -> str:
         """Return two lines with the path and its work."""
@@ -193,27 +144,19 @@ class PathResult(ByValue, Viewed):
         return tuple(range_warnings(self.problem, self.valid_range, lost, self.contact_fraction))
 
     @property
-    def largest_interior_tension(self) -> float:
-        """Largest local maximum of tension inside patches, in Pa; 0 if there is none."""
-        return self.interior.tension if self.interior is not None else 0.0
+    def loss(self) -> float:
+        """The work, which is the loss if the path ends out of contact; in J/m² of nominal area."""
+        return self.work
 
     @property
-    def valid_range(self) -> float:
-        """Range of adhesion in m below which the zero-range limit holds, γ/σ_in.
+    def loss_dimensionless(self) -> float:
+        """The work in units of E* q0 h_max²/2."""
+        return self.work / self.problem.loss_scale
 
-        Infinite if no patch is in tension inside (docs/zero-range.md).
-        """
-        return valid_range(self.problem, self.interior)
-
-    @property
-    def edge_range(self) -> float:
-        """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
-        return edge_range(self.problem, self.narrowest_length)
-
-    @property
-    def energy(self) -> Array:
-        """U in J/m, per period, shape (states,)."""
-        return self.elastic_energy + self.adhesion_energy
+    def jump_rows(self) -> list[dict[str, Any]]:
+        """Return the jumps with their penetration and leg, a dictionary for each, in SI units."""
+        rows = super().jump_rows()
+        return [row | {"leg": int(leg)} for row, leg in zip(rows, self.jump_leg, strict=True)]
 
     @property
     def ends_out(self) -> bool:
@@ -433,39 +376,19 @@ class _PathRunner:
     def result(self, points: tuple[float, ...], load_steps: int, started: float) -> PathResult:
         """Make the result of the path."""
         record, problem = self.record, self.problem
-        work = record.work(problem)
-        drops = float(sum(jump.energy_drop for jump in record.jumps))
-        states = record.states
-        report = self.method.report()  # of the path alone
-        interior = interior_tension(self.method, record)
-        change = (states[-1].potential - states[0].potential) / problem.profile.period
-        separation = record.column("separation")
+        fields = path_fields(self.method, record, started)
+        work, potential = record.work(problem), record.column("potential")
+        change = float(potential[-1] - potential[0]) / problem.profile.period
+        rest = work - change - fields["loss_from_drops"]
         return PathResult(
-            problem=problem,
             turning_points=points,
             load_steps=load_steps,
             leg=np.array(self.legs),
-            branch=np.array(record.branches),
-            load_step=np.array(record.on_axis),
-            penetration=problem.penetration(separation),
-            separation=separation,
-            mean_stress=record.column("mean_stress"),
-            contact_fraction=record.column("contact_fraction"),
-            patches=record.column("patches").astype(np.int64),
-            elastic_energy=record.column("elastic_energy"),
-            adhesion_energy=record.column("adhesion_energy"),
-            potential=record.column("potential"),
-            jumps=tuple(record.jumps),
+            potential=potential,
             jump_leg=np.array(self.jump_legs, dtype=np.int64),
             minor_loops=tuple(self.minor),
             work=work,
-            loss_from_drops=drops,
             energy_change=change,
-            loss_error=estimated_error(record, work - change - drops, problem),
-            seconds=process_time() - started,
-            method=report,
-            contact_states=tuple(states),
-            new_method=self.method.recipe,
-            interior=interior,
-            narrowest_length=narrowest_length(problem, record),
+            loss_error=estimated_error(record, rest, problem),
+            **fields,
         )

@@ -28,12 +28,13 @@ from typing import TypeVar
 
 from adhesis.solver.checks import STIFFNESS, real
 from adhesis.solver.model.profile import Array
+from adhesis.solver.views import Shown
 
 Value = TypeVar("Value", float, Array)
 
 
 @dataclass(frozen=True)
-class Control:
+class Control(Shown):
     """Choice of the prescribed value of a path.
 
     Parameters

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adhesis.solver.checks import LENGTH, POISSON, YOUNG, real
+from adhesis.solver.views import Shown
 
 
 @dataclass(frozen=True)
-class HalfSpace:
+class HalfSpace(Shown):
     """Linear elastic, homogeneous, isotropic half-space in plane strain.
 
     Parameters

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.profile import Array
+from adhesis.solver.views import Shown
 
 Indices = NDArray[np.int64]
 
@@ -38,7 +39,7 @@ SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
 
 
 @dataclass(frozen=True)
-class Jump:
+class Jump(Shown):
     """One jump, at a fixed prescribed value.
 
     Attributes

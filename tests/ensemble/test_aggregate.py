@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from adhesis.ensemble.aggregate.average import aggregate
-from adhesis.ensemble.aggregate.curves import QUANTILES
-from adhesis.ensemble.aggregate.fields import fitted_slope
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES
+from adhesis.ensemble.aggregate.mean_curves import QUANTILES
+from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.aggregate.statistics import estimates
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.errors import InputError

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import adhesis.ensemble.bench.compare as benchmarking
+import adhesis.ensemble.bench.equal_error as benchmarking
 import adhesis.ensemble.bench.tamaas as peer
-from adhesis.ensemble.bench.compare import Line, Reference, benchmark, exponents, growth, ratios
-from adhesis.ensemble.bench.figure import draw
+from adhesis.ensemble.bench.bench_figure import draw
+from adhesis.ensemble.bench.bench_page import page, record
+from adhesis.ensemble.bench.equal_error import Line, Reference, benchmark, exponents, growth, ratios
 from adhesis.ensemble.bench.measure import Measurement, Run, measure, peak_megabytes
-from adhesis.ensemble.bench.page import page, record
 from adhesis.ensemble.bench.scenes import (
     FULL,
     GROWTH,

@@ -18,7 +18,7 @@ from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
 import adhesis.ensemble.command.loop as loop_command
-import adhesis.ensemble.loop.scenes as scenes_module
+import adhesis.ensemble.loop.film_scenes as scenes_module
 from adhesis import (
     Control,
     HalfSpace,
@@ -32,7 +32,7 @@ from adhesis import (
 )
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.loop.film import Film, film_of
-from adhesis.ensemble.loop.scenes import jump_places, scenes_of
+from adhesis.ensemble.loop.film_scenes import jump_places, scenes_of
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.references.exact_wave import ExactWave
 

@@ -14,7 +14,7 @@ from adhesis.ensemble.campaign.tables import TABLES
 from adhesis.ensemble.campaign.template import EXAMPLES, campaign_template
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.command.sample import SAMPLE
-from adhesis.ensemble.trace.read import read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tools import sample_trace
 
 ROOT = Path(__file__).resolve().parent.parent.parent

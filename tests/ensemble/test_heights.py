@@ -18,7 +18,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.heights import closure_warning, read_heights
-from adhesis.ensemble.trace.read import read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from adhesis.solver.model.profile import Array, self_affine_profile, single_wave
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave

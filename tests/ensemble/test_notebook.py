@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 import doctest
 import html
+import io
+import json
 import multiprocessing
 import pickle
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,8 @@ from adhesis import (
 )
 from adhesis.ensemble.loop import saved
 from adhesis.ensemble.trace.prepare import prepare_trace
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading import measured_trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver import views
 from adhesis.solver.references.exact_wave import ExactWave
 
@@ -72,12 +74,18 @@ def test_every_public_object_has_a_short_repr(result):
         *(result, result.jumps, state, method, method.recipe, method.fields(state, 64)),
         *(WAVE, method.problem, method.problem.half_space, Control(), result.method),
         *(method.follow(method.detached(1e-6), 0.9e-6), *method.openings(state)),
+        *result.jumps[:1],
         *getattr(result, "minor_loops", ()),
         *(result.film(frames=2),),
     ]
+    shapes = (LoopResult, PathResult, adhesis.Profile, Problem, adhesis.Fields, adhesis.Opening)
     for thing in objects:
         assert len(repr(thing)) < 800, type(thing)
         assert " at 0x" not in repr(thing)
+        if type(thing).__module__.startswith("adhesis") and thing is not result.method:
+            page = thing._repr_html_()
+            assert page.startswith(("<table><tr><th>", "<iframe")), type(thing)
+            assert ("data:image/png;base64," in page) == isinstance(thing, shapes), type(thing)
 
 
 def test_a_notebook_shows_the_main_numbers_and_the_figure(result):
@@ -155,8 +163,8 @@ def test_other_files_are_refused(tmp_path, result):
 # ---------------------------------------------------------------------- copies and processes
 
 
-def same(result: LoopResult | PathResult) -> LoopResult | PathResult:
-    return result
+def same(thing: Any) -> Any:
+    return thing
 
 
 def test_results_are_copied_pickled_and_sent_to_spawned_processes():
@@ -165,7 +173,9 @@ def test_results_are_copied_pickled_and_sent_to_spawned_processes():
         assert copy.copy(result) == copy.deepcopy(result) == result
         assert pickle.loads(pickle.dumps(result)).contact_states == result.contact_states
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        assert pool.map(same, results) == results
+        trace = Trace(WAVE.heights(64), 1e-5)
+        things = [*results, trace, WAVE, wave_method().problem, results[0].contact_states[3]]
+        assert pool.map(same, things) == things
         method = wave_method()
         loop = pool.apply(run_loop, (method,), {"max_penetration": 0.5, "load_steps": 4})
     assert loop == results[0]
@@ -196,11 +206,44 @@ def test_a_bar_on_stderr_follows_the_path_and_changes_nothing(run, capsys):
         run(progress=3)
 
 
-def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys):
+@pytest.mark.parametrize("thing", [HalfSpace(1e6, 0.5), wave_method()], ids=["solid", "method"])
+def test_numbers_are_shown_with_their_units(thing):
+    shown = html.unescape(thing._repr_html_())
+    expected = {"young": "1e+06 Pa", "modulus": "1.33333e+06 Pa", "name": "exact wave"}
+    for name, value in expected.items():
+        if hasattr(thing, name):
+            assert f"<th>{name}</th><td>{value}</td>" in shown
+
+
+def test_numbers_and_columns_are_those_of_the_result(result):
+    numbers, columns, rows = result.numbers(), result.columns(), result.jump_rows()
+    assert numbers["loss"] == result.loss
+    assert numbers["loss_error"] == result.loss_error
+    assert numbers["young"] == 1e6
+    assert numbers["races"] == 0
+    stiffness = result.problem.control.stiffness
+    assert numbers["stiffness"] == (stiffness if np.isfinite(stiffness) else None)
+    assert json.loads(json.dumps(numbers, allow_nan=False)) == numbers
+    assert {len(values) for values in columns.values()} == {len(result.separation)}
+    assert [row["energy_drop"] for row in rows] == [jump.energy_drop for jump in result.jumps]
+    assert [row["penetration"] for row in rows] == [
+        pytest.approx(1 - jump.separation / WAVE.h_max, abs=1e-12) for jump in result.jumps
+    ]
+
+
+def test_a_film_shows_a_bar_and_is_the_same(capsys):
+    loop = LOOPS["loop"]()
+    assert loop.film(frames=3, progress=True).page == loop.film(frames=3, progress=False).page
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "frames" in shown.err
+
+
+def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_path):
     step = 1e-3 / 400
     x = step * np.arange(400)
     profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=2, h_rms=1e-6)
-    prepared = prepare_trace(Trace(Path("t.txt"), profile.at(x), step))
+    prepared = prepare_trace(Trace(profile.at(x), step, "t.txt"))
     seen = []
     answer = adhesis.loss_of_trace(
         *(prepared,),
@@ -218,8 +261,24 @@ def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys):
     page = answer._repr_html_()
     assert "<th>loss</th>" in page
     assert "data:image/png;base64," in page
-    assert len(repr(answer)) < 200
     assert pickle.loads(pickle.dumps(answer)) == answer
+    assert copy.deepcopy(answer) == answer
+    for thing in (answer, prepared, prepared.trace):
+        assert len(repr(thing)) < 200
+        assert "data:image/png;base64," in thing._repr_html_()
+    assert str(answer).startswith(f"loss        {1e3 * answer.loss.value:.0f}"[:15])
+    table = answer.to_dataframe()
+    assert table.loss[0] == answer.loss.value
+    assert len(table) == runs
+    assert table.description[0] == "the loop"
+    assert table.attrs["units"]["loss"] == "J/m²"
+    path = answer.page(tmp_path / "new" / "folder")
+    assert path == tmp_path / "new" / "folder" / "trace.html"
+    made = {file.name for file in path.parent.iterdir()}
+    assert made >= {"trace.html", "trace.md", "trace.json", "trace.png", "loop.png"}
+    assert json.loads((path.parent / "trace.json").read_text())["loss"]["value"] == table.loss[0]
+    with pytest.raises(TypeError, match="folder is 3"):
+        answer.page(3)
 
 
 # ---------------------------------------------------------------------- campaigns
@@ -245,6 +304,7 @@ def test_a_campaign_is_the_same_from_a_dictionary_a_text_and_a_file(campaign, tm
     assert adhesis.Campaign(campaign.text) == campaign
     assert pickle.loads(pickle.dumps(campaign)) == campaign
     assert repr(campaign) == "<Campaign: 4 cells, 4 tasks>"
+    assert "young = 1000000.0" in campaign._repr_html_()
 
 
 @pytest.mark.parametrize(
@@ -268,12 +328,25 @@ def test_a_campaign_is_priced_run_resumed_and_opened(campaign, tmp_path, capsys)
     price = campaign.price(seconds=0.1)
     assert price.tasks == price.left == 4
     assert "4 tasks to do in 4 cells" in str(price)
+    assert repr(price).startswith("<Price: 4 of 4 tasks to do, ")
+    assert str(price).splitlines()[0] in html.unescape(price._repr_html_())
     assert not file.exists()
     with campaign.run(file) as results:
         assert results.losses.shape[0] == 4
         assert bool((results.dataset.loss > 0).all())
         drops = results.jumps.energy_drop.sum()
         assert drops == pytest.approx(float(results.dataset.loss_from_drops.sum()))
+        assert results.jumps.attrs["units"]["energy_drop"] == "J/m²"
+        units = results.losses.attrs["units"]
+        assert units["loss_mean [J/m^2]"] == units["work_of_adhesion"] == "J/m²"
+        assert units["m2_mean"] == ""
+        again = pickle.loads(pickle.dumps(results))
+        assert again.losses.equals(results.losses)
+        assert again.plot.pull_off()
+        page = results._repr_html_()
+        assert "<th>done</th><td>4</td>" in page
+        assert "data:image/png;base64," in page
+        assert " at 0x" not in repr(results.plot)
     assert capsys.readouterr() == ("", "")
     assert "4 done" in repr(campaign.run(file, progress=True))  # nothing is left to do
     assert "4" in capsys.readouterr().err
@@ -288,15 +361,22 @@ def test_a_campaign_is_priced_run_resumed_and_opened(campaign, tmp_path, capsys)
 
 
 @pytest.mark.mpi
-def test_ranks_compute_the_same_rows(campaign, tmp_path):
+def test_ranks_compute_the_same_rows(campaign, tmp_path, capfd, monkeypatch):
     alone, ranks = campaign.run(tmp_path / "1.h5"), campaign.run(tmp_path / "2.h5", ranks=2)
+    assert capfd.readouterr() == ("", "")
+    shown = io.StringIO()  # what a notebook has as stderr is not the process's own
+    monkeypatch.setattr("sys.stderr", shown)
+    campaign.run(tmp_path / "2.h5", ranks=2, progress=True)
+    assert "4 of 4 tasks done" in shown.getvalue()
     assert alone.dataset.loss.identical(ranks.dataset.loss)
     other = adhesis.Campaign(campaign.text.replace("young = 1000000.0", "young = 2e6"))
     with pytest.raises(InputError, match="young"):
         other.run(tmp_path / "2.h5", ranks=2)
 
 
-@pytest.mark.parametrize("module", [_campaign, saved, views], ids=lambda module: module.__name__)
+@pytest.mark.parametrize(
+    "module", [_campaign, saved, views, measured_trace], ids=lambda module: module.__name__
+)
 def test_the_examples_of_the_docstrings_are_right(module):
     done = doctest.testmod(module)
     assert done.failed == 0

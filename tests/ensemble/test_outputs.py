@@ -14,8 +14,7 @@ import adhesis.ensemble.command.loop as loop_command
 import adhesis.ensemble.command.trace as trace_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.loop.record import write_json
-from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file
+from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.synthetic_results import campaign, rows, write
@@ -55,7 +54,7 @@ def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("run_loop", "run_loops", "run_path"):
         monkeypatch.setattr(loop_command, name, no_work)
     monkeypatch.setattr(trace_command, "run_plan", no_work)
-    monkeypatch.setattr("adhesis.ensemble.bench.compare.benchmark", no_work)
+    monkeypatch.setattr("adhesis.ensemble.bench.equal_error.benchmark", no_work)
     monkeypatch.setattr("adhesis.ensemble.report.write_report.write_report", no_work)
 
 

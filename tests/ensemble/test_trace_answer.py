@@ -21,8 +21,8 @@ from matplotlib.image import imread
 
 from adhesis import Control, Problem, make_method, run_loop, self_affine_profile
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace import answer as answers
-from adhesis.ensemble.trace import page
 from adhesis.ensemble.trace.answer import (
     COVERAGE,
     Answer,
@@ -32,10 +32,11 @@ from adhesis.ensemble.trace.answer import (
     run_plan,
 )
 from adhesis.ensemble.trace.options import what_was_read
-from adhesis.ensemble.trace.plan import Plan, make_plan
 from adhesis.ensemble.trace.pool import Pool
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
+from adhesis.ensemble.trace.trace_page import page_text, summary
+from adhesis.ensemble.trace.variants import Plan, make_plan
 from tests.support.scenes import HALF_SPACE
 from tools.interrupted import Interrupt, interrupted
 
@@ -49,7 +50,7 @@ FIGURES = ["cut-off.png", "loop.png", "spectrum.png", "tables.png", "trace.png"]
 
 def prepared() -> Prepared:
     heights = PROFILE.at(X) + 1e-3 * X + 5e-9 * np.random.default_rng(0).standard_normal(N)
-    return prepare_trace(Trace(Path("t.txt"), heights, LENGTH / N))
+    return prepare_trace(Trace(heights, LENGTH / N, "t.txt"))
 
 
 @pytest.fixture(scope="module")
@@ -182,10 +183,10 @@ def test_a_preload_is_the_turning_point_of_a_trace() -> None:
     document = answers.document(answer)
     assert (document["stiffness"], document["max_stress"]) == (0.0, 300.0)
     assert document["max_penetration"] is None
-    said = page.summary(answer)
+    said = summary(answer)
     assert "to p̄ = 300 Pa with h_max" in said
     assert f"{answer.loss.value / 0.005:.4g} γ" in said
-    text = page._markdown(page._blocks(answer), [])
+    text = page_text(answer, [])
     assert "one loop to p̄ = 300 Pa" in text
     assert "| γ, J/m² | p̄, Pa |" in text
 
@@ -261,22 +262,21 @@ def test_a_variant_that_fails_is_a_warning_and_the_answer_stands(spoiled_answer:
         run_plan(trace, cycle, spoiled(plan, "answer"))
 
 
-def test_the_page_shows_names_headers_and_warnings_as_texts(spoiled_answer: Answer) -> None:
+def test_the_page_shows_names_headers_and_warnings_as_texts(
+    spoiled_answer: Answer, tmp_path: Path
+) -> None:
     """Neither page has an element that a name or a header of a file brought along."""
     before = spoiled_answer.prepared
     said = ("text", "channel ![z](/etc/hostname) <script>x</script> \x1b[31m")
-    evil = dataclasses.replace(before.trace, path=Path("![x](y.png)`<script>`|.txt"), said=said)
+    evil = dataclasses.replace(before.trace, source="![x](y.png)`<script>`|.txt", notes=said)
     answer = dataclasses.replace(
         spoiled_answer,
         prepared=dataclasses.replace(before, trace=evil),
         warnings=("a <script> of ![w](/etc/passwd)",),
     )
-    blocks = page._blocks(answer)
+    page = page_text(answer, [])
     by_markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
-    for text in (
-        page._html(blocks, [], answer),
-        by_markdown.render(page._markdown(blocks, [])),
-    ):
+    for text in (html_page(page, tmp_path), by_markdown.render(page)):
         assert "<script" not in text
         assert "<img" not in text
         assert "\x1b" not in text
@@ -340,7 +340,7 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     rng = np.random.default_rng(1)
     waves = rng.standard_normal(n // 2 + 1) * np.arange(n // 2 + 1).clip(30) ** -1.3
     heights = np.fft.irfft(waves * np.exp(1j * rng.uniform(0, 7, n // 2 + 1)), n)
-    trace = Trace(Path("t.txt"), 1e-6 * heights / heights.std(), 0.2e-6)
+    trace = Trace(1e-6 * heights / heights.std(), 0.2e-6, "t.txt")
     found = prepare_trace(trace)
     plan = make_plan(found, make_cycle(HALF_SPACE, 0.04, 0.9, 40, "auto", 1e-3), processes=2)
     assert plan.waves == pytest.approx(0.95 * n / 5, rel=0.01)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import adhesis.ensemble.trace.instrument as instrument
-import adhesis.ensemble.trace.read as read
+import adhesis.ensemble.trace.reading.instrument as instrument
+import adhesis.ensemble.trace.reading.measured_trace as read
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.read import read_trace
+from adhesis.ensemble.trace.reading.measured_trace import read_trace
 from tests.support import instrument_files
 
 pytestmark = pytest.mark.skipif(
@@ -33,7 +33,10 @@ def test_every_format_gives_the_same_heights(name: str, tmp_path: Path) -> None:
     assert trace.points == N
     assert trace.step == pytest.approx(STEP, rel=1e-6)
     np.testing.assert_allclose(trace.heights, Z, atol=1e-10)
-    assert trace.said
+    assert trace.notes
+    with path.open("rb") as stream:
+        again = read_trace(stream)
+    assert again == trace
 
 
 @pytest.mark.parametrize("name", ["mahr.qep", "row.x3p", "row.sdf", "row.sur"])
@@ -92,7 +95,7 @@ def test_reading_starts_no_mpi(tmp_path: Path) -> None:
 
     instrument_files.sdf(tmp_path / "a.sdf", STEP, Z)
     code = (
-        "import sys\nfrom adhesis.ensemble.trace.read import read_trace\n"
+        "import sys\nfrom adhesis.ensemble.trace.reading.measured_trace import read_trace\n"
         f"read_trace({str(tmp_path / 'a.sdf')!r})\nassert 'mpi4py.MPI' not in sys.modules\n"
         "assert 'SurfaceTopography' in sys.modules\nimport mpi4py"
     )

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.model.profile import self_affine_profile
 
 N, STEP = 1600, 1e-6
@@ -20,11 +18,11 @@ PLACE = 2 * X / X[-1] - 1
 
 
 def prepared(heights: np.ndarray, **options: object) -> Prepared:
-    return prepare_trace(Trace(Path("t.txt"), heights, STEP), **options)  # type: ignore[arg-type]
+    return prepare_trace(Trace(heights, STEP, "t.txt"), **options)  # type: ignore[arg-type]
 
 
 def said(found: Prepared, name: str) -> str:
-    return " ".join(step.said for step in found.steps if step.name == name)
+    return " ".join(step.description for step in found.steps if step.name == name)
 
 
 def test_a_tilt_goes_and_a_clean_trace_stays() -> None:
@@ -121,7 +119,7 @@ def test_the_cut_off_is_proposed_given_or_refused() -> None:
 
 def test_a_tip_radius_that_is_given_goes_before_that_of_the_file() -> None:
     """So does a radius of 0, which is none: the file may name the radius of a new tip."""
-    trace = Trace(Path("t.txt"), Z, STEP, tip_radius=100e-6)
+    trace = Trace(Z, STEP, "t.txt", tip_radius=100e-6)
     radii = (None, 200e-6, 100e-6, 50e-6, 0.0)
     limits = [prepare_trace(trace, tip_radius=radius).limits["tip"] for radius in radii]
     assert limits[1] > limits[2] > limits[3] > limits[4] == 0.0

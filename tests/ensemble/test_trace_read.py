@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
+import io
+import pickle
 import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.trace.read import Trace, read_trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -121,6 +126,105 @@ def test_npy_of_one_column_and_of_two(tmp_path: Path) -> None:
     assert_right(read_trace(tmp_path / "b.npy", unit="um", step=STEP))
 
 
+def npy(array: np.ndarray) -> io.BytesIO:
+    stream = io.BytesIO()
+    np.save(stream, array)
+    stream.seek(0)
+    return stream
+
+
+TEXT = "\n".join([UM, *rows(";", ",")])
+BOTH = np.column_stack([1e6 * X, 1e6 * Z])
+FRAME = pd.DataFrame({"x (mm)": 1e3 * X, "z (um)": 1e6 * Z, "more": 0.0})
+NAMED = FRAME.set_axis(["x", "z", "more"], axis=1)
+WITH_UNITS = NAMED[["x", "z"]].copy()
+WITH_UNITS.attrs["units"] = {"x": "mm", "z": "um"}
+IN_MEMORY: dict[str, tuple[Callable[[], object], dict[str, object]]] = {
+    "stream of text": (lambda: io.StringIO(TEXT), {}),
+    "stream of bytes": (lambda: io.BytesIO(TEXT.encode("latin-1")), {}),
+    "stream of an array": (lambda: npy(BOTH), {"unit": "um"}),
+    "array": (lambda: BOTH, {"unit": "um"}),
+    "array of two rows": (lambda: BOTH.T, {"unit": "um"}),
+    "array in metres": (lambda: np.column_stack([X, Z]), {}),
+    "list": (lambda: BOTH.tolist(), {"unit": "um"}),
+    "heights": (lambda: 1e6 * Z, {"unit": "um", "step": STEP}),
+    "whole numbers": (lambda: np.rint(1e12 * Z).astype(int) / 1e6, {"unit": "um", "step": STEP}),
+    "table": (lambda: FRAME[["x (mm)", "z (um)"]], {}),
+    "table, columns by name": (lambda: FRAME, {"columns": ["x (mm)", "z (um)"]}),
+    "table, columns by number": (lambda: FRAME, {"columns": [1, 2]}),
+    "table with units beside": (lambda: WITH_UNITS, {}),
+    "one column of a table": (lambda: FRAME["z (um)"], {"step": STEP}),
+}
+
+
+@pytest.mark.parametrize("kind", IN_MEMORY)
+def test_streams_arrays_and_tables_give_the_heights_that_files_give(kind: str) -> None:
+    make, options = IN_MEMORY[kind]
+    trace = read_trace(make(), **options)  # type: ignore[arg-type]
+    assert_right(trace)
+    assert trace.notes
+    assert pickle.loads(pickle.dumps(trace)) == copy.deepcopy(trace) == trace
+
+
+def test_an_open_file_is_named_and_read(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(TEXT, encoding="utf-8")
+    for stream in (path.open("rb"), path.open(encoding="utf-8")):
+        with stream:
+            trace = read_trace(stream)
+        assert_right(trace)
+        assert trace.source == str(path)
+
+
+def test_missing_heights_in_memory_are_gaps() -> None:
+    masked = np.ma.masked_array(1e6 * Z, mask=np.arange(N) == 7)
+    table = pd.DataFrame({"z (um)": pd.array([None, *(1e6 * Z[1:])], dtype="Float64")})
+    for source, gap in ((masked, 7), (table, 0)):
+        trace = read_trace(source, unit="um", step=STEP)
+        assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [gap]
+
+
+WORDS = FRAME.assign(**{"z (um)": "high"})
+REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {
+    "no unit": (BOTH, {}, InputError, "array states no unit"),
+    "no step": (Z, {"unit": "m"}, InputError, "array has heights without positions.*give step"),
+    "three columns": (FRAME, {}, InputError, "the table has 3 columns: columns X,Z names"),
+    "no such column": (FRAME, {"columns": ["x", "z"]}, InputError, r"columns is 'x': the table ha"),
+    "words": (WORDS, {"columns": [1, 2]}, InputError, "the table holds more than numbers"),
+    "complex": (1j * Z, {"step": STEP}, InputError, "array holds complex128"),
+    "a map": (np.zeros((99, 98)), {}, InputError, "array holds 99 × 98 numbers"),
+    "a row": (BOTH, {"row": 1}, InputError, "row belongs to files"),
+    "a decimal sign": (BOTH, {"decimal": ","}, InputError, "decimal belongs to files"),
+    "an empty stream": (io.BytesIO(b""), {}, InputError, "the stream is empty"),
+    "a zip": (io.BytesIO(b"\x1f\x8b0"), {}, InputError, "the stream is compressed"),
+    "neither": (3, {}, TypeError, "source is 3: it must be a path"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED_IN_MEMORY)
+def test_what_is_in_doubt_in_memory_is_refused(kind: str) -> None:
+    source, options, error, words = REFUSED_IN_MEMORY[kind]
+    with pytest.raises(error, match=words):
+        read_trace(source, **options)  # type: ignore[arg-type]
+
+
+def test_a_trace_is_made_of_heights_and_a_step() -> None:
+    trace = Trace(np.ma.masked_array(Z, mask=np.arange(N) == 7), STEP)
+    assert repr(trace).startswith("Trace(array: 200 points, step 500 nm, length 99.5 µm, range 23")
+    assert repr(trace).endswith("nm, 1 drop-out)")
+    assert not trace.heights.flags.writeable
+    for change, words in (
+        ({"heights": Z[:9]}, "array holds 9 heights: at least 32"),
+        ({"heights": np.zeros(N)}, "every height is 0 m"),
+        ({"heights": np.zeros((2, N))}, "array holds numbers of 2 dimensions"),
+        ({"step": 0.0}, "step is 0"),
+        ({"step": 1.0}, "would be 199 m long"),
+        ({"tip_radius": -1.0}, "tip_radius is -1"),
+    ):
+        with pytest.raises(InputError, match=words):
+            dataclasses.replace(trace, **change)
+
+
 @pytest.mark.parametrize("gap", ["", "NaN", "---", "*****", "BAD", "-9999", "1e38"])
 def test_drop_outs_are_gaps_however_they_are_written(gap: str, tmp_path: Path) -> None:
     lines = rows(";", ".")
@@ -150,12 +254,12 @@ def test_empty_lines_of_one_column_keep_their_place(tmp_path: Path) -> None:
 def test_backward_and_slightly_uneven_positions(tmp_path: Path) -> None:
     trace = read(tmp_path, [UM, *rows(";", ".")[::-1]])
     assert_right(trace)
-    assert any("backwards" in said for said in trace.said)
+    assert any("backwards" in note for note in trace.notes)
     uneven = X + 0.2 * STEP * np.sin(np.arange(N) / 20)  # a scanner that drifts
     slow = 1e-7 * np.sin(2 * np.pi * uneven / 20e-6)
     lines = [f"{a * 1e6:.6f} {b * 1e6:.6f}" for a, b in zip(uneven, slow, strict=True)]
     trace = read(tmp_path, lines, unit="um")
-    assert any("unequal steps" in said for said in trace.said)
+    assert any("unequal steps" in note for note in trace.notes)
     even = np.linspace(uneven[0], uneven[-1], N)
     np.testing.assert_allclose(trace.heights, 1e-7 * np.sin(2 * np.pi * even / 20e-6), atol=1e-9)
 

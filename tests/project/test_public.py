@@ -36,6 +36,7 @@ PUBLIC = [
     "PathResult",
     "Problem",
     "Profile",
+    "Trace",
     "load",
     "loss_of_trace",
     "make_method",
@@ -172,6 +173,8 @@ DESCRIBED = [
 def test_arguments_and_fields_are_told_with_shapes_and_units(name: str) -> None:
     text = inspect.getdoc(THINGS[name]) or ""
     reported = entries(text)
+    for base in filter(dataclasses.is_dataclass, getattr(THINGS[name], "__mro__", ())):
+        reported |= entries(inspect.getdoc(base) or "")
     lead = text.split("\n\n")[0]
     assert [n for n in arguments(THINGS[name]) if n not in reported] == []
     for argument, annotation in arguments(THINGS[name]).items():

@@ -47,7 +47,7 @@ def test_every_start_of_python_is_the_safe_one():
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Attribute) and node.attr == "executable"
     }
-    assert users == {"ensemble/run/launch.py", "ensemble/trace/instrument.py"}
+    assert users == {"ensemble/run/launch.py", "ensemble/trace/reading/instrument.py"}
     assert launch.python("-m", "x") == [sys.executable, "-P", "-m", "x"]
 
 

@@ -9,6 +9,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -36,9 +37,9 @@ HDF5 = {
 }
 COMPILED = {"adhesis.solver.runtime.jit"}
 FIGURES = {
-    "adhesis.ensemble.loop.figure",
+    "adhesis.ensemble.loop.loop_figure",
     "adhesis.ensemble.loop.film",
-    "adhesis.ensemble.bench.figure",
+    "adhesis.ensemble.bench.bench_figure",
     "adhesis.ensemble.report.figures.along",
     "adhesis.ensemble.report.figures.catalogue",
     "adhesis.ensemble.report.figures.shapes_and_spectra",
@@ -153,6 +154,27 @@ def test_the_statements_are_seen_wherever_they_stand(tmp_path: Path) -> None:
     assert imported(path) == expected
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
     assert len(PATHS) > 80
+
+
+# A command, and the module that does its work.
+COMMANDS = {"merge.py", "status.py", "warm.py"}
+# Still to be renamed in campaign, report, results and task.
+TWICE = {"axes.py", "fields.py", "losses.py", "write.py"}
+
+
+def test_no_file_name_of_campaigns_stands_for_two_things() -> None:
+    names = Counter(
+        path.name
+        for module, path in PATHS.items()
+        if module.startswith("adhesis.ensemble") and path.name != "__init__.py"
+    )
+    assert {name for name, count in names.items() if count > 1} <= COMMANDS | TWICE
+
+
+@pytest.mark.parametrize("folder", ["aggregate", "bench", "loop", "trace", "trace/reading"])
+def test_a_folder_has_no_more_than_thirteen_modules(folder: str) -> None:
+    names = [p.name for p in (ROOT / "ensemble" / folder).glob("*.py")]
+    assert 0 < len(set(names) - {"__init__.py"}) <= 13
 
 
 def test_no_circle_of_modules() -> None:

@@ -47,7 +47,7 @@ from adhesis import (
 from adhesis.ensemble.errors import naming_options
 from adhesis.ensemble.loop.record import loop_summary, path_summary
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.read import Trace
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.checks import Bounds, counted, plain, real, shown, whole
 from adhesis.solver.loading.loop import check_cycle
 from adhesis.solver.method import MethodReport
@@ -67,7 +67,7 @@ SPECTRUM: dict[str, Any] = {
     "seed": 1,
     "h_rms": 1e-6,
 }
-TRACE = Trace(Path("t.csv"), self_affine_profile(**SPECTRUM).heights(400), 5e-6)
+TRACE = Trace(self_affine_profile(**SPECTRUM).heights(400), 5e-6, "t.csv")
 
 
 def spectral(**change: Any) -> Profile:
@@ -699,14 +699,14 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         InputError,
         "campaign: 'sweeps' is unknown; the tables are",
     ),
-    ("load", lambda: adhesis.load(3), TypeError, "path is 3: it must be a path"),
+    ("load", lambda: adhesis.load(3), TypeError, "source is 3: it must be a path"),
     ("load", lambda: adhesis.load("no.nc"), InputError, "path is no.nc: there is no such file"),
     # traces
     (
         "prepare_trace",
         lambda: prepare_trace("file.csv"),
         TypeError,
-        "trace is 'file.csv': it must be a Trace; make one with read_trace(path)",
+        "trace is 'file.csv': it must be a Trace; make one with read_trace(source)",
     ),
     (
         "prepare_trace",
@@ -762,7 +762,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         InputError,
         "t.csv has 0 heights",
     ),
-    ("read_trace", lambda: read_trace(3), TypeError, "path is 3: it must be a path"),
+    ("read_trace", lambda: read_trace(3), TypeError, "source is 3: it must be a path"),
     (
         "read_trace",
         lambda: read_trace("no such file"),
@@ -851,7 +851,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         "watch is 1: it must be a function, or None",
     ),
     # files
-    ("open", lambda: adhesis.open(3), TypeError, "path is 3: it must be a path"),
+    ("open", lambda: adhesis.open(3), TypeError, "source is 3: it must be a path"),
     (
         "open",
         lambda: adhesis.open("a.h5", beside="b.h5"),

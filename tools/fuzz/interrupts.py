@@ -134,7 +134,7 @@ class Traces:
 
     def __init__(self, processes: int, longest: float) -> None:
         from adhesis.ensemble.trace.prepare import prepare_trace
-        from adhesis.ensemble.trace.read import Trace
+        from adhesis.ensemble.trace.reading.measured_trace import Trace
         from adhesis.solver.model.half_space import HalfSpace
         from adhesis.solver.model.profile import self_affine_profile
 

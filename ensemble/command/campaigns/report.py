@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from adhesis.ensemble.outputs import check_output_folder
-from adhesis.ensemble.ticker import ticking
+from adhesis.ensemble.reporter import ticking
 
 EXAMPLES = (
     "adhesis report paper.h5 --to report",

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
-from adhesis.ensemble.aggregate.fields import DeformedShape, FieldStatistics
+from adhesis.ensemble.aggregate.mean_fields import DeformedShape, FieldStatistics
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.selection import cell_of_hurst, cells_of, state_of
 from adhesis.ensemble.report.figures.style import (

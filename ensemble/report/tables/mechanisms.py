@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.fields import fitted_slope
+from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.report.tables.key import key, key_columns
 from adhesis.ensemble.report.tables.table import (
     Table,

@@ -12,7 +12,7 @@ import math
 from pathlib import Path
 
 from adhesis.ensemble.lengths import height, length
-from adhesis.ensemble.trace.arguments import add_cycle_arguments, add_reading_arguments
+from adhesis.ensemble.trace.trace_arguments import add_cycle_arguments, add_reading_arguments
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from adhesis.ensemble.bench.compare import Exponent, Line, Quotient, Ratio
+from adhesis.ensemble.bench.equal_error import Exponent, Line, Quotient, Ratio
 
 LINE_COLUMNS = (
     "method",

@@ -7,15 +7,14 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.trace.reading.source import Source
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
 
-MOST_BYTES = 200_000_000
 _ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with
 _SAMPLE = 400  # lines that the form of a file is judged by
 _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searching more takes long
@@ -62,14 +61,14 @@ class Table:
     decimal: str
 
     @property
-    def said(self) -> str:
+    def form(self) -> str:
         """How the numbers are written, in words."""
         count = len(self.columns)
         form = "one column" if count == 1 else f"{count} columns, {DELIMITERS[self.delimiter]}"
         return form + (", decimal commas" if self.decimal == "," else "")
 
 
-def read_table(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Table:
+def read_table(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
     """Read a text of numbers in columns, whatever its header, delimiter and decimal sign.
 
     Raises
@@ -78,10 +77,10 @@ def read_table(path: Path, delimiter: str | None = None, decimal: str | None = N
         If the file cannot be read, is no text, holds no columns of numbers, or can be read in two
         ways; the sentence says which line, and which option would settle it.
     """
-    return _table(path, _lines(path), delimiter, decimal)
+    return _table(source, _lines(source), delimiter, decimal)
 
 
-def read_column(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Table:
+def read_column(source: Source, delimiter: str | None = None, decimal: str | None = None) -> Table:
     """Read a text of one column, as :func:`read_table` does; its numbers may stand in one row.
 
     Raises
@@ -89,46 +88,46 @@ def read_column(path: Path, delimiter: str | None = None, decimal: str | None = 
     InputError
         As :func:`read_table`, and if a number stands among the lines of the header.
     """
-    lines = _lines(path)
+    lines = _lines(source)
     rows = [place for place, line in enumerate(lines) if _looks_like_numbers(line)]
     if len(rows) == 1:
         row = lines[rows[0]]
-        sign = delimiter or _delimiter(path, [row], decimal)
+        sign = delimiter or _delimiter(source, [row], decimal)
         words = _split(row, sign)
         if len(words) > 1:
             lines[rows[0] : rows[0] + 1] = words
             delimiter = "|"  # none is left
-    table = _table(path, lines, delimiter, decimal)
+    table = _table(source, lines, delimiter, decimal)
     for place, line in enumerate(lines[: int(table.lines[0]) - 1]):
         if _looks_like_numbers(line) and _value(line, table.decimal) is not None:
             raise InputError(
-                f"line {place + 1} of {path} is {_quoted(line)}, above the numbers that begin on "
+                f"line {place + 1} of {source} is {_quoted(line)}, above the numbers that begin on "
                 f"line {table.lines[0]}: mark it with # if it is none of them"
             )
     return table
 
 
-def _table(path: Path, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
+def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
     """Find header and columns in the lines of a file."""
     sample = [line for line in lines if _looks_like_numbers(line)]
     if not sample:
-        raise InputError(f"{path} holds no line of numbers")
+        raise InputError(f"{source} holds no line of numbers")
     spread = sample[:: max(1, len(sample) // _SAMPLE)]
-    delimiter, decimal = _form(path, spread, delimiter, decimal)
+    delimiter, decimal = _form(source, spread, delimiter, decimal)
     split = [_split(line, delimiter) if _looks_like_numbers(line) else None for line in lines]
     count = Counter(len(row) for row in split if row is not None).most_common(1)[0][0]
     start = _first_row(split, count, decimal)
     if start is None and len(sample) < _ROWS_TO_BEGIN:
         raise InputError(
-            f"{path} holds {counted(len(sample), 'row')} of numbers: at least {_ROWS_TO_BEGIN} "
+            f"{source} holds {counted(len(sample), 'row')} of numbers: at least {_ROWS_TO_BEGIN} "
             "are needed"
         )
     if start is None:
-        raise InputError(f"{path} holds no rows of numbers of one length")
+        raise InputError(f"{source} holds no rows of numbers of one length")
     header = [
         line[:_LONGEST_HEADER_LINE].strip().lstrip(_COMMENT).strip() for line in lines[:start]
     ]
-    rows, places = _rows(path, lines, start, count, delimiter, decimal)
+    rows, places = _rows(source, lines, start, count, delimiter, decimal)
     # Of one column, a line of the header is a name as a whole.
     fields = [(line,) if count == 1 else _names(line, delimiter, count) for line in header]
     return Table(
@@ -141,16 +140,10 @@ def _table(path: Path, lines: list[str], delimiter: str | None, decimal: str | N
     )
 
 
-def _lines(path: Path) -> list[str]:
-    try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise InputError(f"{path} holds {size / 1e6:.0f} MB: at most {MOST_BYTES // 10**6} MB")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from None
+def _lines(source: Source) -> list[str]:
+    data = source.read()
     if not data.strip():
-        raise InputError(f"{path} is empty")
+        raise InputError(f"{source} is empty")
     if data[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
         text = data.decode("utf-32", errors="replace")
     elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -158,8 +151,8 @@ def _lines(path: Path) -> list[str]:
     else:
         if b"\0" in data:
             raise InputError(
-                f"{path} is neither text nor an instrument format that can be read: it holds zero "
-                "bytes (UTF-16 without a mark is to be saved as UTF-8)"
+                f"{source} is neither text nor an instrument format that can be read: it holds "
+                "zero bytes (UTF-16 without a mark is to be saved as UTF-8)"
             )
         try:
             text = data.decode("utf-8-sig")
@@ -186,17 +179,17 @@ def _looks_like_numbers(line: str) -> bool:
 
 
 def _form(
-    path: Path, sample: Sequence[str], delimiter: str | None, decimal: str | None
+    source: Source, sample: Sequence[str], delimiter: str | None, decimal: str | None
 ) -> tuple[str, str]:
     """Delimiter and decimal sign, given or found out."""
     if delimiter is None:
-        delimiter = _delimiter(path, sample, decimal)
+        delimiter = _delimiter(source, sample, decimal)
     if decimal is None:
         rows = [field for line in sample for field in _split(line, delimiter)]
         comma, point = any("," in f for f in rows), any("." in f for f in rows)
         if comma and point:
             raise InputError(
-                f"{path} has commas and points within its numbers: give "
+                f"{source} has commas and points within its numbers: give "
                 f"{parameter('decimal')} and {parameter('delimiter')}, "
                 "and take signs of thousands out"
             )
@@ -204,7 +197,7 @@ def _form(
     return delimiter, decimal
 
 
-def _delimiter(path: Path, sample: Sequence[str], decimal: str | None) -> str:
+def _delimiter(source: Source, sample: Sequence[str], decimal: str | None) -> str:
     def everywhere(sign: str) -> bool:
         return sum(sign in line.strip() for line in sample) >= 0.8 * len(sample)
 
@@ -224,16 +217,16 @@ def _delimiter(path: Path, sample: Sequence[str], decimal: str | None) -> str:
     if commas == 1:
         if any(re.search(r"[eE][+\-]?\d+\s*,", line) for line in sample):
             return ","
-        return _one_comma(path, sample)
+        return _one_comma(source, sample)
     if commas == 3:
         raise InputError(
-            f"{path} has rows such as {_quoted(sample[0])}, which can be two numbers or four: "
+            f"{source} has rows such as {_quoted(sample[0])}, which can be two numbers or four: "
             f"give {parameter('decimal')}"
         )
     return ","
 
 
-def _one_comma(path: Path, sample: Sequence[str]) -> str:
+def _one_comma(source: Source, sample: Sequence[str]) -> str:
     """Tell "12,345" as a decimal number from two whole ones."""
     halves = [line.strip().split(",") for line in sample if line.count(",") == 1]
     whole = [int(left) if re.fullmatch(r"[+\-]?\d+", left) else None for left, _ in halves]
@@ -246,7 +239,7 @@ def _one_comma(path: Path, sample: Sequence[str]) -> str:
     if any(len(d) > 1 and d[0] == "0" for d in decimals):
         return " "
     raise InputError(
-        f"{path} has rows such as {_quoted(sample[0])}, which can be one number with a decimal "
+        f"{source} has rows such as {_quoted(sample[0])}, which can be one number with a decimal "
         f"comma or two: give {parameter('decimal')}"
     )
 
@@ -317,7 +310,7 @@ def _first_row(split: Sequence[list[str] | None], count: int, decimal: str) -> i
 
 
 def _rows(
-    path: Path, lines: Sequence[str], start: int, count: int, delimiter: str, decimal: str
+    source: Source, lines: Sequence[str], start: int, count: int, delimiter: str, decimal: str
 ) -> tuple[list[list[float]], list[int]]:
     rows: list[list[float]] = []
     places: list[int] = []
@@ -338,7 +331,7 @@ def _rows(
             continue
         if foreign is not None:
             raise InputError(
-                f"line {foreign + 1} of {path} is {_quoted(lines[foreign])}: within the "
+                f"line {foreign + 1} of {source} is {_quoted(lines[foreign])}: within the "
                 f"numbers every line must hold {count} of them"
             )
         rows.append([float("nan") if v is None else v for v in values])

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
 from adhesis.ensemble.lengths import METRES, unit_named
+from adhesis.ensemble.trace.reading.source import Source
 from adhesis.solver.model.profile import Array
 
 HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
@@ -33,7 +33,7 @@ class Scan:
 
     positions: Array
     heights: Array
-    said: str
+    description: str
     tip_radius: float | None
 
 
@@ -44,7 +44,7 @@ def available() -> bool:
     return find_spec("SurfaceTopography") is not None
 
 
-def read_scan(path: Path, row: int | None = None, channel: int | None = None) -> Scan:
+def read_scan(source: Source, row: int | None = None, channel: int | None = None) -> Scan:
     """Read a line scan, or one row of a map, from an instrument file.
 
     Raises
@@ -61,26 +61,27 @@ def read_scan(path: Path, row: int | None = None, channel: int | None = None) ->
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # they concern the readers, not the file
         try:
-            reader = io.open_topography(str(path))
+            reader = io.open_topography(source.name if source.content is None else source.open())
             channels = list(reader.channels)
         except Exception as error:  # each reader raises exceptions of its own
             raise UnknownFormatError(
-                f"{path} is no instrument format that can be read: {_one_line(error)}"
+                f"{source} is no instrument format that can be read: {_one_line(error)}"
             ) from None
-        chosen = _channel(path, channels, channel)
+        chosen = _channel(source, channels, channel)
         try:
             topography = reader.topography(channel_index=chosen.index)
             heights: Array = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan)
-            positions, heights, where = _line(path, topography, heights, row)
+            positions, heights, where = _line(source, topography, heights, row)
         except InputError:
             raise
         except Exception as error:
             raise UnknownFormatError(
-                f"{path} cannot be read as heights: {_one_line(error)}"
+                f"{source} cannot be read as heights: {_one_line(error)}"
             ) from None
     if topography.unit is None or topography.physical_sizes is None:
         raise InputError(
-            f"{path} states no unit of its lengths: export it as text and give {parameter('unit')}"
+            f"{source} states no unit of its lengths: export it as text and give "
+            f"{parameter('unit')}"
         )
     metres = METRES[unit_named(str(topography.unit))]
     name = getattr(type(reader), "_name", None) or reader.format()
@@ -106,36 +107,38 @@ def _library() -> ModuleType:
     return module
 
 
-def _channel(path: Path, channels: list[Any], wanted: int | None) -> Any:
+def _channel(source: Source, channels: list[Any], wanted: int | None) -> Any:
     if wanted is not None:
         if not 0 <= wanted < len(channels):
             raise InputError(
-                f"{parameter('channel')} is {wanted}: {path} has the channels 0 to "
+                f"{parameter('channel')} is {wanted}: {source} has the channels 0 to "
                 f"{len(channels) - 1}"
             )
         return channels[wanted]
     heights = [c for c in channels if "height" in str(getattr(c, "data_kind", "height")).lower()]
     if not heights:
         names = ", ".join(f"{c.index} {c.name}" for c in channels) or "none"
-        raise InputError(f"{path} holds no channel of heights (its channels: {names})")
+        raise InputError(f"{source} holds no channel of heights (its channels: {names})")
     return heights[0]
 
 
-def _line(path: Path, topography: Any, heights: Array, row: int | None) -> tuple[Array, Array, str]:
+def _line(
+    source: Source, topography: Any, heights: Array, row: int | None
+) -> tuple[Array, Array, str]:
     """Return positions and heights of a line scan, or of one row of a map, in the file's unit."""
     if heights.ndim == 1:
         if row is not None:
-            raise InputError(f"{parameter('row')} is {row}: {path} holds a line, no map")
+            raise InputError(f"{parameter('row')} is {row}: {source} holds a line, no map")
         return np.asarray(topography.positions(), dtype=float), heights, ""
     points, rows = heights.shape
     if row is None and rows > 1:
         raise InputError(
-            f"{path} holds a map of {points} × {rows} heights: {parameter('row')} K takes one of "
+            f"{source} holds a map of {points} × {rows} heights: {parameter('row')} K takes one of "
             f"its rows, 0 to {rows - 1}, as the trace"
         )
     row = row or 0
     if not 0 <= row < rows:
-        raise InputError(f"{parameter('row')} is {row}: {path} has the rows 0 to {rows - 1}")
+        raise InputError(f"{parameter('row')} is {row}: {source} has the rows 0 to {rows - 1}")
     step = topography.physical_sizes[0] / points
     where = f", row {row} of {rows}" if rows > 1 else ""
     return step * np.arange(points), heights[:, row], where

@@ -1,9 +1,11 @@
-"""The figure of ``adhesis loop --figure``: mean stress and contact fraction along the path."""
+"""Figures of a loop, mean stress and contact fraction along the path; and of shapes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -15,8 +17,13 @@ from adhesis.ensemble.report.figures.style import (
     new_figure,
     style,
 )
+from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
+from adhesis.solver.method import Fields, Opening
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Profile
 
 
 def draw_loops(results: Sequence[LoopResult] | PathResult) -> Figure:
@@ -66,3 +73,41 @@ def _draw_each(stress: Axes, contact: Axes, loops: Sequence[LoopResult]) -> None
     options = {"color": "k", "ls": LINE_OF_BRANCH["loading"], "label": "loading"}
     stress.plot(deepest.penetration[rows], deepest.mean_stress[rows] / 1e3, **options)
     contact.plot(deepest.penetration[rows], deepest.contact_fraction[rows], **options)
+
+
+_POINTS = 2000  # of a drawn profile
+
+
+def draw_shape(shown: Any) -> Figure | None:
+    """Draw heights, gap or fields against the position; None for what has none of them."""
+    curves = _curves(shown)
+    if not curves:
+        return None
+    with style():
+        figure = new_figure(1, 1, TWO_COLUMNS, 48 * MM)
+        (axes,) = figure.axes
+        for label, x, y in curves:
+            axes.plot(1e3 * x, 1e6 * y, lw=0.8, label=label)
+        axes.set(xlabel="position (mm)", ylabel="µm")
+        axes.legend(loc="best")
+    return figure
+
+
+def _curves(shown: Any) -> list[tuple[str, Any, Any]]:
+    """Return label, positions and heights (m) of the curves of an object."""
+    if isinstance(shown, Problem):
+        shown = shown.profile
+    if isinstance(shown, Profile):
+        x = np.linspace(0.0, shown.period, _POINTS)
+        return [("profile", x, shown.at(x))]
+    if isinstance(shown, Trace):
+        return [("heights as read", shown.step * np.arange(shown.points), shown.heights)]
+    if isinstance(shown, Prepared):
+        level = shown.level()
+        used = _curves(shown.profile())[0][1:]
+        return [("level", shown.step * np.arange(level.size), level), ("used, one period", *used)]
+    if isinstance(shown, Fields):
+        return [("profile", shown.x, shown.height), ("surface", shown.x, shown.height + shown.gap)]
+    if isinstance(shown, Opening):
+        return [("gap", shown.x, shown.gap)]
+    return []

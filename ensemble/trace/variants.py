@@ -64,7 +64,7 @@ class Run:
 
     name: str
     group: str
-    said: str
+    description: str
     changes: dict[str, Any] = field(default_factory=dict)
     reference: str = "answer"
     work_of_adhesion: float | None = None
@@ -96,7 +96,7 @@ class Plan(ByValue):
     hints: tuple[str, ...]
 
     @property
-    def said(self) -> str:
+    def text(self) -> str:
         """Description of the plan in two or three lines."""
         lines = [
             f"plan        {self.waves} waves, about {self.patches} "
@@ -190,9 +190,9 @@ def _doubts(prepared: Prepared) -> list[Run]:
         factor *= 2
     reference = "answer" if factor == 1 else f"cut-off × {factor:.3g}"
 
-    def variant(name: str, group: str, said: str, **changes: Any) -> None:
+    def variant(name: str, group: str, description: str, **changes: Any) -> None:
         kept = {} if factor == 1 else {"cut_off": factor * cut}
-        runs.append(Run(name, group, said, kept | changes, reference))
+        runs.append(Run(name, group, description, kept | changes, reference))
 
     variant("blend 10 %", "continuation", "end and beginning blended over a tenth", part=0.1)
     for part in (0.05, 0.1):

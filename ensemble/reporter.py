@@ -1,0 +1,146 @@
+"""Report progress on stderr: lines, a line that is rewritten on a terminal, a bar."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol, TextIO
+
+_EVERY = 10.0  # s
+_LIVE = 0.1  # s between two states of a line on a terminal
+_REWRITE = "\r\x1b[K"
+
+
+def log(text: str) -> None:
+    """Write a line to stderr, unbuffered."""
+    print(text, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def ticking(
+    task: Callable[[], str] | str, write: Callable[[str], None] = log, every: float = _EVERY
+) -> Iterator[None]:
+    """Log at intervals which task is under way, and for how long.
+
+    A task that ends within the first interval is not logged.
+
+    Parameters
+    ----------
+    task : str or callable
+        Description of the task, or a callable that returns it; it is called by another thread.
+    write : callable
+        Takes a line.
+    every : float
+        Time between lines, in s.
+    """
+    started = time.monotonic()
+    over = threading.Event()
+
+    def lines() -> None:
+        while not over.wait(every):
+            text = task if isinstance(task, str) else task()
+            write(f"{text} ({time.monotonic() - started:.0f} s)")
+
+    thread = threading.Thread(target=lines, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+class StatusLine:
+    """One line: rewritten on a terminal, elsewhere written anew at intervals.
+
+    Parameters
+    ----------
+    every : float or callable
+        Time between lines where there is no terminal, in s; or the same as a function of the time
+        since the start.
+    stream : text stream, optional
+        Where to; stderr without it.
+    at_once : bool
+        Show the first text when it is given, not after the first interval.
+    """
+
+    def __init__(
+        self,
+        every: float | Callable[[float], float],
+        stream: TextIO | None = None,
+        *,
+        at_once: bool = False,
+    ) -> None:
+        self._stream = stream or sys.stderr
+        self._live = self._stream.isatty()
+        self._every = every
+        self._started = time.monotonic()
+        self._next = self._started + (0.0 if at_once or self._live else self._interval())
+        self._begun = False  # whether a line on the terminal has no end yet
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start, in s."""
+        return time.monotonic() - self._started
+
+    def show(self, text: Callable[[], str], *, last: bool = False) -> None:
+        """Show a text if it is time to; ``last`` shows it anyway and ends the line."""
+        now = time.monotonic()
+        if now < self._next and not last:
+            return
+        self._next = now + self._interval()
+        if not self._live:
+            print(text(), file=self._stream, flush=True)
+            return
+        # A line that wraps cannot be rewritten.
+        line = text()[: shutil.get_terminal_size().columns - 1]
+        print(_REWRITE + line, end="\n" if last else "", file=self._stream, flush=True)
+        self._begun = not last
+
+    def say(self, text: str) -> None:
+        """Write a line of its own."""
+        print((_REWRITE if self._begun else "") + text, file=self._stream, flush=True)
+        self._begun = False
+
+    def close(self, text: Callable[[], str]) -> None:
+        """Show a last text where a line on the terminal has no end yet."""
+        if self._begun:
+            self.show(text, last=True)
+
+    def _interval(self) -> float:
+        if self._live:
+            return _LIVE
+        return self._every(self.seconds) if callable(self._every) else self._every
+
+
+class Bar(Protocol):
+    """Takes what is shown by :func:`bar`."""
+
+    def __call__(self, done: float | None, total: float | None, text: str = "") -> None:
+        """Show a text, and how much is done; unknown if ``total`` is None."""
+
+
+@contextmanager
+def bar(what: str) -> Iterator[Bar]:
+    """Show a bar on stderr, or in the notebook.
+
+    Parameters
+    ----------
+    what : str
+        Description, until another text is given.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task: Any = progress.add_task(what, total=1.0)
+
+        def show(done: float | None, total: float | None, text: str = "") -> None:
+            progress.update(task, description=text or what, completed=done, total=total)
+
+        yield show

@@ -1,0 +1,158 @@
+"""What measurements are read from: a file, or the content of a stream.
+
+Files that have to be unpacked or exported first are refused: archives, workbooks, pictures.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from adhesis.ensemble.errors import InputError
+from adhesis.solver import checks
+
+MOST_BYTES = 200_000_000
+
+# By their first bytes: name of the format, and program that unpacks it.
+_COMPRESSED = {
+    b"\x1f\x8b": ("gzip", "gunzip"),
+    b"BZh": ("bzip2", "bunzip2"),
+    b"\xfd7zXZ\0": ("xz", "unxz"),
+    b"\x28\xb5\x2f\xfd": ("zstd", "unzstd"),
+    b"7z\xbc\xaf\x27\x1c": ("7z", "7z x"),
+    b"Rar!": ("rar", "unrar x"),
+}
+_DOCUMENTS = {
+    b"%PDF": "a PDF",
+    b"\x89PNG": "a picture (PNG)",
+    b"\xff\xd8\xff": "a picture (JPEG)",
+    b"GIF8": "a picture (GIF)",
+}
+_ZIP, _COMPOUND = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+_WORKBOOKS = frozenset((".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"))
+_BEGIN = 4096
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file of measurements, or what a stream held.
+
+    Attributes
+    ----------
+    name : str
+        In messages; its ending may decide the format.
+    content : bytes or None
+        Of a stream; None for a file, whose name is its path.
+    """
+
+    name: str
+    content: bytes | None = None
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def suffix(self) -> str:
+        """Ending of the name, in lower case."""
+        return Path(self.name).suffix.lower()
+
+    @property
+    def is_npy(self) -> bool:
+        """Whether it is an array of NumPy, by its name or its first bytes."""
+        return self.suffix == ".npy" or self.beginning().startswith(b"\x93NUMPY")
+
+    def open(self) -> BinaryIO:
+        """Open it to read (OSError)."""
+        return Path(self.name).open("rb") if self.content is None else io.BytesIO(self.content)
+
+    def read(self) -> bytes:
+        """Return its whole content.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read, or is too large for a text.
+        """
+        try:
+            size = os.stat(self.name).st_size if self.content is None else len(self.content)
+            if size > MOST_BYTES:
+                raise InputError(
+                    f"{self} holds {size / 1e6:.0f} MB: at most {MOST_BYTES // 10**6} MB"
+                )
+            with self.open() as stream:
+                return stream.read()
+        except OSError as error:
+            raise InputError(f"cannot read {self}: {error.strerror or error}") from None
+
+    def beginning(self) -> bytes:
+        """Return its first bytes.
+
+        Raises
+        ------
+        InputError
+            If it is missing, no regular file, unreadable, empty, or has to be unpacked or exported
+            first.
+        """
+        try:
+            if self.content is None:
+                _refuse_no_file(Path(self.name))
+            with self.open() as stream:
+                begin = stream.read(_BEGIN)
+        except InputError:
+            raise
+        except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"cannot read {self}: {reason}") from None
+        if not begin.strip():
+            raise InputError(f"{self} is empty")
+        for magic, (name, program) in _COMPRESSED.items():
+            if begin.startswith(magic):
+                raise InputError(
+                    f"{self} is compressed ({name}): unpack it first ({program} {self})"
+                )
+        for magic, name in _DOCUMENTS.items():
+            if begin.startswith(magic):
+                raise InputError(f"{self} is {name}: export the heights as text")
+        return begin
+
+    def container(self) -> str | None:
+        """Return a message for a workbook or an archive that is no instrument's file, else None."""
+        with self.open() as stream:
+            begin = stream.read(_BEGIN)
+        if begin.startswith((_ZIP, _COMPOUND)) and self.suffix in _WORKBOOKS:
+            return f"{self} is a workbook: save its columns as text (CSV)"
+        if begin.startswith(_ZIP) and self.suffix == ".npz":
+            return f"{self} is an archive of arrays: save the one of the heights as .npy"
+        if begin.startswith(_ZIP) and self.suffix == ".zip":
+            return f"{self} is an archive (zip): unpack it first (unzip {self})"
+        return None
+
+
+def source_of(given: Any) -> Source:
+    """Return the source of a path, or of an open file or other stream, which is read to its end.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    """
+    if not hasattr(given, "read"):
+        return Source(str(checks.path("source", given)))
+    content = given.read()
+    name = getattr(given, "name", None)
+    return Source(
+        name if isinstance(name, str) else "the stream",
+        content.encode() if isinstance(content, str) else bytes(content),
+    )
+
+
+def _refuse_no_file(path: Path) -> None:
+    if path.is_dir():
+        raise InputError(f"{path} is a directory: a trace is a file")
+    if not path.exists():
+        raise InputError(f"cannot read {path}: there is no such file")
+    if not path.is_file():
+        raise InputError(f"{path} is a pipe or a device: write its content to a file first")

@@ -1,0 +1,219 @@
+"""The page of an answer: ``trace.md``, and ``trace.html`` with its figures inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from adhesis._version import __version__
+from adhesis.ensemble.escape import code_span, markdown, printable
+from adhesis.ensemble.lengths import length_text
+from adhesis.ensemble.outputs import staged_folder, write_json
+from adhesis.ensemble.quantities import in_works_of_adhesion
+from adhesis.ensemble.report.html import html_page
+from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, Answer, Quantity, document
+from adhesis.ensemble.trace.figures import Drawn, draw_all
+from adhesis.solver.checks import counted
+
+
+def summary(answer: Answer) -> str:
+    """The answer in a few lines for the terminal."""
+    loop = answer.main
+    lines = [
+        f"loss        {_value(answer.loss, 1e3, 'mJ/m²')}"
+        f"{in_works_of_adhesion(answer.loss.value, answer.cycle.works_of_adhesion[0])}",
+        f"pull-off    {_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension",
+        f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area')} at most",
+        f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
+        f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
+        f"{length_text(loop['h_max'], 4)}; "
+        f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
+        f"most, {counted(loop['jumps'], 'jump')}, "
+        f"audit {loop['audit_residual']:.0e}",
+        f"range       {_range(answer)}",
+        "doubts      "
+        + ", ".join(f"{name} {_percent(share)}" for name, share in answer.loss.doubts.items())
+        + " of the loss (standard uncertainties; the half-width of the interval is "
+        f"{COVERAGE:g} times the root of the sum of their squares)",
+        *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
+    ]
+    return printable("\n".join(lines))
+
+
+def _range(answer: Answer) -> str:
+    """Say below which range of adhesion the zero-range limit holds."""
+    if answer.valid_range is None:
+        return "no tension inside patches"
+    return (
+        f"adhesion of a range below {length_text(answer.valid_range, 3)} is of zero range here: "
+        f"largest tension inside patches {1e-6 * answer.largest_interior_tension:.3g} MPa"
+    )
+
+
+def write_page(answer: Answer, folder: Path) -> None:
+    """Draw the figures and write ``trace.md`` and ``trace.html`` into a directory that exists."""
+    text = page_text(answer, draw_all(answer, folder))
+    (folder / "trace.md").write_text(text, encoding="utf-8")
+    (folder / "trace.html").write_text(html_page(text, folder), encoding="utf-8")
+
+
+def write_all(answer: Answer, folder: Path) -> Path:
+    """Write the page, its figures and ``trace.json``; return the path of the page (OSError)."""
+    with staged_folder(folder) as staged:
+        write_page(answer, staged)
+        write_json(staged / "trace.json", document(answer))
+    return folder / "trace.html"
+
+
+# ---------------------------------------------------------------------- content
+
+
+def _value(quantity: Quantity, by: float, unit: str) -> str:
+    unit = f" {unit}" if unit else ""
+    known = _with_interval(by * quantity.value, by * quantity.uncertainty)
+    return f"{known}{unit} (± {_percent(quantity.relative, 0)})"
+
+
+def _with_interval(value: float, half: float) -> str:
+    """Digits down to the first one of the interval."""
+    digits = 0
+    while digits < 6 and half * 10**digits < 9.5:
+        digits += 1
+    digits = max(digits - 1, 0)
+    return f"{value:.{digits}f} ± {half:.{digits}f}"
+
+
+def _percent(share: float, digits: int = 1, sign: str = "") -> str:
+    """Per cent, and no sign of what rounds to nothing."""
+    rounded = round(100 * share, digits) or 0.0
+    return f"{rounded:{sign if rounded else ''}.{digits}f} %"
+
+
+def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
+    """Return the page as Markdown, with those figures that were drawn."""
+    prepared, cycle, plan = answer.prepared, answer.cycle, answer.plan
+    trace, half_space = prepared.trace, cycle.half_space
+    name = Path(trace.source).name
+    images = {
+        drawn.path.stem: f"![{drawn.title}]({drawn.path.name})\n\n*{drawn.title}.* {drawn.caption}"
+        for drawn in figures
+    }
+    parts = [
+        f"# From the trace {code_span(name)} to its loss",
+        f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area"
+        f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}, pull-off at a "
+        f"mean tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
+        f"most **{_value(answer.contact_fraction, 1.0, '')}**: one loop to "
+        f"{cycle.turn(cycle.turning_points[0])} (h_max = {length_text(answer.main['h_max'], 4)}) "
+        f"and off again, with γ = {cycle.works_of_adhesion[0]:g} J/m², "
+        f"E = {half_space.young:g} Pa, ν = {half_space.poisson:g}.",
+        *(f"> **Warning:** {markdown(warning)}" for warning in answer.warnings),
+        "## What was read",
+        f"- {code_span(name)}: {markdown('; '.join(trace.notes))}\n- {trace.summary}",
+        "## What was done to it",
+        "\n".join(f"- **{step.name}**: {markdown(step.description)}" for step in prepared.steps),
+        "One period: the last 5 % of the trace fade out over the first 5 %, which fade in, "
+        "with weights whose squares add up to one.",
+        images.get("trace"),
+        images.get("spectrum"),
+        "## The loop",
+        images.get("loop"),
+        f"Range: {_range(answer)} (least of the loop and its variants).",
+        "## How far it can be trusted",
+        "Each doubt is measured by running the loop with the decision made otherwise. "
+        "Standard uncertainty: the root mean square of the changes; the interval is "
+        f"{COVERAGE:g} times the root of the sum of their squares. It is about this trace, "
+        "closed to one period; other places of the same surface have other losses.",
+        _table(_doubt_rows(answer)),
+        _table(_variant_rows(answer)),
+        images.get("cut-off"),
+    ]
+    mirror = answer.change("mirror")
+    if mirror is not None:
+        parts.append(
+            f"A mirror image instead changes the loss by {_percent(mirror, sign='+')}. It is not "
+            "counted: it is a body of twice the period, and the loss grows with the period."
+        )
+    sweep = _sweep_rows(answer)
+    if len(sweep) > 2:
+        heading = "## Against work of adhesion and turning point"
+        parts += [heading, _table(sweep), images.get("tables")]
+    parts += [
+        "## What it took",
+        f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {plan.processes} cores (planned: "
+        f"{plan.wall:.0f} s). Every number: `trace.json`. adhesis {__version__}.",
+    ]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    rule = "|---|" + "---:|" * (len(rows[0]) - 1)
+    head, *body = (f"| {' | '.join(row)} |" for row in rows)
+    return "\n".join([head, rule, *body])
+
+
+def _doubt_rows(answer: Answer) -> list[list[str]]:
+    rows = [["doubt", "loss", "pull-off", "contact"]]
+    quantities = (answer.loss, answer.pull_off_stress, answer.contact_fraction)
+    for name in (*DOUBTS, "numerics"):
+        shares = [q.doubts.get(name) for q in quantities]
+        if any(share is not None for share in shares):
+            words = DOUBTS.get(name, "of the loop itself")
+            cells = ["" if share is None else _percent(share) for share in shares]
+            rows.append([f"{name}: {words}", *cells])
+    rows.append(["interval", *(f"± {_percent(q.relative)}" for q in quantities)])
+    return rows
+
+
+def _variant_rows(answer: Answer) -> list[list[str]]:
+    rows = [["variant", "loss, mJ/m²", "change", "pull-off, kPa", "contact", "waves", "CPU, s"]]
+    for run in answer.plan.runs:
+        if run.group in ("work of adhesion", "turning point"):
+            continue
+        found = answer.result(run.name)
+        if found is None:
+            rows.append([f"{run.name}: failed", *[""] * 6])
+            continue
+        change = answer.change(run.name) if run.name != "answer" else None
+        against = "" if run.reference == "answer" else f" (against {run.reference})"
+        rows.append(
+            [
+                f"{run.name}: {run.description}{against}",
+                f"{1e3 * found['loss']:.4g}",
+                "" if change is None else _percent(change, sign="+"),
+                f"{1e-3 * found['pull_off_stress']:.4g}",
+                f"{found['contact_fraction']:.3f}",
+                f"{found['waves']}",
+                f"{found['seconds']:.1f}",
+            ]
+        )
+    return rows
+
+
+def _sweep_rows(answer: Answer) -> list[list[str]]:
+    cycle = answer.cycle
+    gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
+    turn = (
+        "p̄, Pa" if cycle.control.is_load else "Δ/h_max" if cycle.control.is_fixed else "u_tot/h_max"
+    )
+    rows = [(gamma, point, answer.main)]
+    rows += [(float(n.split()[1]), point, r) for n, _, r in answer.group("work of adhesion")]
+    rows += [(gamma, float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
+    head = ["γ, J/m²", turn, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
+    return [
+        head,
+        *(
+            [
+                f"{g:g}",
+                f"{d:g}",
+                _with_interval(1e3 * r["loss"], 1e3 * abs(r["loss"]) * answer.loss.relative),
+                _with_interval(
+                    1e-3 * r["pull_off_stress"],
+                    1e-3 * r["pull_off_stress"] * answer.pull_off_stress.relative,
+                ),
+                f"{r['contact_fraction']:.3f}",
+                f"{r['jumps']}",
+            ]
+            for g, d, r in sorted(rows, key=lambda row: row[:2])
+        ),
+    ]

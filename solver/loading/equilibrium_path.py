@@ -1,0 +1,212 @@
+"""Base of the results of loops and paths: the states and jumps along an equilibrium path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from time import process_time
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.loading.path_record import Record
+from adhesis.solver.loading.zero_range import (
+    InteriorTension,
+    edge_range,
+    interior_tension,
+    narrowest_length,
+    valid_range,
+)
+from adhesis.solver.method import ContactState, Method, MethodReport
+from adhesis.solver.model.jump import Jump
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.values import ByValue, finite
+from adhesis.solver.views import Viewed
+
+_OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class EquilibriumPath(ByValue, Viewed):
+    """The states of a path in its order, and the jumps between them; arrays of shape (states,).
+
+    Immutable; two results are equal if all fields except ``seconds``, ``method``,
+    ``contact_states`` and ``new_method`` are: one method gives equal results each time for the
+    same problem.
+
+    Attributes
+    ----------
+    problem : Problem
+    load_steps : int
+        Equal steps from first touch up to the (largest) turning point.
+    branch : array of str, shape (states,)
+        "loading" or "unloading".
+    load_step : bool array
+        True at load steps and turning points, False at states that the method added in between
+        (before and after jumps, and where the curve bends).
+    penetration : array
+        Δ/h_max.
+    separation : array
+        s in m.
+    mean_stress : array
+        p̄ in Pa, compression positive.
+    contact_fraction : array
+        A/A0.
+    patches : int array
+    elastic_energy, adhesion_energy : array
+        In J/m, per period.
+    jumps : tuple of Jump
+    loss_from_drops : float
+        Sum of the energy drops at the jumps, in J/m² of nominal area.
+    loss_error : float
+        Estimated numerical error of the loss or work, in J/m² (docs/methods.md, "Error of the
+        loss").
+    seconds : float
+        CPU time of this process, in s.
+    method : MethodReport
+        Name, resolution and counters of the method.
+    contact_states : tuple of ContactState
+        The states themselves, with the edges of every patch; empty for a result from a file.
+    new_method : callable or None
+        Builds the method anew, whose ``fields`` and ``openings`` take these states.
+    interior : InteriorTension or None
+        Largest local maximum of tension inside patches, and where it occurred; None if no patch
+        has one (docs/zero-range.md).
+    narrowest_length : float
+        Shortest length in m that decides where edges stand (``zero_range``).
+
+    References
+    ----------
+    docs/theory.md, "3. The loop"
+    """
+
+    problem: Problem = field(repr=False)
+    load_steps: int
+    branch: NDArray[np.str_]
+    load_step: NDArray[np.bool_]
+    penetration: Array
+    separation: Array
+    mean_stress: Array
+    contact_fraction: Array
+    patches: NDArray[np.int64]
+    elastic_energy: Array
+    adhesion_energy: Array
+    jumps: tuple[Jump, ...]
+    loss_from_drops: float
+    loss_error: float
+    seconds: float = field(compare=False)
+    method: MethodReport = field(compare=False)
+    contact_states: tuple[ContactState, ...] = field(default=(), compare=False)
+    new_method: Callable[[], Method] | None = field(default=None, compare=False)
+    interior: InteriorTension | None = None
+    narrowest_length: float = float("nan")
+
+    # Beside those of every path, in the order in which they are listed.
+    _columns: ClassVar[tuple[str, ...]] = ()
+    _numbers: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def energy(self) -> Array:
+        """U in J/m, per period, shape (states,)."""
+        return self.elastic_energy + self.adhesion_energy
+
+    @property
+    def largest_contact_fraction(self) -> float:
+        """Largest A/A0 on the path."""
+        return float(self.contact_fraction.max())
+
+    @property
+    def largest_interior_tension(self) -> float:
+        """Largest local maximum of tension inside patches, in Pa; 0 if there is none."""
+        return self.interior.tension if self.interior is not None else 0.0
+
+    @property
+    def valid_range(self) -> float:
+        """Range of adhesion in m below which the zero-range limit holds, γ/σ_in.
+
+        Infinite if no patch is in tension inside (docs/zero-range.md).
+        """
+        return valid_range(self.problem, self.interior)
+
+    @property
+    def edge_range(self) -> float:
+        """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
+        return edge_range(self.problem, self.narrowest_length)
+
+    @property
+    def races(self) -> int:
+        """Number of jumps whose end state depends on the assumed edge kinetics."""
+        return sum(jump.raced for jump in self.jumps)
+
+    @property
+    def energy_at_stake(self) -> float:
+        """Sum over the jumps of the energy that depends on the assumed kinetics, in J/m²."""
+        return float(sum(jump.at_stake for jump in self.jumps))
+
+    # ------------------------------------------------------------------ for tables and files
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the single numbers of the problem and the result by name, in SI units.
+
+        None stands for infinity, and for the stiffness of a fixed separation.
+        ``pandas.DataFrame([loop.numbers() for loop in loops])`` compares loops.
+        """
+        problem, half_space = self.problem, self.problem.half_space
+        own = (*self._numbers, "loss_from_drops", "audit_residual", "loss_error", "races")
+        more = ("energy_at_stake", "largest_contact_fraction", "largest_interior_tension")
+        return {
+            **{name: getattr(problem.profile, name) for name in _OF_PROFILE},
+            "young": half_space.young,
+            "poisson": half_space.poisson,
+            "work_of_adhesion": problem.work_of_adhesion,
+            "stiffness": finite(problem.control.stiffness),
+            "full_contact_energy": problem.full_contact_energy,
+            "load_steps": self.load_steps,
+            **{name: getattr(self, name) for name in (*own, *more)},
+            "valid_range": finite(self.valid_range),
+            "edge_range": finite(self.edge_range),
+            "seconds": self.seconds,
+            "method": self.method.name,
+        }
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Return the values of every state by name, arrays of shape (states,) in SI units."""
+        names = (
+            *("branch", "load_step", "penetration", "separation", "mean_stress"),
+            *("contact_fraction", "patches", "energy", "elastic_energy", "adhesion_energy"),
+            *self._columns,
+        )
+        return {name: getattr(self, name) for name in names}
+
+    def jump_rows(self) -> list[dict[str, Any]]:
+        """Return the jumps with their penetration Δ/h_max, a dictionary for each, in SI units."""
+        place = self.problem.penetration
+        return [asdict(jump) | {"penetration": place(jump.separation)} for jump in self.jumps]
+
+
+def path_fields(method: Method, record: Record, started: float) -> dict[str, Any]:
+    """Return the fields of every path from its record; ``started`` is its first CPU time, in s."""
+    problem = method.problem
+    report = method.report()  # of the path alone
+    interior = interior_tension(method, record)
+    separation = record.column("separation")
+    arrays = ("mean_stress", "contact_fraction", "elastic_energy", "adhesion_energy")
+    return {
+        "problem": problem,
+        "branch": np.array(record.branches),
+        "load_step": np.array(record.on_axis),
+        "penetration": problem.penetration(separation),
+        "separation": separation,
+        **{name: record.column(name) for name in arrays},
+        "patches": record.column("patches").astype(np.int64),
+        "jumps": tuple(record.jumps),
+        "loss_from_drops": float(sum(jump.energy_drop for jump in record.jumps)),
+        "seconds": process_time() - started,
+        "method": report,
+        "contact_states": tuple(record.states),
+        "new_method": method.recipe,
+        "interior": interior,
+        "narrowest_length": narrowest_length(problem, record),
+    }
