@@ -222,8 +222,6 @@ def _length(name: str, value: float | None, bounds: Bounds) -> float | None:
 def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
     """Cut missing heights off both ends, where interpolation is impossible."""
     good = np.flatnonzero(np.isfinite(heights))
-    if good.size < 2:
-        raise InputError(f"{trace.source} has {counted(good.size, 'height')}: a trace needs more")
     first, last = int(good[0]), int(good[-1]) + 1
     lost = heights.size - (last - first)
     if lost:

@@ -757,11 +757,13 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         "keep_outliers is 1: it must be True or",
     ),
     (
-        "prepare_trace",
-        lambda: prepare_trace(replace(TRACE, heights=np.full(400, np.nan))),
+        "Trace",
+        lambda: replace(TRACE, heights=np.full(400, np.nan)),
         InputError,
-        "t.csv has 0 heights",
+        "t.csv holds 0 heights: at least 32",
     ),
+    ("Trace", lambda: Trace(["a"] * 99, 1e-6), InputError, "array holds <U1 of 1 dimensions"),
+    ("Trace", lambda: replace(TRACE, step="5um"), TypeError, "step is '5um': it must be a pos"),
     ("read_trace", lambda: read_trace(3), TypeError, "source is 3: it must be a path"),
     (
         "read_trace",
