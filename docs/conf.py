@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import re
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+from sphinx.util.docutils import SphinxDirective
+
 import adhesis
+from adhesis.ensemble.command.main import parser_of
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from tools import transcripts  # noqa: E402  # needs the path
 
 project = "adhesis"
 author = copyright = "The adhesis developers"
@@ -23,6 +33,7 @@ extensions = [
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["README.md", "paper/README.md"]
 language = "en"
+smartquotes = False  # options begin with two hyphens
 
 # Anchors as the pages use them where they are read as plain Markdown.
 myst_heading_anchors = 4
@@ -86,8 +97,56 @@ def public_name(app: Any, env: Any, node: Any, content: Any) -> Any:
     )
 
 
-def film(app: Any, error: Exception | None) -> None:
-    """Write the film of docs/python.md beside its page."""
+class Command(SphinxDirective):
+    """List the options of a command, as its parser declares them, with its examples."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Make a paragraph, a list of options for each group, and the examples."""
+        parser = parser_of(self.arguments[0])
+        first, *_ = (parser.description or "").split("\n\n")
+        made: list[nodes.Node] = [nodes.paragraph(text=" ".join(first.split()))]
+        usage = " ".join(parser.format_usage().split()).removeprefix("usage: ")
+        made.append(nodes.literal_block(usage, usage, classes=["usage"], language="text"))
+        for group in parser._action_groups:
+            shown = [a for a in group._group_actions if "--help" not in a.option_strings]
+            if not shown:
+                continue
+            title = (group.title or "").removeprefix("positional ").capitalize()
+            made.append(nodes.rubric(text=title))
+            entries = nodes.definition_list(classes=["options"])
+            for action in shown:
+                term = nodes.term()
+                term += nodes.literal(text=self._name(action))
+                text = (action.help or "").replace("%%", "%") or "–"
+                entries += nodes.definition_list_item(
+                    "", term, nodes.definition("", nodes.paragraph(text=text))
+                )
+            made.append(entries)
+        examples = (parser.epilog or "").partition("\n")[2]
+        made.append(nodes.rubric(text="Examples"))
+        text = "\n".join(line.strip() for line in examples.splitlines())
+        made.append(nodes.literal_block(text, text, language="text"))
+        return made
+
+    @staticmethod
+    def _name(action: argparse.Action) -> str:
+        if not action.option_strings:
+            return str(action.metavar or action.dest)
+        names = ", ".join(action.option_strings)
+        if action.nargs == 0:
+            return names
+        choices = "|".join(action.choices or ())
+        value = action.metavar or choices or action.dest.upper()
+        return f"{names} {value}"
+
+
+def films(app: Any, error: Exception | None) -> None:
+    """Write the films of docs/python.md and docs/tutorial.md beside their pages.
+
+    The second is made by the tutorial itself, whose outputs are compared with the page.
+    """
     if error is not None or app.builder.format != "html":
         return
     profile = adhesis.self_affine_profile(0.8, period=2e-3, n0=2, ratio=12, seed=3, h_rms=1e-6)
@@ -95,11 +154,18 @@ def film(app: Any, error: Exception | None) -> None:
     method = adhesis.make_method("auto", problem)
     loop = adhesis.run_loop(method, max_penetration=0.8, load_steps=20)
     loop.film(Path(app.outdir, "film.html"), frames=60)
+    page = ROOT / "docs" / "tutorial.md"
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        wrong = transcripts.wrong(page, transcripts.lesson(page))
+        if wrong:
+            raise RuntimeError("\n".join(wrong))
+        shutil.copyfile("first_film.html", Path(app.outdir, "first_film.html"))
 
 
 def setup(app: Any) -> None:
-    """Connect the four."""
-    app.connect("build-finished", film)
+    """Connect them."""
+    app.add_directive("command", Command)
+    app.connect("build-finished", films)
     app.connect("source-read", start_page)
     app.connect("autodoc-process-docstring", plain, priority=400)  # ahead of napoleon
     app.connect("missing-reference", public_name)

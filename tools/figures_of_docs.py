@@ -72,6 +72,18 @@ PARTS = {
     "zero-range": Part(
         ("docs/figures/zero_range.py OUT/zero_range.png",), "zero_range.png", "figures"
     ),
+    "one-asperity": Part(
+        ("docs/figures/one_asperity.py OUT/one_asperity.png",), "one_asperity.png", "figures"
+    ),
+    "two-scales": Part(
+        ("docs/figures/two_scales.py OUT/two_scales.png",), "two_scales.png", "figures"
+    ),
+    "two-methods": Part(
+        ("docs/figures/two_methods.py OUT/two_methods.png",), "two_methods.png", "figures"
+    ),
+    "tutorial": Part(
+        ("-m tools.transcripts docs/tutorial.md --keep OUT",), "first_*.png", "figures"
+    ),
     "measured": Part(
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),
@@ -125,7 +137,7 @@ def source(name: str) -> str:
 def make(name: str, ranks: int) -> None:
     """Run the commands of a part and put what they made into docs/, stamped."""
     part = PARTS[name]
-    made = set()
+    made: set[Path] = set()
     with tempfile.TemporaryDirectory() as folder:
         for command in part.commands:
             words = command.replace("OUT", folder).split()

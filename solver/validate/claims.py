@@ -305,7 +305,7 @@ def controls(judge: Judge) -> Iterator[Row]:
         problem = replace(problem_of(wave), control=Control(stiffness))
         result = run_loop(
             judge.method(problem),
-            max_penetration=0.3 if stiffness else None,
+            max_penetration=0.1 if stiffness else None,
             max_stress=None if stiffness else 0.1 * p_star,
             load_steps=2,
         )

@@ -17,10 +17,12 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
+import adhesis
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.campaigns import run
 from adhesis.ensemble.command.main import COMMANDS, INTERRUPTED, TERMINATED, main, parser_of
 from adhesis.ensemble.run import launch
+from tools import transcripts
 
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [
@@ -80,6 +82,14 @@ NOT_RUN = {
     "test_precision.py asks four kinds of a thousand",
     '.venv/bin/pip install "SurfaceTopography>=1.27"': "needs a network",
     "python3 -m venv .venv && .venv/bin/pip install .": "needs a network; see check-package",
+    ". .venv/bin/activate": "the reader's shell",
+    "adhesis run big.toml --dry-run": "a minute of pilot loops; tests/ensemble/test_price.py",
+    "adhesis report big.h5 --to big": "a minute; tests/ensemble/test_report.py",
+    "sbatch --ntasks=33 --time=00:30:00 --mem-per-cpu=500M PATH/jobs/slurm.sh big.toml": (
+        "tests/ensemble/test_slurm.py"
+    ),
+    "sbatch --job-name=my --dependency=singleton --ntasks=64 --time=12:00:00 PATH/jobs/slurm.sh "
+    "my.toml": "as before",
 }
 # Blocks that are neither code nor commands, by how they begin.
 TEXT = {
@@ -92,6 +102,7 @@ TEXT = {
     "branch = Branch(": "pseudo-code",
 }
 PROGRAMS = (
+    ".",
     "adhesis",
     ".venv/bin/adhesis",
     "make",
@@ -145,15 +156,18 @@ def blocks(page: Path) -> Iterator[Block]:
     assert language is None, f"{page}: a fence is not closed"
 
 
-BLOCKS = [block for page in PAGES for block in blocks(page)]
-
-
 def is_text(block: Block) -> bool:
     return any(block.text.startswith(begin) for begin in TEXT)
 
 
 def is_transcript(block: Block) -> bool:
-    return block.text.startswith("$ ")
+    """Whether the block shows what it prints."""
+    return block.language in ("console", "pycon") or block.text.startswith("$ ")
+
+
+BLOCKS = [block for page in PAGES for block in blocks(page)]
+# Pages whose blocks run one after the other in one folder, and show what they print.
+LESSONS = sorted({block.page for block in BLOCKS if is_transcript(block)})
 
 
 def commands(block: Block) -> list[str]:
@@ -174,7 +188,8 @@ LINES = [(block, line) for block in COMMAND_BLOCKS for line in commands(block)]
 
 def test_every_block_is_of_a_kind_that_is_tested() -> None:
     # Directives in braces are for the site alone: `make docs` takes each warning for an error.
-    kinds = {"python", "toml", "", "bash", "sh", "{include}", "{toctree}", "{raw}"}
+    kinds = {"python", "toml", "", "bash", "sh", "console", "pycon", "bibtex"}
+    kinds |= {"{include}", "{toctree}", "{raw}", "{command}"}
     assert [block.name for block in BLOCKS if block.language.split(" ")[0] not in kinds] == []
     for block, line in LINES:
         word = line.split()[0]
@@ -190,7 +205,9 @@ def test_the_lists_of_what_is_not_run_are_up_to_date() -> None:
 
 
 @pytest.mark.parametrize(
-    "block", [b for b in BLOCKS if b.language == "python"], ids=lambda block: block.name
+    "block",
+    [b for b in BLOCKS if b.language == "python" and b.page not in LESSONS],
+    ids=lambda block: block.name,
 )
 def test_python_runs(block: Block, tmp_path: Path) -> None:
     done = subprocess.run(
@@ -225,13 +242,15 @@ def example() -> str:
     return block.text
 
 
+def wrong_example() -> str:
+    return re.sub(r"hurst = .*", "hurst = [0.8, 1.2]", example())
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the commands run: with the files that they name."""
     folder = tmp_path_factory.mktemp("docs")
     (folder / "my.toml").write_text(example())
-    wrong = re.sub(r"hurst = .*", "hurst = [0.8, 1.2]", example())
-    (folder / "wrong.toml").write_text(wrong)
     heights = "\n".join(f"{1e-6 * (-1) ** k / (1 + k % 7)}" for k in range(31))
     (folder / "heights.csv").write_text(heights)
     assert main(["run", str(folder / "my.toml"), "--out", str(folder / "my.h5")]) == 0
@@ -270,22 +289,56 @@ def test_commands_run(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) 
     assert main(words) == 0
 
 
-@pytest.mark.parametrize(
-    "block", [b for b in BLOCKS if is_transcript(b)], ids=lambda block: block.name
-)
-def test_transcripts_are_what_is_printed(
-    block: Block,
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize("page", LESSONS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_lessons_print_what_their_pages_show(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(folder)
-    line, _, reported = block.text.partition("\n")
-    words = adhesis_words(line.removeprefix("$ "))
-    assert words is not None
-    main(words)
-    printed = capsys.readouterr()
-    assert printed.out + printed.err == reported
+    (tmp_path / "wrong.toml").write_text(wrong_example())
+    monkeypatch.chdir(tmp_path)
+    pieces = list(transcripts.pieces(page.read_text()))
+    shown = sum(is_transcript(block) for block in BLOCKS if block.page == page)
+    assert len([p for p in pieces if p.kind in ("command", "session")]) >= shown
+    assert transcripts.wrong(page, transcripts.lesson(page)) == []
+
+
+SHOWN = "loss        0.0354151 J/m² in 28 jumps, residual 4.29e-06\nmethod      sharp, 1.2 s\n"
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "same"),
+    [
+        (SHOWN, SHOWN, True),
+        (SHOWN, SHOWN.replace("1.2 s", "71.0 s"), True),
+        (SHOWN, SHOWN.replace("1.2 s", "1 min 12 s"), True),
+        ("done in 2 s\n", "done in 1 h 2 min\n", True),
+        (SHOWN, SHOWN.replace("4.29e-06", "6.1e-06"), True),
+        (SHOWN, SHOWN.replace("4.29e-06", "6.1e-05"), False),
+        (SHOWN, SHOWN.replace("0.0354151", "0.0354152"), True),
+        (SHOWN, SHOWN.replace("0.0354151", "0.0354161"), False),
+        (SHOWN, SHOWN.replace("28", "29"), False),
+        (SHOWN, SHOWN.replace("jumps", "leaps"), False),
+        (SHOWN, SHOWN + "and more\n", False),
+        ("first\n…\nlast 1\n", "first\nany 3\nline\nlast 1\n", True),
+        ("first\n…\nlast 1\n", "first\nany 3\nline\nlast 2\n", False),
+        ("h_max 2.55e-06 m\n", "h_max 2.56e-06 m\n", True),
+        ("h_max 2.55e-06 m\n", "h_max 2.57e-06 m\n", False),
+    ],
+)
+def test_outputs_are_compared_number_by_number(shown: str, printed: str, same: bool) -> None:
+    assert (transcripts.differences(shown, printed) == []) == same
+
+
+def test_a_page_with_old_outputs_is_renewed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "page.md"
+    loop = ">>> for j in range(2):\n...     print(j + k)\n"
+    text = f"```pycon\n>>> k = 3\n{loop}OLD>>> 2 * k\n6\n```\n"
+    page.write_text(text.replace("OLD", "3\n5\n"))
+    monkeypatch.chdir(tmp_path)
+    done = transcripts.lesson(page)
+    assert len(transcripts.wrong(page, done)) == 1
+    assert transcripts.renewed(page, done) == text.replace("OLD", "3\n4\n")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -295,7 +348,7 @@ def test_commands_in_the_text_exist(page: Path) -> None:
         words = snippet.replace("[", " ").replace("]", " ").split()
         if "adhesis" in words[:-1]:
             name, *rest = words[words.index("adhesis") + 1 :]
-            if name in ("COMMAND", "--version"):
+            if name in ("COMMAND", "--version", "--help", "…"):
                 continue
             assert name in COMMANDS, snippet
             known = parser_of(name)._option_string_actions
@@ -312,6 +365,30 @@ def test_the_readme_lists_every_command() -> None:
     assert sorted(listed) == sorted(COMMANDS)
 
 
+def test_the_reference_of_commands_lists_every_command_and_no_other() -> None:
+    text = (ROOT / "docs" / "commands.md").read_text()
+    assert re.findall(r"^```{command} (\w+)$", text, re.MULTILINE) == list(COMMANDS)
+    assert re.findall(r"^## adhesis (\w+)$", text, re.MULTILINE) == list(COMMANDS)
+
+
+def test_the_entries_to_cite_are_those_of_the_citation_file() -> None:
+    cited = yaml_lines((ROOT / "CITATION.cff").read_text())
+    text = (ROOT / "docs" / "citing.md").read_text()
+    entries = next(b.text for b in blocks(ROOT / "docs" / "citing.md") if b.language == "bibtex")
+    for value in cited:
+        assert value in " ".join(entries.split()), value
+    assert f"version = {{{adhesis.__version__}}}" in entries
+    assert "CITATION.cff" in text
+
+
+def yaml_lines(text: str) -> list[str]:
+    """Return what of the citation file an entry has to hold."""
+    folded = re.sub(r"title: >-\n +", "title: ", text)
+    names = "title|family-names|given-names|journal|volume|year|doi"
+    found = re.findall(rf"^ +(?:- )?(?:{names}): (.*)$", folded, re.MULTILINE)
+    return [value.strip('"') for value in found]
+
+
 def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
     tables = {
         str(page.relative_to(ROOT)): {
@@ -321,7 +398,7 @@ def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
     }
     codes = {run.DONE, run.SOME_FAILED, run.BAD_INPUT, run.OUR_ERROR, run.WRITE_FAILED, run.RESUME}
     signals = {launch.KILLED, INTERRUPTED, TERMINATED}
-    assert tables.pop("README.md") == codes | signals
+    assert tables.pop("docs/troubleshooting.md") == codes | signals
     assert [name for name, reported in tables.items() if run.RESUME in reported] == []
 
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -115,7 +116,10 @@ def imported(path: Path) -> set[str]:
     return found
 
 
-IMPORTS = {name: imported(path) for name, path in PATHS.items()}
+@cache
+def imports() -> dict[str, set[str]]:
+    """Return what each module imports; every file is parsed once, and not while tests are found."""
+    return {name: imported(path) for name, path in PATHS.items()}
 
 
 def unit(module: str) -> str:
@@ -128,7 +132,7 @@ def unit(module: str) -> str:
 def units() -> dict[str, set[str]]:
     """Return what each unit imports of others."""
     arrows: dict[str, set[str]] = {}
-    for module, names in IMPORTS.items():
+    for module, names in imports().items():
         here = arrows.setdefault(unit(module), set())
         here |= {unit(name) for name in names if name in PATHS} - {unit(module)}
     return arrows
@@ -176,7 +180,7 @@ def test_a_folder_has_no_more_than_thirteen_modules(folder: str) -> None:
 
 
 def test_no_circle_of_modules() -> None:
-    assert circle({m: {n for n in names if n in PATHS} for m, names in IMPORTS.items()}) == []
+    assert circle({m: {n for n in names if n in PATHS} for m, names in imports().items()}) == []
 
 
 def test_no_circle_of_units() -> None:
@@ -184,7 +188,7 @@ def test_no_circle_of_units() -> None:
 
 
 def test_mechanics_know_nothing_of_campaigns_ranks_and_files() -> None:
-    for module, names in IMPORTS.items():
+    for module, names in imports().items():
         if module.startswith("adhesis.solver"):
             assert all(n.startswith("adhesis.solver") for n in names if n.startswith("adhesis"))
             found = {name.split(".")[0] for name in names} & NOT_IN_SOLVER
@@ -194,7 +198,7 @@ def test_mechanics_know_nothing_of_campaigns_ranks_and_files() -> None:
 def test_campaigns_know_the_public_modules_of_mechanics_alone() -> None:
     used = {
         name
-        for module, names in IMPORTS.items()
+        for module, names in imports().items()
         if module.startswith("adhesis.ensemble")
         for name in names
         if name.startswith("adhesis.solver")
@@ -206,7 +210,7 @@ def test_campaigns_know_the_public_modules_of_mechanics_alone() -> None:
 def test_what_is_slow_to_load_is_imported_by_few_modules(package: str) -> None:
     importers = {
         module
-        for module, names in IMPORTS.items()
+        for module, names in imports().items()
         if package in {name.split(".")[0] for name in names}
     }
     assert importers == IMPORTERS[package]

@@ -47,12 +47,10 @@ def rough_loop(profile: Profile, gamma: float = 2e-3, young: float = 1e6, **opti
 
 
 @pytest.mark.parametrize("alpha", ALPHAS)
-def test_loss_of_the_single_wave_is_exact_to_half_a_per_cent(alpha):
-    result = run_loop(wave_method(alpha, nodes=4096), max_penetration=0.4, load_steps=30)
-    exact = wave(alpha).loop.loss
-    assert result.loss == pytest.approx(exact, rel=5e-3)
-    assert result.loss_from_drops == pytest.approx(exact, rel=5e-3)
-    large = [j.kind for j in result.jumps if j.energy_drop > 0.01 * exact]
+def test_a_single_wave_has_two_large_jumps(alpha):
+    """Its losses are held to the closed form by ``adhesis validate``, in test_validate.py."""
+    result = run_loop(wave_method(alpha, nodes=1024), max_penetration=0.1, load_steps=2)
+    large = [j.kind for j in result.jumps if j.energy_drop > 0.01 * wave(alpha).loop.loss]
     assert large == ["snap-in", "pull-off"]
 
 
@@ -63,7 +61,7 @@ def test_drops_converge_to_the_exact_loss(alpha):
     errors = []
     for n in nodes.tolist():
         method = wave_method(alpha, nodes=n, accuracy=1e-4)
-        result = run_loop(method, max_penetration=0.2, load_steps=10)
+        result = run_loop(method, max_penetration=0.05, load_steps=1)
         errors.append(abs(result.loss_from_drops / exact - 1))
     order = -np.polyfit(np.log(nodes), np.log(errors), 1)[0]
     assert order > 1.2

@@ -31,23 +31,21 @@ def loop(profile, gamma, *, accuracy=1e-3, max_penetration=0.9, load_steps=20, s
     return run_loop(method, max_penetration=max_penetration, load_steps=load_steps)
 
 
-# ------------------------------------------------------------------ exact losses
+# ------------------------------------------------------------------ the single wave
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-def test_exact_losses_of_the_single_wave(alpha):
-    """Sum of drops to 1e-8 of the exact loss, loop integral to 1e-5; A q0 = 6e-5 is flat."""
-    amplitude, period = 1e-8, 1e-3
+def test_a_single_wave_jumps_twice_where_the_closed_form_does(alpha):
+    """Its losses are held to the closed form by ``adhesis validate``, in test_validate.py."""
+    amplitude, period = 1e-8, 1e-3  # A q0 = 6e-5 is flat
     exact = SingleWave.with_alpha(alpha, amplitude, period, HALF_SPACE.modulus)
     result = loop(
         single_wave(amplitude, period),
         exact.work_of_adhesion,
-        accuracy=1e-8,
-        max_penetration=0.5,
-        load_steps=10,
+        accuracy=1e-5,
+        max_penetration=0.1,
+        load_steps=2,
     )
-    assert abs(result.loss_from_drops / exact.loop.loss - 1) < 1e-8
-    assert abs(result.loss / exact.loop.loss - 1) < 1e-5
     assert [j.kind for j in result.jumps] == ["snap-in", "pull-off"]
     assert result.jumps[0].separation == pytest.approx(amplitude, rel=1e-12)
     assert result.jumps[1].separation == pytest.approx(exact.loop.fold_separation, rel=1e-8)

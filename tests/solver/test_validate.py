@@ -35,7 +35,7 @@ def judged(monkeypatch):
 
 
 def exact(problem: Problem) -> ExactWave:
-    return ExactWave(problem, states_per_step=32)
+    return ExactWave(problem, states_per_step=64)  # 1e-5 of the loop integral
 
 
 def failed(rows: dict[str, Row]) -> str:

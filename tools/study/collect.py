@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ NUMBERS = (
 COLUMNS = (
     *("campaign", "hurst", "work_of_adhesion", "realisation", *AXES, "status", *NUMBERS),
     *("jump_count", "stress_at_turn", "contact_at_turn", "loss_curve", "loss_curve_above"),
+    "patches_at_turn",
 )
 JUMP_COLUMNS = ("hurst", "realisation", "branch", "kind", "energy_drop", "area")
 # Of the jumps only those of one campaign, γ and turning point are kept.
@@ -28,20 +30,37 @@ JUMPS_OF = ("turns", 0.04, 0.9)
 
 
 def collect_all(folder: Path, study: Path) -> None:
-    """Write loops.csv and jumps.csv from the results files ``NAME.h5`` of the campaigns."""
+    """Write loops.csv and jumps.csv from the results files ``NAME.h5`` of the campaigns.
+
+    A campaign without a results file keeps its rows.
+    """
+    kept = _rows_by_campaign(study / "loops.csv")
     loops: list[list[str]] = []
-    jumps: list[list[str]] = []
+    jumps: list[list[str]] | None = None
     for campaign in sorted((study / "campaigns").glob("*.toml")):
         path = folder / f"{campaign.stem}.h5"
         if not path.exists():
-            print(f"{path} is not there: left out")
+            rows = kept.get(campaign.stem, [])
+            print(f"{path} does not exist: {len(rows)} rows of {campaign.stem} are kept")
+            loops += rows
             continue
         with Results(path) as results:
             loops += _loops(campaign.stem, results)
             if campaign.stem == JUMPS_OF[0]:
-                jumps += _jumps(results)
+                jumps = _jumps(results)
     _write(study / "loops.csv", COLUMNS, loops)
-    _write(study / "jumps.csv", JUMP_COLUMNS, jumps)
+    if jumps is not None:
+        _write(study / "jumps.csv", JUMP_COLUMNS, jumps)
+
+
+def _rows_by_campaign(path: Path) -> dict[str, list[list[str]]]:
+    """Rows of an earlier table by campaign; columns that it lacks are empty."""
+    rows: dict[str, list[list[str]]] = {}
+    if path.exists():
+        with path.open(encoding="utf-8") as stream:
+            for row in csv.DictReader(stream):
+                rows.setdefault(row["campaign"], []).append([row.get(n, "") for n in COLUMNS])
+    return rows
 
 
 def _loops(name: str, results: Results) -> list[list[str]]:
@@ -54,7 +73,7 @@ def _loops(name: str, results: Results) -> list[list[str]]:
     curves = {
         key: results.column(key)
         for branch in BRANCHES
-        for key in (f"{branch}_mean_stress", f"{branch}_contact_fraction")
+        for key in (f"{branch}_mean_stress", f"{branch}_contact_fraction", f"{branch}_patches")
     }
     rows = []
     for row in np.flatnonzero((status == DONE) | (status == FAILED)).tolist():
@@ -82,10 +101,13 @@ def _loops(name: str, results: Results) -> list[list[str]]:
 def _turn(
     results: Results, task: Any, curve: dict[str, Any], column: dict[str, Any], row: int
 ) -> list[Any]:
-    """State at the turning point, and W~ by the stored curves: all of it, and where Δ ≥ 0."""
+    """State at the turning point, and W~ by the stored curves: of the loop, and where Δ ≥ 0.
+
+    The last value is the number of patches at the turning point.
+    """
     campaign = results.campaign
     if campaign.at(task).cycle.under_load:
-        return [campaign.at(task).cycle.max_stress, None, None, None]
+        return [campaign.at(task).cycle.max_stress, None, None, None, None]
     unit = campaign.penetration_unit(task)
     down = unit * campaign.unloading_penetration
     load, unload = curve["loading_mean_stress"], curve["unloading_mean_stress"]
@@ -100,7 +122,8 @@ def _turn(
     x = np.append(0.0, down[:last][::-1])
     y = np.append(np.interp(0.0, down[::-1], unload[::-1]), unload[:last][::-1])
     above = gained - np.trapezoid(y, x) / scale
-    return [load[-1], curve["loading_contact_fraction"][-1], whole, above]
+    contact, patches = curve["loading_contact_fraction"][-1], curve["loading_patches"][-1]
+    return [load[-1], contact, whole, above, patches]
 
 
 def _jumps(results: Results) -> list[list[str]]:

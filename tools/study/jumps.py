@@ -15,6 +15,8 @@ from scipy.stats import norm
 from tools.study.data import Array, Rows
 
 FEWEST = 50  # jumps above x_min
+# Decades below the largest jump over which a power law with a cut-off is fitted.
+ENERGY_DECADES, AREA_DECADES = 4.0, 2.5
 CANDIDATES = 60
 RESAMPLES, SEED = 100, 7
 
@@ -132,6 +134,8 @@ class CutPowerLaw:
         Jumps above ``smallest``, and all.
     distance : float
         Of Kolmogorov and Smirnov.
+    drawn : array, shape (resamples, 2)
+        Exponent and cut of each resample.
     """
 
     exponent: float
@@ -142,6 +146,7 @@ class CutPowerLaw:
     n: int
     of: int
     distance: float
+    drawn: Array
 
 
 _NODES = 400
@@ -187,18 +192,25 @@ def cut_power_law(rows: Rows, name: str, decades: float) -> CutPowerLaw:
         fit_cut(
             np.concatenate([groups[k] for k in rng.integers(len(groups), size=len(groups))]),
             smallest,
-        )[0]
+        )
         for _ in range(RESAMPLES)
     ]
-    low, high = np.quantile(drawn, [0.025, 0.975])
-    x, weights = _grid(smallest, cut)
-    density = weights * x**-exponent * np.exp(-x / cut)
-    law = np.interp(tail, x, (np.cumsum(density) - 0.5 * density) / density.sum())
+    low, high = np.quantile([a for a, _ in drawn], [0.025, 0.975])
+    law = 1 - share_above(tail, smallest, exponent, cut)
     n = tail.size
     distance = max((np.arange(1, n + 1) / n - law).max(), (law - np.arange(n) / n).max())
     return CutPowerLaw(
-        exponent, float(low), float(high), cut, smallest, n, values.size, float(distance)
+        *(exponent, float(low), float(high), cut, smallest, n, values.size, float(distance)),
+        np.array(drawn),
     )
+
+
+def share_above(x: Array, smallest: float, exponent: float, cut: float) -> Array:
+    """Share of the jumps above ``smallest`` that are larger than ``x``, by the law."""
+    places, weights = _grid(smallest, cut)
+    density = weights * places**-exponent * np.exp(-places / cut)
+    below = np.interp(x, places, (np.cumsum(density) - 0.5 * density) / density.sum())
+    return np.asarray(1 - below)
 
 
 def _against_lognormal(tail: Array, exponent: float) -> float:

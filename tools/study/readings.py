@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 
 import numpy as np
-from scipy.stats import multivariate_normal
 
 from adhesis.ensemble.report.paper import M2, TABLE_1
 from tools.study.data import Array, Study
@@ -27,9 +26,20 @@ Cell = tuple[float, float]
 Series = dict[int, float]
 
 
+# Table 1 with its two largest values exchanged (a hint that was found afterwards).
+TRANSPOSED = {**TABLE_1, (0.7, 0.07): TABLE_1[0.8, 0.07], (0.8, 0.07): TABLE_1[0.7, 0.07]}
+FACTORS = ("none", "one", "one a row")
+
+
+@cache
+def _normals(values: int, draws: int) -> Array:
+    """Draws that all readings of as many values share."""
+    return np.random.default_rng(SEED).standard_normal((values, draws))
+
+
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One reading, held against the paper.
+    """One reading, compared with the paper.
 
     Attributes
     ----------
@@ -38,11 +48,21 @@ class Reading:
         Of the paper's, those that were computed.
     losses : array, shape (cells, realisations)
         W~; NaN where a cell lacks a realisation.
+    paper : dict
+        Loss of each (H, γ).
+    factors : str
+        Free factors of the unit of the loss, one of FACTORS; fitted by generalised least squares.
+    shared : float
+        Share of the covariance between cells that is kept: the paper may have used one set of
+        profiles for all cells, or another set for each (0).
     """
 
     name: str
     cells: tuple[Cell, ...]
     losses: Array
+    paper: dict[Cell, float] = field(default_factory=lambda: TABLE_1)
+    factors: str = "none"
+    shared: float = OFF_DIAGONAL
 
     @property
     def realisations(self) -> int:
@@ -57,12 +77,12 @@ class Reading:
     @cached_property
     def deviation(self) -> Array:
         """ln(paper/mean) of each cell."""
-        paper = np.array([TABLE_1[cell] for cell in self.cells])
+        paper = np.array([self.paper[cell] for cell in self.cells])
         return np.asarray(np.log(paper / self.means))
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the deviation, were the reading right."""
+        """Covariance of the deviation of a right reading."""
         away = self.losses / self.means[:, None] - 1
         there = np.isfinite(away)
         filled = np.where(there, away, 0.0)
@@ -70,7 +90,7 @@ class Reading:
         shared = count @ count.T
         # over the realisations that two cells share, about the means of all that each has
         relative = (filled @ filled.T) / np.maximum(shared - 1, 1)
-        shrunk = OFF_DIAGONAL * relative + (1 - OFF_DIAGONAL) * np.diag(np.diag(relative))
+        shrunk = self.shared * relative + (1 - self.shared) * np.diag(np.diag(relative))
         own = np.diag(shared)
         found = shrunk * (1 / OF_PAPER + shared / np.outer(own, own))
         spread = np.sqrt(np.diag(found))
@@ -80,26 +100,51 @@ class Reading:
         return np.asarray(sound * np.outer(spread, spread))
 
     @cached_property
+    def _design(self) -> Array:
+        """Which logarithm of a factor each cell has, shape (cells, factors)."""
+        if self.factors == "one":
+            return np.ones((len(self.cells), 1))
+        if self.factors == "one a row":
+            hursts = sorted({hurst for hurst, _ in self.cells})
+            return np.array([[float(hurst == h) for h in hursts] for hurst, _ in self.cells])
+        return np.zeros((len(self.cells), 0))
+
+    @cached_property
+    def _fit(self) -> Array:
+        """Matrix from deviations to logarithms of the factors."""
+        weighted = np.linalg.solve(self.covariance, self._design).T
+        return np.asarray(np.linalg.solve(weighted @ self._design, weighted))
+
+    @cached_property
+    def fitted(self) -> Array:
+        """Factors of the computed losses, in the order of their H."""
+        return np.asarray(np.exp(self._fit @ self.deviation))
+
+    @cached_property
+    def _left(self) -> Array:
+        """Matrix from deviations to those that the factors leave."""
+        return np.asarray(np.eye(len(self.cells)) - self._design @ self._fit)
+
+    @cached_property
+    def _spread(self) -> Array:
+        """Standard deviation of what the factors leave."""
+        return np.asarray(np.sqrt(np.diag(self._left @ self.covariance @ self._left.T)))
+
+    @cached_property
     def z(self) -> Array:
-        """Deviation over its standard deviation."""
-        return np.asarray(self.deviation / np.sqrt(np.diag(self.covariance)))
+        """Deviation over its standard deviation, fitted factors taken out."""
+        return np.asarray(self._left @ self.deviation / self._spread)
 
     @cached_property
     def p(self) -> float:
-        """Probability of a largest |z| as large, were the reading right."""
+        """Probability that a right reading has a largest |z| as large."""
         if np.abs(self.z).max() > FAR:
             return 0.0  # below one over the number of draws in any case
         spread = np.sqrt(np.diag(self.covariance))
-        rng = np.random.default_rng(SEED)
         factor = np.linalg.cholesky(self.covariance / np.outer(spread, spread))
-        drawn = factor @ rng.standard_normal((len(self.cells), DRAWS))
-        return float(np.mean(np.abs(drawn).max(axis=0) >= np.abs(self.z).max()))
-
-    @cached_property
-    def log_likelihood(self) -> float:
-        """Of the paper's values."""
-        law = multivariate_normal(np.zeros(len(self.cells)), self.covariance)
-        return float(law.logpdf(self.deviation))
+        of_draw = (self._left * spread) @ factor / self._spread[:, None]
+        z = of_draw @ _normals(len(self.cells), DRAWS)
+        return float(np.mean(np.abs(z).max(axis=0) >= np.abs(self.z).max()))
 
     @property
     def worst(self) -> Cell:
@@ -248,18 +293,23 @@ def readings(study: Study) -> Iterator[Reading]:
 
 def _between(along: dict[float, Series], turn: float) -> Series:
     """A series at a turning point between those computed, straight lines between them."""
-    return _at_turns(along, lambda r: turn)
+    return at_turns(along, lambda r: turn)
 
 
-def _at_turns(along: dict[float, Series], turn_of: Callable[[int], float]) -> Series:
-    """W~ of each realisation at a turning point of its own; none further than 0.05 outside."""
+def at_turns(
+    along: dict[float, Series], turn_of: Callable[[int], float], beyond: float = 0.05
+) -> Series:
+    """W~ of each realisation at a turning point of its own, none further outside than ``beyond``.
+
+    Straight lines between the turning points that were computed.
+    """
     turns = sorted(along)
     if len(turns) < 2:
         return {}
     found: Series = {}
     for r in set.intersection(*(set(one) for one in along.values())):
         turn = turn_of(r)
-        if not turns[0] - 0.05 <= turn <= turns[-1] + 0.05:
+        if not turns[0] - beyond <= turn <= turns[-1] + beyond:
             continue
         k = int(np.clip(np.searchsorted(turns, turn), 1, len(turns) - 1))
         share = (turn - turns[k - 1]) / (turns[k] - turns[k - 1])
@@ -273,7 +323,7 @@ def _other_turning_points(study: Study, losses: Losses) -> Iterator[Reading]:
 
         def at_separation(hurst: float, gamma: float, s: float = s) -> Series:
             h_max = losses.direct("h_max", hurst, 0.04, 0.8, 100)
-            return _at_turns(losses.along(hurst, gamma), lambda r: 1 - s / h_max.get(r, np.nan))
+            return at_turns(losses.along(hurst, gamma), lambda r: 1 - s / h_max.get(r, np.nan))
 
         reading = _reading(f"common separation {1e6 * s:.1f} µm", at_separation)
         if reading is not None:
@@ -291,7 +341,7 @@ def _other_turning_points(study: Study, losses: Losses) -> Iterator[Reading]:
                 inside = values[0] <= contact <= values[-1]
                 return float(np.interp(contact, values, turns)) if inside else np.nan
 
-            return _at_turns(losses.along(hurst, gamma), turn_of)
+            return at_turns(losses.along(hurst, gamma), turn_of)
 
         reading = _reading(f"common contact fraction {contact:.2f}", at_contact)
         if reading is not None:

@@ -2,38 +2,54 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
-from adhesis.ensemble.report.paper import TABLE_1
-from tools.study.data import Study, aligned
-from tools.study.readings import OF_PAPER, Losses, Reading, readings
-from tools.study.text import Table, mean_text
+from adhesis.ensemble.report.paper import M2, TABLE_1
+from tools.study.data import Array, Study, aligned
+from tools.study.readings import OF_PAPER, TRANSPOSED, Losses, Reading, readings
+from tools.study.text import Table, mean_text, p_text
+
+READING_HEADER = [
+    *("reading", "n", *(f"{h:g}, {g:g}" for h, g in TABLE_1)),
+    *("largest \\|z\\|", "p", "p, other profiles in each cell", "verdict"),
+]
 
 
 def _reading_row(reading: Reading) -> list[str]:
     means = dict(zip(reading.cells, reading.means, strict=True))
     reported = [f"{means[cell]:.3g}" if cell in means else "" for cell in TABLE_1]
-    p = "< 1e-5" if reading.p < 1e-5 else f"{reading.p:.2g}"
     hurst, gamma = reading.worst
     return [
         *(reading.name, f"{reading.realisations}", *reported),
-        *(f"{np.abs(reading.z).max():.1f} at {hurst:g}, {gamma:g}", p),
-        *(f"{reading.log_likelihood:.0f}", reading.verdict),
+        f"{np.abs(reading.z).max():.1f} at {hurst:g}, {gamma:g}",
+        *(p_text(reading.p), p_text(replace(reading, shared=0.0).p), reading.verdict),
     ]
-
-
-READING_HEADER = [
-    *("reading", "n", *(f"{h:g}, {g:g}" for h, g in TABLE_1)),
-    *("largest \\|z\\|", "p", "ln L", "verdict"),
-]
 
 
 @cache
 def every_reading(study: Study) -> tuple[Reading, ...]:
-    """All readings, worked out once."""
+    """All readings, computed once."""
     return tuple(readings(study))
+
+
+def complete(every: Iterable[Reading]) -> list[Reading]:
+    """Those that have all values of the paper: only they are ranked."""
+    return [reading for reading in every if len(reading.cells) == len(TABLE_1)]
+
+
+def best_of(every: Iterable[Reading]) -> Reading:
+    """The reading with the largest p, of equals that with the smallest largest |z|."""
+    return max(every, key=lambda reading: (reading.p, -np.abs(reading.z).max()))
+
+
+def is_main(reading: Reading) -> bool:
+    """Whether a reading is of the whole loop, in scales of each profile's own h_max."""
+    return "≥" not in reading.name and " h_max" not in reading.name
 
 
 def all_readings(study: Study) -> Table:
@@ -46,7 +62,102 @@ def all_readings(study: Study) -> Table:
 def main_readings(study: Study) -> Table:
     """Those of the whole loop with own h_max."""
     header, rows = all_readings(study)
-    return header, [row for row in rows if "≥" not in row[0] and " h_max" not in row[0]]
+    names = {reading.name for reading in every_reading(study) if is_main(reading)}
+    return header, [row for row in rows if row[0] in {"paper", *names}]
+
+
+def reach(study: Study) -> Table:
+    """Smallest and largest mean of each cell over all readings, beside the paper's value."""
+    every = every_reading(study)
+    worst = Counter(reading.worst for reading in every)
+    rows = []
+    for cell, paper in TABLE_1.items():
+        found = [(float(r.means[r.cells.index(cell)]), r.name) for r in every if cell in r.cells]
+        # a reading with few values may still have a large mean
+        least, most = min(found), max(found)
+        values = [f"{paper:g}", f"{least[0]:.3g}", f"{most[0]:.3g}"]
+        over = f"{100 * (paper / most[0] - 1):+.0f} %"
+        rows.append([f"{cell[1]:g}", f"{cell[0]:g}", *values, most[1], over, f"{worst[cell]}"])
+    header = ["γ (J/m²)", "H", "paper", "smallest mean", "largest mean", "reading of the largest"]
+    return [*header, "paper against the largest", "readings with the largest \\|z\\| here"], rows
+
+
+# Seen afterwards: (what is varied, paper's values, free factors, exponent of m2 in the unit)
+VARIANTS: tuple[tuple[str, dict[tuple[float, float], float], str, float], ...] = (
+    ("as decided", TABLE_1, "none", 0.0),
+    ("one free factor for the unit of the loss", TABLE_1, "one", 0.0),
+    ("one free factor a row of the table", TABLE_1, "one a row", 0.0),
+    ("one free factor times √m2", TABLE_1, "one", 0.5),
+    ("42.83 and 49.25 exchanged", TRANSPOSED, "none", 0.0),
+    ("exchanged, one free factor", TRANSPOSED, "one", 0.0),
+    ("exchanged, one free factor a row", TRANSPOSED, "one a row", 0.0),
+    ("exchanged, one free factor times √m2", TRANSPOSED, "one", 0.5),
+)
+
+
+def variant(
+    reading: Reading, paper: dict[tuple[float, float], float], factors: str, power: float
+) -> Reading:
+    """One reading with other values of the paper, free factors, or losses times a power of m2."""
+    scale = np.array([M2[hurst] ** power for hurst, _ in reading.cells])
+    losses = reading.losses * scale[:, None] / np.mean([m2**power for m2 in M2.values()])
+    return replace(reading, paper=paper, factors=factors, losses=losses)
+
+
+def variants(study: Study) -> Table:
+    """Readings with a free unit of the loss, and with two values exchanged (seen afterwards)."""
+    every = [reading for reading in complete(every_reading(study)) if is_main(reading)]
+    rows = []
+    for name, paper, factors, power in VARIANTS:
+        changed = [variant(reading, paper, factors, power) for reading in every]
+        verdicts = Counter(reading.verdict for reading in changed)
+        best = best_of(changed)
+        fitted = ", ".join(f"{factor:.2f}" for factor in best.fitted)
+        counts = [f"{verdicts[v]}" for v in ("compatible", "doubtful", "excluded")]
+        largest = f"{np.abs(best.z).max():.1f} at {best.worst[0]:g}, {best.worst[1]:g}"
+        rows.append([name, *counts, best.name, fitted, largest, p_text(best.p)])
+    header = ["changed", "compatible", "doubtful", "excluded", "best", "its factors"]
+    return [*header, "its largest \\|z\\|", "its p"], rows
+
+
+def factors_of_rows(study: Study) -> Table:
+    """The factor that each row of the paper's table asks for, at some turning points."""
+    rows = []
+    for reading in every_reading(study):
+        if reading.name in {f"h_rms, N = 100, Δ~max = {turn:g}" for turn in (0.6, 0.7, 0.8, 0.9)}:
+            free = replace(reading, factors="one a row")
+            exchanged = replace(free, paper=TRANSPOSED)
+            values = [f"{f:.2f}" for f in (*free.fitted, *exchanged.fitted)]
+            largest = [f"{np.abs(r.z).max():.1f} at {r.worst[0]:g}, {r.worst[1]:g}"
+                       for r in (free, exchanged)]  # fmt: skip
+            rows.append([reading.name.split(", ")[-1], *values[:3], largest[0],
+                         *values[3:], largest[1]])  # fmt: skip
+    hursts = [f"H = {hurst:g}" for hurst in sorted(M2)]
+    largest_z = "largest \\|z\\|"
+    return ["turning point", *hursts, largest_z, *(f"{h}, exchanged" for h in hursts),
+            f"{largest_z}, exchanged"], rows  # fmt: skip
+
+
+def caption_bounds(study: Study) -> Table:
+    """What the separations of the paper's Fig. 3 say of the turning point, in three units."""
+    rows = []
+    h_max = np.array(list(Losses(study).direct("h_max", 0.8, 0.01, 0.8, 100).values()))
+    for unit, scale in (("0.01 h_max", None), ("0.01 µm", 1e-8), ("nm", 1e-9), ("µm", 1e-6)):
+        reported = [f"92, 51, 20 {unit}"]
+        for s in (92, 51, 20):
+            turns = 1 - s * 0.01 * np.ones_like(h_max) if scale is None else 1 - s * scale / h_max
+            reported.append(mean_of_turns(turns))
+        rows.append(reported)
+    return ["separations read as", *(f"Δ~ of {s}" for s in (92, 51, 20))], rows
+
+
+def mean_of_turns(turns: Array) -> str:
+    """Mean of a turning point over profiles, with its range."""
+    if turns.max() < 0:
+        return f"{turns.mean():.1f}: apart"
+    if np.ptp(turns) < 1e-12:
+        return f"{turns[0]:.2f}"
+    return f"{turns.mean():.3f} ({turns.min():.3f} … {turns.max():.3f})"
 
 
 STRONG = tuple(cell for cell in TABLE_1 if cell[1] >= 0.04)
@@ -61,7 +172,7 @@ def without(study: Study) -> Table:
     for cells in left_out:
         kept = tuple(cell for cell in STRONG if cell not in cells)
         cut = [Reading(r.name, kept, r.losses[[r.cells.index(c) for c in kept]]) for r in every]
-        best = max(cut, key=lambda r: (r.p, -np.abs(r.z).max()))
+        best = best_of(cut)
         count = sum(r.verdict == "compatible" for r in cut)
         rows.append(
             [
@@ -69,7 +180,7 @@ def without(study: Study) -> Table:
                 or "none of them",
                 f"{count} of {len(cut)}",
                 best.name,
-                "< 1e-5" if best.p < 1e-5 else f"{best.p:.2g}",
+                p_text(best.p),
                 f"{np.abs(best.z).max():.1f}",
             ]
         )

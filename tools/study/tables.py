@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 from adhesis.ensemble.interval import interval
-from tools.study import jumps, monotone
-from tools.study.data import Study, aligned
-from tools.study.table1 import cells, main_readings, stress, tens, under_load, without
-from tools.study.text import Table, mean_text, ratio_text
+from tools.study import amplitude, jumps, monotone
+from tools.study.data import Array, Study, aligned
+from tools.study.readings import Losses, at_turns
+from tools.study.table1 import (
+    caption_bounds,
+    cells,
+    factors_of_rows,
+    main_readings,
+    reach,
+    stress,
+    tens,
+    under_load,
+    variants,
+    without,
+)
+from tools.study.text import Table, change_text, mean_text, p_text, ratio_text
 
 
 def campaigns(study: Study) -> Table:
@@ -44,7 +58,7 @@ def campaigns(study: Study) -> Table:
 
 def monotony(study: Study) -> Table:
     """Paired differences between neighbouring H."""
-    return _told(monotone.rows(study))
+    return _row_table(monotone.rows(study))
 
 
 def around(study: Study) -> Table:
@@ -53,33 +67,161 @@ def around(study: Study) -> Table:
     header, rows = [], []
     for profiles, campaigns in both:
         found = [monotone.around(study, name, campaigns) for name in monotone.QUANTITIES]
-        header, reported = _told([row for row in found if row is not None])
+        header, reported = _row_table([row for row in found if row is not None])
         rows += [[profiles, *row[2:]] for row in reported]
     return ["profiles", *header[2:]], rows
 
 
-def _told(found: Iterable[monotone.Row]) -> Table:
+LOSSES = {"loss_dimensionless": "W~", "loss": "J/m²"}
+
+
+def steps_text(row: monotone.Row) -> str:
+    """The steps of a row."""
+    return "; ".join(
+        f"{step.ends[0]:.3g} → {step.ends[1]:.3g}: "
+        f"{change_text(step.difference, step.low, step.high)}, p = {p_text(step.p, 1e-99)}"
+        for step in row.steps
+    )
+
+
+def _row_table(found: Iterable[monotone.Row]) -> Table:
     rows = []
     for row in found:
-        steps = [
-            f"{step.hursts[0]:g} → {step.hursts[1]:g}: {100 * step.difference:+.0f} % "
-            f"({100 * step.low:+.0f} … {100 * step.high:+.0f})"
-            f", p = {min(step.p_rise, step.p_fall):.2g}"
-            for step in row.steps
-        ]
-        name = "W~" if row.quantity == "loss_dimensionless" else "J/m²"
+        place = [f"{row.gamma:g}", f"{row.turn:g}", LOSSES[row.quantity]]
         n = min(step.n for step in row.steps)
-        rows.append(
-            [f"{row.gamma:g}", f"{row.turn:g}", name, f"{n}", "; ".join(steps), row.verdict]
-        )
-    return [
-        "γ (J/m²)",
-        "Δ~max",
-        "loss",
-        "n",
-        "change from one H to the next lower",
-        "verdict",
-    ], rows
+        rows.append([*place, f"{n}", steps_text(row), row.verdict])
+    header = ["γ (J/m²)", "Δ~max", "loss", "n", "change from one H to the next lower", "verdict"]
+    return header, rows
+
+
+def _column(study: Study, hurst: float, turn: float, name: str, height: float) -> Array:
+    return np.array(list(amplitude.series(study, hurst, turn, name).get(height, {}).values()))
+
+
+def amplitudes(study: Study) -> Table:
+    """Loss, shares and contact against the amplitude at γ = 0.04 J/m²."""
+    rows = []
+    for turn in amplitude.TURNS:
+        for hurst in amplitude.HURSTS:
+            for height in amplitude.series(study, hurst, turn, "loss"):
+                column = partial(_column, study, hurst, turn, height=height)
+                loss = column("loss")
+                patches = column("patches_at_turn")
+                rows.append(
+                    [
+                        *(f"{turn:g}", f"{hurst:g}", f"{height:.3g}"),
+                        *(f"{column('m2')[0]:.2g}", f"{loss.size}"),
+                        mean_text(loss, 1e-3),
+                        mean_text(loss, amplitude.GAMMA),
+                        mean_text(column("loss_dimensionless")),
+                        mean_text(column("share"), 0.01),
+                        mean_text(patches) if patches.size else "",
+                        mean_text(column("largest_contact_fraction")),
+                    ]
+                )
+    header = ["Δ~max", "H", "h_rms (µm)", "m2", "n", "loss (mJ/m²)", "loss/γ", "W~"]
+    return [*header, "small scale (%)", "patches at the turning point", "largest A/A0"], rows
+
+
+def maxima(study: Study) -> Table:
+    """Amplitude at which the loss in J/m² is largest."""
+    rows = []
+    for turn in amplitude.TURNS:
+        for hurst in amplitude.HURSTS:
+            found = amplitude.maximum(study, hurst, turn)
+            if found is None:
+                continue
+            at_end = f"{100 * found.at_end:.0f} %"
+            unit = next(iter(amplitude.series(study, hurst, turn, "m2").items()))
+            slope = next(iter(unit[1].values())) / unit[0] ** 2
+            ends = [found.height, found.low, found.high]
+            heights = [
+                "{:.2f} ({:.2f} … {:.2f})".format(*(h * np.sqrt(gamma / 0.04) for h in ends))
+                for gamma in (0.01, 0.04, 0.07)
+            ]
+            m2 = "{:.2g} ({:.2g} … {:.2g})".format(*(slope * h**2 for h in ends))
+            loss = f"{found.loss:.3g} ({found.loss_low:.3g} … {found.loss_high:.3g})"
+            rows.append([f"{turn:g}", f"{hurst:g}", *heights, m2, loss, at_end])
+    header = ["Δ~max", "H", *(f"h_rms (µm), γ = {gamma:g}" for gamma in (0.01, 0.04, 0.07))]
+    return [*header, "m2, γ = 0.04", "loss/γ there", "resamples with the maximum at an end"], rows
+
+
+def through_amplitude(study: Study) -> Table:
+    """Steps along the amplitude, at every γ."""
+    rows = []
+    for name in monotone.QUANTITIES[::-1]:
+        for hurst, row in amplitude.rows(study, name):
+            rows.append(
+                [
+                    *(LOSSES[name], f"{row.turn:g}", f"{hurst:g}"),
+                    *(steps_text(row), row.verdict, p_of_verdict(row)),
+                ]
+            )
+    header = ["loss", "Δ~max", "H", "change from one h (µm) to the next larger", "verdict", "p"]
+    return header, rows
+
+
+def p_of_verdict(row: monotone.Row) -> str:
+    """Error probability of a verdict; of an open row that of either."""
+    one, other = p_text(row.p_not_monotone, 1e-99), p_text(row.p_monotone, 1e-99)
+    if row.verdict == "open":
+        return f"not monotone {one}, monotone {other}"
+    return one if row.verdict == "not monotone" else other
+
+
+def through_hurst(study: Study) -> Table:
+    """Steps along H, at every amplitude."""
+    rows = []
+    for name in monotone.QUANTITIES[::-1]:
+        for height, row in amplitude.rows_along_hurst(study, name):
+            n = min(step.n for step in row.steps)
+            rows.append(
+                [
+                    *(LOSSES[name], f"{row.turn:g}", f"{height:.3g}", f"{n}"),
+                    *(steps_text(row), row.verdict, p_of_verdict(row)),
+                ]
+            )
+    header = ["loss", "Δ~max", "h at γ = 0.04 (µm)", "n", "change from one H to the next lower"]
+    return [*header, "verdict", "p"], rows
+
+
+def answer(study: Study) -> Table:
+    """Whether the loss in J/m² is monotone in m2, at the paper's γ and each turning point."""
+    along = {(row.turn, hurst): row for hurst, row in amplitude.rows(study, "loss")}
+    across = {(row.turn, height): row for height, row in amplitude.rows_along_hurst(study, "loss")}
+    rows = []
+    for gamma, height in amplitude.OF_PAPER.items():
+        for turn in amplitude.TURNS:
+            row = across.get((turn, height))
+            if row is None:  # not in the amplitude campaigns: as decided first
+                first = monotone.series(study, gamma, turn, "loss", monotone.FIRST)
+                row = monotone.row_of(gamma, turn, "loss", first)
+            n = min(step.n for step in row.steps)
+            ups = [along.get((turn, hurst)) for hurst in amplitude.HURSTS]
+            verdicts = Counter(one.verdict for one in ups if one)
+            p = max(one.p_not_monotone for one in ups if one)
+            rows.append(
+                [
+                    *(f"{gamma:g}", f"{turn:g}"),
+                    ", ".join(f"{verdict} ({k} of 3 H)" for verdict, k in verdicts.items()),
+                    p_text(p, 1e-99),
+                    *(row.verdict, p_of_verdict(row), f"{n}"),
+                ]
+            )
+    header = ["γ (J/m²)", "Δ~max", "through amplitude", "p of the least certain H"]
+    return [*header, "through H at h_rms = 1 µm", "p", "n"], rows
+
+
+def scaling(study: Study) -> Table:
+    """Loops at an equivalent work of adhesion against those of higher or lower profiles."""
+    rows = []
+    for one in amplitude.scaling(study):
+        place = f"{one.height:.3g}", f"{one.gamma:g}", f"{one.turn:g}", f"{one.pairs}"
+        differences = f"{100 * one.mean:+.2f} %", f"{100 * one.largest:.2f} %"
+        rows.append([*place, *differences, f"{100 * one.slope:.2f} %", f"{100 * one.error:.2f} %"])
+    header = ["h_rms at γ = 0.04 J/m² (µm)", "compared with 1 µm at γ =", "Δ~max", "pairs of loops"]
+    header += ["mean difference of W~", "largest", "half the difference of m2 (largest)"]
+    return [*header, "sum of the estimated errors (largest)"], rows
 
 
 def mechanisms(study: Study) -> Table:
@@ -168,7 +310,7 @@ def power_laws(study: Study) -> Table:
                     f"{law.smallest:.2g} … {law.largest:.2g}{unit}",
                     f"{law.decades:.1f}",
                     f"{law.n} of {law.of}",
-                    f"{law.p:.2g}",
+                    p_text(law.p, 1 / jumps.RESAMPLES),
                     f"{law.against_lognormal:.1f}",
                 ]
             )
@@ -180,7 +322,10 @@ def cut_power_laws(study: Study) -> Table:
     """Fits with an exponential cut-off (seen afterwards)."""
     rows = []
     for branch in ("loading", "unloading"):
-        for name, title, decades in (("energy_drop", "energy (J/m²)", 4.0), ("area", "area", 2.5)):
+        for name, title, decades in (
+            ("energy_drop", "energy (J/m²)", jumps.ENERGY_DECADES),
+            ("area", "area", jumps.AREA_DECADES),
+        ):
             law = jumps.cut_power_law(study.jumps.where(branch=branch), name, decades)
             rows.append(
                 [
@@ -270,38 +415,76 @@ def cutoff(study: Study) -> Table:
     return [*header, "pull-off (kPa)", "small scale (%)"], rows
 
 
+MACHINES = (1e10, 3e9, 1e9)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Loops at a stiffness and a turning point of the far side, beside those at fixed separation.
+
+    Attributes
+    ----------
+    reached : array
+        Δ~ at the turning point.
+    losses : array
+        W~.
+    same_far_side : array, shape (2, realisations)
+        W~ with a fixed separation at Δ~ = u_tot/h_max, and W~.
+    same_penetration : array, shape (2, realisations)
+        W~ with a fixed separation at the Δ~ reached, and W~.
+    """
+
+    failed: int
+    reached: Array
+    losses: Array
+    same_far_side: Array
+    same_penetration: Array
+
+
+def machine_of(study: Study, turn: float, stiffness: float) -> Machine:
+    """Compare at the same far side, and at the same penetration reached."""
+    place = {"hurst": 0.8, "work_of_adhesion": 0.04}
+    of = {"campaign": "machine", "stiffness": stiffness, "max_penetration": turn, **place}
+    column = {
+        name: study.by_realisation(name, **of)
+        for name in ("loss_dimensionless", "stress_at_turn", "h_max")
+    }
+    reached = {
+        r: turn - stress / (stiffness * column["h_max"][r])
+        for r, stress in column["stress_at_turn"].items()
+    }
+    fixed = study.by_realisation(
+        "loss_dimensionless", campaign="turns", max_penetration=turn, **place
+    )
+    along = Losses(study).along(0.8, 0.04)
+    there = at_turns(along, lambda r: reached.get(r, np.nan), beyond=0.0)
+    loss = column["loss_dimensionless"]
+    return Machine(
+        len(study.failed.where(**of)),
+        np.array(list(reached.values())),
+        np.array(list(loss.values())),
+        aligned(fixed, loss),
+        aligned(there, loss),
+    )
+
+
 def machine(study: Study) -> Table:
     """Loss against the stiffness of the machine."""
     rows = []
     for turn in (0.6, 0.8):
-        place = {"hurst": 0.8, "work_of_adhesion": 0.04, "max_penetration": turn}
-        fixed = study.by_realisation("loss_dimensionless", campaign="turns", **place)
-        for stiffness in (np.inf, 1e10, 3e9, 1e9):
-            if np.isinf(stiffness):
-                loss = fixed
-                failed = 0
-            else:
-                of = {"campaign": "machine", "stiffness": stiffness, **place}
-                loss = study.by_realisation("loss_dimensionless", **of)
-                failed = len(study.failed.where(**of))
-            if not loss:
-                rows.append([f"{turn:g}", f"{stiffness:.0e}", "0", f"{failed}", "", ""])
-                continue
-            both = aligned(fixed, loss)
-            change = "" if np.isinf(stiffness) else ratio_text(both[1], both[0])
+        for stiffness in MACHINES:
+            of = machine_of(study, turn, stiffness)
+            span = f"{of.reached.mean():.2f} ({of.reached.min():.2f} … {of.reached.max():.2f})"
             rows.append(
                 [
-                    f"{turn:g}",
-                    "fixed" if np.isinf(stiffness) else f"{stiffness:.0e}",
-                    *(
-                        f"{len(loss)}",
-                        f"{failed}",
-                        mean_text(np.array(list(loss.values()))),
-                        change,
-                    ),
+                    *(f"{turn:g}", f"{stiffness:.0e}", f"{of.losses.size}", f"{of.failed}"),
+                    *(span, mean_text(of.losses), ratio_text(*of.same_far_side[::-1])),
+                    f"{ratio_text(*of.same_penetration[::-1])}, "
+                    f"n = {of.same_penetration.shape[1]}",
                 ]
             )
-    return ["u_tot/h_max", "k (Pa/m)", "n", "ran away", "W~", "against fixed separation"], rows
+    header = ["u_tot/h_max", "k (Pa/m)", "n", "ran away", "Δ~ reached", "W~"]
+    return [*header, "against fixed separation at Δ~ = u_tot/h_max", "at the Δ~ reached"], rows
 
 
 def errors(study: Study) -> Table:
@@ -320,13 +503,15 @@ def errors(study: Study) -> Table:
     for name in set(study.loops["campaign"].tolist()):
         here = study.loops.where(campaign=name)
         keys = {
-            *zip(*(here[k].tolist() for k in ("hurst", "work_of_adhesion", "max_penetration")),
-                 strict=True)
+            *zip(*(here[k].tolist() for k in
+                   ("hurst", "work_of_adhesion", "max_penetration", "h_rms")), strict=True)
         }  # fmt: skip
-        for hurst, gamma, turn in keys:
+        for hurst, gamma, turn, h_rms in keys:
             if np.isnan(turn):
                 continue
-            cell = here.where(hurst=hurst, work_of_adhesion=gamma, max_penetration=turn)
+            cell = here.where(
+                hurst=hurst, work_of_adhesion=gamma, max_penetration=turn, h_rms=h_rms
+            )
             for ratio in cell.values("ratio"):
                 one = cell.where(ratio=ratio)
                 if len(one) >= 5 and np.isnan(one["stiffness"]).all():
@@ -338,8 +523,18 @@ def errors(study: Study) -> Table:
 
 
 TABLES: dict[str, Callable[[Study], Table]] = {
+    "answer": answer,
+    "amplitudes": amplitudes,
+    "maxima": maxima,
+    "through_amplitude": through_amplitude,
+    "through_hurst": through_hurst,
+    "scaling": scaling,
     "campaigns": campaigns,
+    "reach": reach,
     "readings": main_readings,
+    "variants": variants,
+    "factors": factors_of_rows,
+    "captions": caption_bounds,
     "without": without,
     "tens": tens,
     "stress": stress,
