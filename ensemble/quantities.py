@@ -1,4 +1,4 @@
-"""Units of the numbers that results and commands state; the loss over the work of adhesion."""
+"""Units of the numbers that results and commands state; losses over the work of adhesion."""
 
 from __future__ import annotations
 
@@ -24,6 +24,13 @@ _NAMES = {
 }
 UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 """Unit by the name of a quantity; others are dimensionless (penetrations are in units of h_max)."""
+
+
+def with_units(table: Any) -> Any:
+    """Return a DataFrame with the unit of every column in ``attrs["units"]``."""
+    table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
+    return table
+
 
 # Of the turning points: in Pa under a load, else dimensionless.
 _TURNING = ("turning_point", "turning_points", "start", "turn")
@@ -70,18 +77,6 @@ def _unit(path: tuple[str, ...]) -> str:
     return UNITS.get(name, "1")
 
 
-def loss_over_work_of_adhesion(loss: float, work_of_adhesion: float) -> float | None:
-    """Return W/γ; None without adhesion."""
-    return loss / work_of_adhesion if work_of_adhesion > 0 else None
-
-
 def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:
     """Return ", 0.31 γ", to follow a loss in J/m²; an empty text without adhesion."""
-    ratio = loss_over_work_of_adhesion(loss, work_of_adhesion)
-    return "" if ratio is None else f", {ratio:.4g} γ"
-
-
-def with_units(table: Any) -> Any:
-    """Return a DataFrame with the unit of every column in ``attrs["units"]``."""
-    table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
-    return table
+    return f", {loss / work_of_adhesion:.4g} γ" if work_of_adhesion > 0 else ""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.outputs import whole_file
-from adhesis.ensemble.quantities import in_works_of_adhesion, loss_over_work_of_adhesion
+from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult

@@ -105,8 +105,8 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         f"mean tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
         f"most **{_value(answer.contact_fraction, 1.0, '')}**: one loop to "
         f"{cycle.turn(cycle.turning_points[0])} (h_max = {length_text(answer.main['h_max'], 4)}) "
-        f"and off again, with γ = {cycle.works_of_adhesion[0]:g} J/m², "
-        f"E = {half_space.young:g} Pa, ν = {half_space.poisson:g}.",
+        f"and off again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} "
+        f"Pa, ν = {half_space.poisson:g}.",
         *(f"> **Warning:** {markdown(warning)}" for warning in answer.warnings),
         "## What was read",
         f"- {code_span(name)}: {markdown('; '.join(trace.notes))}\n- {trace.summary}",

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.quantities import loss_over_work_of_adhesion
 from adhesis.ensemble.run.launch import end_with_parent
 from adhesis.solver.values import ByValue
 
@@ -102,7 +101,6 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
     return loop.numbers() | {
-        "loss_over_work_of_adhesion": loss_over_work_of_adhesion(loop.loss, job.work_of_adhesion),
         "range_warnings": range_warnings(
             problem, loop.valid_range, loop.loss, loop.contact_fraction
         ),

@@ -156,15 +156,18 @@ class EquilibriumPath(ByValue, Viewed):
         problem, half_space = self.problem, self.problem.half_space
         own = (*self._numbers, "loss_from_drops", "audit_residual", "loss_error", "races")
         more = ("energy_at_stake", "largest_contact_fraction", "largest_interior_tension")
+        values = {name: getattr(self, name) for name in (*own, *more)}
+        gamma = problem.work_of_adhesion
         return {
             **{name: getattr(problem.profile, name) for name in _OF_PROFILE},
             "young": half_space.young,
             "poisson": half_space.poisson,
-            "work_of_adhesion": problem.work_of_adhesion,
+            "work_of_adhesion": gamma,
             "stiffness": finite(problem.control.stiffness),
             "full_contact_energy": problem.full_contact_energy,
             "load_steps": self.load_steps,
-            **{name: getattr(self, name) for name in (*own, *more)},
+            **values,
+            "loss_over_work_of_adhesion": values["loss"] / gamma if gamma > 0 else None,
             "valid_range": finite(self.valid_range),
             "edge_range": finite(self.edge_range),
             "seconds": self.seconds,

@@ -10,7 +10,11 @@ import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
-from adhesis.ensemble.trace.reading.header_units import parse_units, step_of_header, units_of_header
+from adhesis.ensemble.trace.reading.header_units import (
+    parse_units,
+    step_of_header,
+    units_of_header,
+)
 from adhesis.ensemble.trace.reading.instrument import HINT, UnknownFormatError, available, read_scan
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table
