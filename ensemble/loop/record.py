@@ -33,9 +33,6 @@ def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
     del details["name"]
     document = {
         **result.numbers(),
-        "loss_over_work_of_adhesion": loss_over_work_of_adhesion(
-            result.loss, result.problem.work_of_adhesion
-        ),
         **_displacement(result),
         "interior_tension": None if interior is None else asdict(interior),
         "warnings": list(result.warnings),
