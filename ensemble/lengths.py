@@ -126,8 +126,9 @@ def length_with_unit(text: str) -> float:
         raise InputError(f"is {quoted(text)}: it must be a length, as in 5e-6 (m) or 5um")
     try:
         unit = unit_named(found[2])
-    except InputError as error:
-        raise InputError(f"is {quoted(text)}: {error}") from None
+    except InputError:
+        names = ", ".join(METRES)
+        raise InputError(f"is {quoted(text)}: its unit must be one of {names}") from None
     # Decimal numbers, so that 7um is the same number as 7e-6.
     return float(Decimal(found[1]) * Decimal(repr(METRES[unit])))
 

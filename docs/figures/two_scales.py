@@ -13,7 +13,6 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
-from adhesis.ensemble.loop.film_scenes import jump_places
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
@@ -26,6 +25,7 @@ from adhesis import (
     run_loop,
     self_affine_profile,
 )
+from adhesis.ensemble.loop.film_scenes import jump_places
 
 LOADING, UNLOADING = "#1f5fa8", "#c4472b"
 BODY, RIGID = "#dbe4ee", "#8a8f98"

@@ -28,10 +28,10 @@ READ = {
 REFUSED = {
     "": "is '': it must be a length, as in 5e-6 (m) or 5um",
     "um": "is 'um': it must be a length",
-    "5 parsec": "is '5 parsec': 'parsec' is no unit of length: it must be one of m, cm, mm",
+    "5 parsec": "is '5 parsec': its unit must be one of m, cm, mm, µm, nm, Å, inch",
     "1,5mm": "is '1,5mm': it must be a length",
     "5um5": "is '5um5': it must be a length",
-    "9" * 400 + "x": "…': 'x' is no unit of length",
+    "9" * 400 + "x": "…': its unit must be one of m, cm",
     "20": "is 20, which would be 20 m: give its unit, as in 20um (20m, if metres are meant)",
 }
 
@@ -83,7 +83,7 @@ def test_every_option_that_is_a_length_takes_a_unit() -> None:
     [
         (("--h-rms", "10"), "--h-rms is 10, which would be 10 m: give its unit, as in 10um (10m,"),
         (("--period", "2000"), "--period is 2000, which would be 2000 m: give its unit"),
-        (("--h-rms", "0.5 furlong"), "--h-rms is '0.5 furlong': 'furlong' is no unit of length"),
+        (("--h-rms", "0.5 furlong"), "--h-rms is '0.5 furlong': its unit must be one of m, cm"),
         (("--period", "0mm"), "--period is 0.0: it must be a positive number"),
         (("--h-rms", "100mm"), "rms slope is "),
         (("--layer", "5"), "--layer is 5, which would be 5 m: give its unit"),
