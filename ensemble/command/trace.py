@@ -30,7 +30,10 @@ def execute(args: argparse.Namespace) -> int:
     depths = _numbers(args.max_penetration, "--max-penetration")
     with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
-        cycle = make_cycle(half_space, gammas, depths, args.load_steps, args.method, args.accuracy)
+        cycle = make_cycle(
+            half_space, gammas, depths, args.load_steps, args.method, args.accuracy,
+            args.adhesion_range, args.strength,
+        )  # fmt: skip
     if args.to is not None:
         check_output_folder("--to", args.to, _FILES, {"the command": args.file})
     prepared = prepared_of(args, trace_of(args, args.file))

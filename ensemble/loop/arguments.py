@@ -10,7 +10,7 @@ import argparse
 import math
 from pathlib import Path
 
-from adhesis.ensemble.trace.arguments import add_reading_arguments
+from adhesis.ensemble.trace.arguments import add_reading_arguments, add_strength_arguments
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6
@@ -55,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact.add_argument(
         "--poisson", type=float, metavar="NU", help="(required with --heights; else default 0.5)"
     )
+    add_strength_arguments(contact)
     _add_cycle_arguments(contact)
     method = parser.add_argument_group("method")
     method.add_argument(

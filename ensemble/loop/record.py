@@ -130,6 +130,7 @@ def _scene(problem: Problem) -> dict[str, Any]:
         "young": problem.half_space.young,
         "poisson": problem.half_space.poisson,
         "work_of_adhesion": problem.work_of_adhesion,
+        "strength": finite(problem.strength),
     }
 
 
@@ -141,6 +142,8 @@ def _ranges(result: LoopResult | PathResult) -> dict[str, Any]:
         "edge_range": finite(result.edge_range),
         "largest_interior_tension": result.largest_interior_tension,
         "interior_tension": None if interior is None else asdict(interior),
+        "openings": result.openings,
+        "barrier": result.barrier,
     }
 
 
@@ -167,6 +170,7 @@ def _catalogue(problem: Problem, jumps: Sequence[Jump]) -> list[dict[str, Any]]:
             "patch_length": jump.patch_length,
             "raced": jump.raced,
             "at_stake": jump.at_stake,
+            "barrier": jump.barrier,
         }
         for jump in jumps
     ]

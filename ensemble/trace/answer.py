@@ -30,7 +30,7 @@ from adhesis.solver.loading.loop import check_cycle
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.registry import METHOD_NAMES, MethodName
-from adhesis.solver.values import ByValue
+from adhesis.solver.values import ByValue, finite
 
 QUANTITIES = {
     "loss": "J/m²",
@@ -181,6 +181,8 @@ def loss_of_trace(
     load_steps: int = 40,
     method: MethodName = "auto",
     accuracy: float = 1e-3,
+    adhesion_range: float | None = None,
+    strength: float | None = None,
     quick: bool = False,
     processes: int | None = None,
     progress: bool = False,
@@ -202,6 +204,9 @@ def loss_of_trace(
     method : {"auto", "sharp", "grid"}
     accuracy : float
         Wanted relative error of the loss of each loop.
+    adhesion_range, strength : float, optional
+        Range δ of adhesion in m, or instead the strength in Pa at which patches open from inside
+        (:class:`~adhesis.Problem`).
     quick : bool
         Without the two tables.
     processes : int, optional
@@ -224,7 +229,10 @@ def loss_of_trace(
     ----------
     docs/measured-profile.md, "The answer and its doubts"
     """
-    cycle = make_cycle(half_space, work_of_adhesion, max_penetration, load_steps, method, accuracy)
+    cycle = make_cycle(
+        half_space, work_of_adhesion, max_penetration, load_steps, method, accuracy,
+        adhesion_range, strength,
+    )  # fmt: skip
     check(prepared, cycle)
     flag("quick", quick)
     function("watch", watch)
@@ -246,6 +254,8 @@ def make_cycle(
     load_steps: int,
     method: MethodName,
     accuracy: float,
+    adhesion_range: float | None = None,
+    strength: float | None = None,
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -264,7 +274,12 @@ def make_cycle(
             raise ValueError(f"{name} is empty: it must hold one number at least")
     for depth in depths:
         check_cycle(depth, load_steps)
-    return Cycle(half_space, gammas, depths, load_steps, method, accuracy)
+    cycle = Cycle(
+        half_space, gammas, depths, load_steps, method, accuracy, adhesion_range, strength
+    )
+    for gamma in gammas:
+        cycle.strength_at(gamma)
+    return cycle
 
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
@@ -272,7 +287,8 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     instance("prepared", prepared, Prepared, "prepare_trace(read_trace(path))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        Problem(profile, cycle.half_space, gamma)
+        strength = cycle.strength_at(gamma)
+        Problem(profile, cycle.half_space, gamma, strength=strength)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
@@ -404,6 +420,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "young": cycle.half_space.young,
         "poisson": cycle.half_space.poisson,
         "work_of_adhesion": cycle.works_of_adhesion[0],
+        "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
         "max_penetration": cycle.max_penetrations[0],
         "load_steps": cycle.load_steps,
         "loss": _plain(answer.loss),

@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     contact.add_argument("--young", type=float, required=True, metavar="E", help="Pa")
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
+    add_strength_arguments(contact)
     contact.add_argument(
         "--max-penetration", default="0.9", metavar="D", help="Δ/h_max, or several (default 0.9)"
     )
@@ -45,6 +46,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     output.add_argument("--processes", type=int, metavar="N", help="side by side (default: cores)")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def add_strength_arguments(group: argparse._ArgumentGroup) -> None:
+    """Declare the strength of the interface; ``adhesis loop`` shares it."""
+    group.add_argument(
+        "--adhesion-range",
+        type=float,
+        metavar="D",
+        help="m: range of adhesion; patches open from inside at the strength G/D "
+        "(default: zero range, they never do)",
+    )
+    group.add_argument("--strength", type=float, metavar="S", help="Pa: instead, that strength")
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:

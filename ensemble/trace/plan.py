@@ -15,6 +15,7 @@ from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.units import length_text
 from adhesis.ensemble.trace.worker import Job
 from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import strength_of
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName
 from adhesis.solver.values import ByValue
@@ -40,6 +41,12 @@ class Cycle:
     load_steps: int = 40
     method: MethodName = "auto"
     accuracy: float = 1e-3
+    adhesion_range: float | None = None
+    strength: float | None = None
+
+    def strength_at(self, work_of_adhesion: float) -> float:
+        """Return the strength of the interface in Pa at a work of adhesion in J/m²."""
+        return strength_of(work_of_adhesion, self.adhesion_range, self.strength)
 
 
 @dataclass(frozen=True)
@@ -230,17 +237,19 @@ def _tables(cycle: Cycle) -> list[Run]:
 
 def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
     gamma, depth = cycle.works_of_adhesion[0], cycle.max_penetrations[0]
+    gamma = gamma if run.work_of_adhesion is None else run.work_of_adhesion
     return Job(
         name=run.name,
         period=profile.period,
         coefficients=profile.coefficients,
         young=cycle.half_space.young,
         poisson=cycle.half_space.poisson,
-        work_of_adhesion=gamma if run.work_of_adhesion is None else run.work_of_adhesion,
+        work_of_adhesion=gamma,
         max_penetration=depth if run.max_penetration is None else run.max_penetration,
         load_steps=cycle.load_steps,
         method=cycle.method,
         accuracy=cycle.accuracy,
+        strength=cycle.strength_at(gamma),
     )
 
 

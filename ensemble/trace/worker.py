@@ -6,6 +6,7 @@ script, so it works from a notebook as well as from the command line.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import signal
@@ -48,6 +49,7 @@ class Job(ByValue):
     load_steps: int
     method: MethodName
     accuracy: float
+    strength: float = math.inf
 
 
 def main() -> None:
@@ -74,7 +76,7 @@ def main() -> None:
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists."""
     from adhesis.solver.loading.loop import run_loop
-    from adhesis.solver.loading.zero_range import range_warnings
+    from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
     from adhesis.solver.method import Branch, ContactState
     from adhesis.solver.model.half_space import HalfSpace
     from adhesis.solver.model.problem import Problem
@@ -91,7 +93,8 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
             report(branch, penetration)
 
     profile = Profile(job.period, job.coefficients)
-    problem = Problem(profile, HalfSpace(job.young, job.poisson), job.work_of_adhesion)
+    half_space = HalfSpace(job.young, job.poisson)
+    problem = Problem(profile, half_space, job.work_of_adhesion, strength=job.strength)
     method = make_method(job.method, problem, accuracy=job.accuracy)
     loop = run_loop(
         method,
@@ -112,7 +115,10 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
         "largest_interior_tension": loop.largest_interior_tension,
         "range_warnings": range_warnings(
             problem, loop.valid_range, loop.loss, loop.contact_fraction
-        ),
+        )
+        + opening_warnings(loop.jumps, loop.loss),
+        "openings": loop.openings,
+        "barrier": loop.barrier,
         "energy_at_stake": _number(loop, "energy_at_stake"),
         "pull_off_stress": loop.pull_off_stress,
         "pull_off_penetration": loop.pull_off_penetration,

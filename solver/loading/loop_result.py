@@ -22,6 +22,7 @@ from adhesis.solver.loading.zero_range import (
     edge_range,
     interior_tension,
     narrowest_length,
+    opening_warnings,
     range_summary,
     range_warnings,
     valid_range,
@@ -183,6 +184,7 @@ class LoopResult(ByValue, Viewed):
                 f"J/m², is larger than {most:g} of it, the relative error allowed"
             )
         found += range_warnings(self.problem, self.valid_range, self.loss, self.contact_fraction)
+        found += opening_warnings(self.jumps, self.loss)
         return tuple(found)
 
     @property
@@ -202,6 +204,16 @@ class LoopResult(ByValue, Viewed):
     def edge_range(self) -> float:
         """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
         return edge_range(self.problem, self.narrowest_length)
+
+    @property
+    def openings(self) -> int:
+        """Number of jumps that begin with a gap that opens inside a patch."""
+        return sum(jump.kind == "opening" for jump in self.jumps)
+
+    @property
+    def barrier(self) -> float:
+        """Sum of the barriers of these openings, in J/m² (:class:`Jump`)."""
+        return float(sum(jump.barrier for jump in self.jumps))
 
     @property
     def races(self) -> int:

@@ -29,6 +29,7 @@ from adhesis.solver.loading.zero_range import (
     edge_range,
     interior_tension,
     narrowest_length,
+    opening_warnings,
     range_warnings,
     valid_range,
 )
@@ -190,7 +191,8 @@ class PathResult(ByValue, Viewed):
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what makes the work doubtful; none for most paths."""
         lost = self.loss_from_drops
-        return tuple(range_warnings(self.problem, self.valid_range, lost, self.contact_fraction))
+        found = range_warnings(self.problem, self.valid_range, lost, self.contact_fraction)
+        return (*found, *opening_warnings(self.jumps, lost))
 
     @property
     def largest_interior_tension(self) -> float:
@@ -209,6 +211,16 @@ class PathResult(ByValue, Viewed):
     def edge_range(self) -> float:
         """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
         return edge_range(self.problem, self.narrowest_length)
+
+    @property
+    def openings(self) -> int:
+        """Number of jumps that begin with a gap that opens inside a patch."""
+        return sum(jump.kind == "opening" for jump in self.jumps)
+
+    @property
+    def barrier(self) -> float:
+        """Sum of the barriers of these openings, in J/m² (:class:`Jump`)."""
+        return float(sum(jump.barrier for jump in self.jumps))
 
     @property
     def energy(self) -> Array:

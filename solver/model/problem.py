@@ -119,7 +119,7 @@ class Problem(ByValue):
     strength: float = math.inf
     adhesion_range: InitVar[float | None] = None
 
-    def __post_init__(self, adhesion_range: float | None) -> None:  # type: ignore[override]
+    def __post_init__(self, adhesion_range: float | None) -> None:
         instance("profile", self.profile, Profile, "single_wave or profile_from_heights")
         instance("half_space", self.half_space, HalfSpace, "HalfSpace(young, poisson)")
         gamma = real("work_of_adhesion", self.work_of_adhesion, WORK_OF_ADHESION)
@@ -152,9 +152,8 @@ class Problem(ByValue):
 
         Under a uniform tension σ_th a longer gap inside a patch grows, a shorter one closes.
         """
-        return (
-            4 * self.half_space.modulus * self.work_of_adhesion / (math.pi * self.strength**2)
-        )
+        modulus = self.half_space.modulus
+        return 4 * modulus * self.work_of_adhesion / (math.pi * self.strength**2)
 
     @property
     def stress_scale(self) -> float:

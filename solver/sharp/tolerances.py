@@ -287,28 +287,12 @@ NO_CURVATURE = 1e-100
 
 STRENGTH_EXCEEDED = 2e-5
 """σ_th. Tension inside a patch may exceed the strength by this share when it opens."""
-NEAR_STRENGTH = 0.8
-"""σ_th. Smaller maxima of tension are not refined."""
-EQUAL_TENSIONS = 1e-4
-"""σ_th. Maxima that differ by less open together; the field's error is at most a tenth of that."""
 MOST_MAXIMA = 32
 """Maxima of tension of one field that are refined."""
-CRACK_GROWTH = 1.1
-"""γ. Energy release rate with which a crack that is put into a patch surely grows."""
-CRACK_RATIO = 1.1
-"""Ratio of the lengths of cracks that are tried one after the other."""
-CRACK_NODES = 12
-"""Places of a crack at which the tension of the unbroken patch is taken."""
 SHORTEST_CRACK = 0.02
 """λ_min. Shorter ones are not put: steps of their edges would count as rest."""
-LONGEST_CRACK = 0.5
-"""λ_min. Longer ones are not put: they would be as long as the waves that make the tension."""
-CRACK_IN_PATCH = 0.8
-"""Share of the distance of its middle from an edge that a crack may take."""
 HEALED_PLACE = 0.05
 """λ_min. A maximum of tension this close to a crack that closed again is at the same place."""
-HEALED_TENSION = 1.05
-"""Of the tension at which a crack closed again: it is tried again from here on."""
 MOST_OPENINGS = 1000
 """Openings one after the other at one place of a path; more are an endless loop."""
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adhesis.solver.crack import Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
@@ -19,7 +20,7 @@ from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
 from adhesis.solver.sharp.nucleation.location import Located, locate
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
-from adhesis.solver.sharp.nucleation.opening import Crack, Openings
+from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import Memory, States
 from adhesis.solver.sharp.tolerances import (
     FINER_FIELD,

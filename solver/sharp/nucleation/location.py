@@ -25,7 +25,6 @@ from adhesis.solver.sharp.tolerances import (
 )
 
 Seed = TypeVar("Seed")
-Result = TypeVar("Result", covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +49,7 @@ class Tracked(Protocol):
         ...
 
 
-class Criterion(Protocol[Result]):
+class Criterion(Protocol[Seed]):
     """What nucleates, and when."""
 
     @property
@@ -62,7 +61,7 @@ class Criterion(Protocol[Result]):
         """Return the least value of a field, and the places from which seeds are chosen."""
         ...
 
-    def ready(self, places: Any) -> list[Result]:
+    def ready(self, places: Any) -> list[Seed]:
         """Return the seeds of the least value, and of those that equal it; none if positive."""
         ...
 
