@@ -72,7 +72,6 @@ class Openings:
             first = round(crack.position / dx - 0.5 * (width - 1))
             nodes = np.arange(first, first + width) % n
             opened.mask[nodes] = False
-            opened.stress[nodes] = 0.0
         return opened
 
     def barrier(self, cracks: list[Crack]) -> float:
