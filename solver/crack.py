@@ -131,7 +131,7 @@ def judge_maximum(
     def release(half: Array) -> Array:
         return release_rate(half, tension_at, position) / balanced
 
-    half = first * _RATIO ** np.arange(int(np.log(longest / first) / np.log(_RATIO)) + 1)
+    half: Array = first * _RATIO ** np.arange(int(np.log(longest / first) / np.log(_RATIO)) + 1)
     found = release(half)
     grows = np.flatnonzero(found >= GROWTH)
     if not grows.size:
@@ -140,8 +140,9 @@ def judge_maximum(
     # up to the half-length at which G = γ
     steps = max(int(np.log(end / griffith) / np.log(_RATIO)), 0)
     half = np.append(griffith * _RATIO ** np.arange(steps + 1), end)
-    half = half[np.argmax(release(half) >= 1)] * np.linspace(0, 1, _NODES + 1)
-    barrier = 2 * toughness * float(np.trapezoid(1 - release(half), half))
+    balance = float(half[np.argmax(release(half) >= 1)])
+    way: Array = balance * np.linspace(0, 1, _NODES + 1)
+    barrier = 2 * toughness * float(np.trapezoid(1 - release(way), way))
     return Crack(position, share, 1 - share, 2 * end, barrier)
 
 

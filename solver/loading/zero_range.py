@@ -40,6 +40,9 @@ DOUBTFUL_RANGE = 1e-9
 DOUBTFUL_LOSS = 20.0
 """Loss over γ A_max/A0 above which a loss is doubtful (docs/zero-range.md)."""
 
+DOUBTFUL_EXCESS = 1.1
+"""Tension inside patches over a finite strength above which a loss is doubtful."""
+
 DOUBTFUL_BARRIER = 0.1
 """Barriers of all openings over the loss above which a loss is doubtful (docs/zero-range.md)."""
 
@@ -274,10 +277,18 @@ def range_warnings(
 ) -> list[str]:
     """Return the sentences of doubt where a loss is that of the zero-range limit alone.
 
-    At a finite strength patches open from inside, and there are none.
+    At a finite strength patches open from inside; doubtful is then a tension that exceeds it where
+    no crack grows.
     """
     out: list[str] = []
     if math.isfinite(problem.strength):
+        excess = problem.work_of_adhesion / range_ / problem.strength
+        if excess > DOUBTFUL_EXCESS:
+            out.append(
+                f"the tension inside patches reaches {excess:.3g} times the strength "
+                f"({problem.strength:.3g} Pa) where no crack that fits grows: how such places "
+                "yield, which zero range leaves open, may matter for the loss (docs/zero-range.md)"
+            )
         return out
     if range_ < DOUBTFUL_RANGE:
         out.append(

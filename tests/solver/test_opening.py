@@ -19,6 +19,7 @@ from adhesis import (
     self_affine_profile,
 )
 from adhesis.solver.crack import Crack, griffith_length, judge_maximum, largest_excess
+from adhesis.solver.loading.zero_range import beyond_limit, opening_warnings, range_warnings
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
@@ -214,6 +215,21 @@ def test_a_gap_put_into_a_patch_lies_between_its_neighbours(centre, place):
     assert len(found) == 3
     assert np.all(np.diff(np.append(found.ravel(), found[0, 0] + 2 * np.pi)) > 0)
     assert found[place].mean() % (2 * np.pi) == pytest.approx(centre % (2 * np.pi))
+
+
+# ---------------------------------------------------------------------- doubts
+
+
+def test_barriers_and_tensions_that_are_not_small_make_a_loss_doubtful():
+    problem = troughs_problem()
+    opened = [jump for jump in rough_loop(4e6)[0].jumps if jump.kind == "opening"]
+    barrier = sum(jump.barrier for jump in opened)
+    assert opening_warnings(opened, 11 * barrier) == []
+    assert "add up to" in opening_warnings(opened, 9 * barrier)[0]
+    assert range_warnings(problem, GAMMA / (1.05 * STRENGTH), 1.0, [0.5]) == []
+    (excess,) = range_warnings(problem, GAMMA / (2 * STRENGTH), 1.0, [0.5])
+    assert "reaches 2 times the strength (4 Pa)" in excess
+    assert not beyond_limit([1e-12], [1.0], 0.02, 0.5, opens=True).any()
 
 
 # ---------------------------------------------------------------------- the problem
