@@ -36,7 +36,7 @@ EQUAL_TENSIONS = 1e-4
 """Maxima of tension that differ by less, in units of the strength, open together."""
 NEAR_STRENGTH = 0.8
 """Smaller maxima of tension, in units of the strength, are not judged."""
-HEALED_TENSION = 1.05
+HEALED_TENSION = 1.01
 """A crack that closed again is tried again from this multiple of its tension on."""
 
 _RATIO = 1.1  # of the lengths of cracks that are tried one after the other

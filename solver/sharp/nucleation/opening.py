@@ -52,6 +52,8 @@ class Openings:
         Share of the strength by which a tension may exceed it.
     healed : list of Crack
         Cracks that closed again: nothing opens there unless the tension is larger.
+    heals : int
+        Number of cracks that closed again, so far.
     """
 
     tolerance = STRENGTH_EXCEEDED
@@ -60,6 +62,7 @@ class Openings:
         self.edges = edges
         self.strength = problem.strength / (problem.half_space.modulus / 2)
         self.healed: list[Crack] = []
+        self.heals = 0
         self._nodal = NodalTension(problem.profile) if self.is_possible else None
 
     @property
@@ -101,6 +104,7 @@ class Openings:
     def heal(self, cracks: list[Crack]) -> None:
         """Note cracks that closed again."""
         self.healed += cracks
+        self.heals += len(cracks)
 
     def is_located(self, value: float, many: bool, near: bool) -> bool:
         """Whether a place with this value is exact enough.
