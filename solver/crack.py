@@ -131,7 +131,8 @@ def judge_maximum(
     def release(half: Array) -> Array:
         return release_rate(half, tension_at, position) / balanced
 
-    half: Array = first * _RATIO ** np.arange(int(np.log(longest / first) / np.log(_RATIO)) + 1)
+    steps = int(np.log(longest / first) / np.log(_RATIO))
+    half = np.asarray(first * _RATIO ** np.arange(steps + 1), dtype=np.float64)
     found = release(half)
     grows = np.flatnonzero(found >= GROWTH)
     if not grows.size:
