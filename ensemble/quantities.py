@@ -18,7 +18,7 @@ _NAMES = {
     "Pa/m": "stiffness",
     "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
     "J/m²": "work_of_adhesion loss loss_from_drops loss_error energy_drop at_stake energy_at_stake "
-    "energy_change work work_gained work_spent effective_work_of_approach "
+    "barrier energy_change work work_gained work_spent effective_work_of_approach "
     "effective_work_of_separation full_contact_energy",
     "s": "seconds expected_seconds wall",
 }

@@ -10,8 +10,8 @@ LEAST_PROMINENCE = 0.01
 """A maximum stands out by this share of its height at least: above the errors of the values."""
 
 
-def highest_peaks(values: Array, most: int) -> list[int]:
-    """Return the places of the highest positive maxima, the highest first.
+def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
+    """Return the places of the highest maxima above ``least``, the highest first.
 
     The prominence of a maximum is its height above the higher one of the two minima between which
     it is the largest value; it is no maximum unless its neighbours have values.
@@ -22,12 +22,14 @@ def highest_peaks(values: Array, most: int) -> list[int]:
         Periodic; NaN where there is nothing.
     most : int
         So many maxima at most.
+    least : float
+        Not negative.
     """
     nothing = np.flatnonzero(np.isnan(values))
     start = int(nothing[0]) if nothing.size else 0
     row = np.concatenate([values[start:], values[:start], values[start : start + 1]])
     here, before, after = row[1:-1], row[:-2], row[2:]
-    tops = 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0))
+    tops = 1 + np.flatnonzero((here > before) & (here >= after) & (here > least))
     found: list[int] = []
     for top in tops[np.argsort(-row[tops], kind="stable")].tolist():
         sides = row[:top][::-1], row[top + 1 :]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from adhesis import (
 from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.model.profile import Amplitudes
 from adhesis.solver.registry import MethodName
+from adhesis.solver.sharp.method import SharpMethod
 from tests.support.explicit_solution import explicit_openings
 
 TIGHT = 4  # every so many scenes are followed again, to 1e-5 or a hundred times as accurately
@@ -28,11 +29,15 @@ _WEAK = 1e-3  # for so weak adhesion accuracy is dear: one in four of these
 _LOOKED_AT = 6  # states, and those at jumps
 _MOST_NODES = 3000  # of the independent openings
 _OVERLAP = 1e-6
+_TENSION = 1e-3  # of the strength
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One hostile loop; γ is ``g`` times E* h_rms² q0 n0."""
+    """One hostile loop; γ is ``g`` times E* h_rms² q0 n0.
+
+    The strength is that of a Griffith crack ``crack`` shortest waves long; infinite for 0.
+    """
 
     hurst: float
     n0: int
@@ -44,6 +49,7 @@ class Scene:
     max_penetration: float
     load_steps: int
     accuracy: float
+    crack: float = 0.0
 
     def problem(self) -> Problem:
         """Period 2 mm, E = 1 MPa, ν = 0.5."""
@@ -53,15 +59,27 @@ class Scene:
         )  # fmt: skip
         half_space = HalfSpace(1e6, 0.5)
         gamma = self.g * half_space.modulus * self.h_rms**2 * profile.q0 * self.n0
-        return Problem(profile, half_space, gamma)
+        if self.crack == 0:
+            return Problem(profile, half_space, gamma)
+        length = self.crack * profile.shortest_wavelength
+        strength = np.sqrt(4 * half_space.modulus * gamma / (np.pi * length))
+        return Problem(profile, half_space, gamma, strength=float(strength))
 
 
-def draw(seed: int, number: int) -> Scene:
+def draw(seed: int, number: int, strength: bool = False) -> Scene:
     """Draw the scene of a number: mostly few waves, one in fifty up to 250.
 
-    Where adhesion is weak, thousands of fields go into each jump: few crests there.
+    Where adhesion is weak, thousands of fields go into each jump: few crests there. With
+    ``strength`` the range of adhesion is drawn over four decades, up to the largest allowed.
     """
-    rng = np.random.default_rng([seed, number])
+    scene = _draw(np.random.default_rng([seed, number]))
+    if not strength:
+        return scene
+    ranges = 10 ** np.random.default_rng([seed, number, 1]).uniform(-4, 0)
+    return replace(scene, crack=0.249 * float(ranges) ** 2)
+
+
+def _draw(rng: np.random.Generator) -> Scene:
     kind = rng.integers(6)
     depth = float(rng.uniform(0.05, 0.99))
     if kind == 0:
@@ -100,7 +118,33 @@ def follow(
         load_steps=scene.load_steps,
         on_state=lambda _, state: states.append(state),
     )
-    return loop, [*_of_loop(loop), *(_of_states(method, states) if name == "sharp" else [])]
+    wrong = _of_loop(loop)
+    if isinstance(method, SharpMethod):
+        wrong += [*_of_states(method, states), *_of_tension(method, loop, states)]
+    return loop, wrong
+
+
+def _excess(loop: LoopResult) -> float:
+    """Largest tension inside patches over the strength."""
+    return loop.largest_interior_tension / loop.problem.strength
+
+
+def _of_tension(method: SharpMethod, loop: LoopResult, states: list[ContactState]) -> list[str]:
+    """What is wrong with the tension inside patches: it exceeds the strength and nothing opens.
+
+    Not judged are states from which patches open, maxima so peaked that no crack grows, and loops
+    in which a crack closed again.
+    """
+    if method.follower.openings.heals:
+        return []
+    opened = {jump.separation for jump in loop.jumps if jump.kind == "opening"}
+    worst = 0.0
+    for state in states:
+        if state.patches and state.separation not in opened:
+            field = method.edges.field(state.internal.gaps, method.states.place(state))
+            worst = min(worst, method.follower.openings.least(field)[0])
+    exceeded = f"tension inside a patch exceeds the strength by {-worst:.1e} of it"
+    return [exceeded] if worst < -_TENSION else []
 
 
 def _of_loop(loop: LoopResult) -> list[str]:
@@ -110,7 +154,7 @@ def _of_loop(loop: LoopResult) -> list[str]:
     for what in ("separation", "mean_stress", "energy", "contact_fraction"):
         if not np.all(np.isfinite(getattr(loop, what))):
             wrong.append(f"{what} is not finite")
-    least = min((j.energy_drop for j in loop.jumps), default=0.0)
+    least = min((j.energy_drop + j.barrier for j in loop.jumps), default=0.0)
     if least < -loop.loss_error:
         wrong.append(f"a drop of {least:.1e} J/m² is negative beyond {loop.loss_error:.1e}")
     if loop.loss < -loop.loss_error:
@@ -179,6 +223,7 @@ def judge(scene: Scene, number: int) -> dict[str, Any]:
         loop, found["wrong"] = follow(scene, scene.accuracy)
         found |= {"loss": loop.loss, "loss_error": loop.loss_error, "races": loop.races}
         found |= {"audit": loop.audit_residual, "drops": loop.loss_from_drops}
+        found |= {"openings": loop.openings, "barrier": loop.barrier, "excess": _excess(loop)}
         if compared_tightly(scene, number):
             found["kind"] = "tight"
             _compare(found, loop, follow(scene, min(1e-5, 1e-2 * scene.accuracy))[0])

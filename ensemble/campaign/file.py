@@ -164,6 +164,12 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [profile] gives {' and '.join(given) or 'none of h_rms, m2 and c0'}: "
             "exactly one of h_rms, m2 and c0 must be given"
         )
+    material = campaign.material
+    if material.adhesion_range is not None and material.strength is not None:
+        raise InputError(
+            f"{source}: [material] gives adhesion_range and strength: at most one of them can be "
+            "given, strength = work_of_adhesion/adhesion_range"
+        )
     n0, ratio = (_largest(campaign, name, getattr(profile, name)) for name in ("n0", "ratio"))
     if n0 * ratio > MOST_WAVES:
         raise InputError(

@@ -30,6 +30,7 @@ from adhesis.ensemble.campaign.rules import (
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
 from adhesis.solver.checks import (
     ACCURACY,
+    ADHESION_RANGE,
     HARMONIC,
     HURST,
     LENGTH,
@@ -40,6 +41,7 @@ from adhesis.solver.checks import (
     POISSON,
     ROLLOFF,
     SPRING,
+    STRENGTH,
     WORK_OF_ADHESION,
     YOUNG,
 )
@@ -104,13 +106,27 @@ class ProfileTable:
 
 @dataclass(frozen=True)
 class MaterialTable:
-    """``[material]``: the elastic half-space."""
+    """``[material]``: the elastic half-space, and the strength of the interface."""
 
     young: float = _key(number_in(YOUNG), "Young's modulus E in Pa", axis="Pa")
     poisson: float = _key(
         number_in(POISSON), "Poisson's ratio ν", axis="1"
     )
+    adhesion_range: float | None = _key(
+        number_in(ADHESION_RANGE),
+        "range δ of adhesion in m: patches open from inside at the strength γ/δ; by default zero, "
+        "so that they never do",
+        None,
+        axis="m",
+    )
+    strength: float | None = _key(
+        number_in(STRENGTH), "instead of adhesion_range, the strength in Pa", None, axis="Pa"
+    )
 
+    @property
+    def opens(self) -> bool:
+        """Whether patches may open from inside."""
+        return not (self.adhesion_range is None and self.strength in (None, math.inf))
 
 @dataclass(frozen=True)
 class SweepTable:

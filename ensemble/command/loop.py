@@ -40,7 +40,7 @@ from adhesis.solver.loading.path import PathResult, run_path
 from adhesis.solver.loading.turning_points import run_loops
 from adhesis.solver.method import Branch, ContactState, Method, PathError
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.problem import Problem, strength_of
 from adhesis.solver.model.profile import Profile, profile_from_heights, self_affine_profile
 from adhesis.solver.registry import make_method
 
@@ -62,7 +62,8 @@ def execute(args: argparse.Namespace) -> int:
         source = input_record(args.heights or args.trace)
         half_space = HalfSpace(args.young, args.poisson)
         cycle = cycle_of(args, half_space)
-        problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control)
+        strength = strength_of(args.work_of_adhesion, args.adhesion_range, args.strength)
+        problem = Problem(profile, half_space, args.work_of_adhesion, cycle.control, strength)
         cycle.check(problem)
     _check_film(args, cycle)
     penetrations = _field_penetrations(args, cycle)

@@ -37,8 +37,9 @@ def execute(args: argparse.Namespace) -> int:
         control = control_of(args, half_space)
         turns = turning_points_of(args, control)
         cycle = make_cycle(
-            half_space, gammas, turns, args.load_steps, args.method, args.accuracy, control
-        )
+            half_space, gammas, turns, args.load_steps, args.method, args.accuracy, control,
+            args.adhesion_range, args.strength,
+        )  # fmt: skip
     if args.to is not None:
         check_output_folder("--to", args.to, _FILES, {"the command": args.file})
     prepared = prepared_of(args, trace_of(args, args.file))

@@ -12,7 +12,11 @@ import math
 from pathlib import Path
 
 from adhesis.ensemble.lengths import height, length
-from adhesis.ensemble.trace.trace_arguments import add_cycle_arguments, add_reading_arguments
+from adhesis.ensemble.trace.trace_arguments import (
+    add_cycle_arguments,
+    add_reading_arguments,
+    add_strength_arguments,
+)
 
 # The paper's profile (arXiv 1511.08891): period 2π mm, wave numbers 10 to 1000, h_rms 1 µm.
 PERIOD, N0, RATIO, H_RMS = 2e-3 * math.pi, 10, 100, 1e-6
@@ -62,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact.add_argument(
         "--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)"
     )
+    add_strength_arguments(contact)
     add_cycle_arguments(contact)
     contact.add_argument(
         "--path",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import tempfile
 from collections.abc import Sequence
@@ -100,6 +101,7 @@ def to_xarray(result: Result) -> xr.Dataset:
     about |= {name: value for name, value in result.numbers().items() if value is not None}
     about |= {
         "stiffness": problem.control.stiffness,
+        "strength": problem.strength,
         "method": json.dumps(asdict(result.method), default=lambda v: v.tolist()),
     }
     return xr.Dataset(variables, attrs=about)
@@ -210,6 +212,8 @@ def _result(found: xr.Dataset) -> Result:
         if name in _PARTS:
             dim, part = _PARTS[name]
             names = [entry.name for entry in fields(part)]
+            # a file of an earlier version lacks entries that have a default
+            names = [name for name in names if f"{dim}_{name}" in found]
             columns = [found[f"{dim}_{entry}"].values.tolist() for entry in names]
             rows = zip(*columns, strict=True)
             values[name] = tuple(part(**dict(zip(names, row, strict=True))) for row in rows)
@@ -230,5 +234,6 @@ def _result(found: xr.Dataset) -> Result:
         HalfSpace(float(about["young"]), float(about["poisson"])),
         float(about["work_of_adhesion"]),
         Control(float(about["stiffness"])),
+        float(about.get("strength", math.inf)),
     )
     return kind(problem=problem, method=method, **values)

@@ -235,8 +235,8 @@ def _limit(data: Aggregate) -> list[str]:
         for cell in data.cells
         if (value := least(cell.values["valid_range"])) is not None
     ]
-    if not found:
-        return []
+    if not found or data.campaign.material.opens:
+        return []  # patches open from inside where the limit ends
     low, cell = min(found, key=lambda entry: entry[0])
     out = [
         f"The zero-range limit holds for ranges of adhesion below {low:.3g} m: the least "

@@ -21,6 +21,8 @@ _LABELS = {
     "stiffness": "stiffness $k$ (Pa/m)",
     "young": "Young's modulus $E$ (Pa)",
     "poisson": r"Poisson's ratio $\nu$",
+    "adhesion_range": r"range of adhesion $\delta$ (m)",
+    "strength": r"strength $\sigma_\mathrm{th}$ (Pa)",
 }
 
 

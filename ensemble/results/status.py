@@ -69,6 +69,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy
         stop = results.campaign.stop
+        opens = results.campaign.material.opens
         axes = ["hurst", "work_of_adhesion"]
         axes += [dataset.name for dataset in axis_datasets(results.campaign)]
         state = results.status()
@@ -109,7 +110,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
-        "beyond_limit": _beyond_limit(state, column),
+        "beyond_limit": _beyond_limit(state, column, opens=opens),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
         "groups": _groups(state, column, axes, stop),
@@ -143,9 +144,10 @@ def _doubtful(
 
 
 def _beyond_limit(
-    state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
+    state: NDArray[np.uint8], column: dict[str, NDArray[Any]], *, opens: bool
 ) -> list[dict[str, Any]]:
-    rows = np.flatnonzero(beyond_limit(*(column[name] for name in _LIMIT)) & (state == DONE))
+    beyond = beyond_limit(*(column[name] for name in _LIMIT), opens=opens)
+    rows = np.flatnonzero(beyond & (state == DONE))
     rows = rows[np.argsort(column["valid_range"][rows], kind="stable")]
     return [
         {

@@ -415,7 +415,10 @@ class _Session:
         wrong = doubtful(self._campaign.solver.accuracy, loss, residual, error)
         steered = float(row[self._campaign.stop.quantity])
         contact = row["largest_contact_fraction"]
-        beyond = beyond_limit(row["valid_range"], loss, task.work_of_adhesion, contact)
+        opens = self._campaign.material.opens
+        beyond = beyond_limit(
+            row["valid_range"], loss, task.work_of_adhesion, contact, opens=opens
+        )
         return RowSummary(loss, residual, error, bool(wrong), steered, bool(beyond))
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:

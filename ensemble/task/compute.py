@@ -17,7 +17,7 @@ from adhesis.solver.loading.turning_points import LoadingBranch
 from adhesis.solver.method import Branch, Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.problem import Problem, strength_of
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.registry import make_method
 
@@ -48,7 +48,9 @@ def make_problem(campaign: Campaign, task: Task) -> Problem:
         control = Control(0.0)
     else:
         control = Control() if stiffness is None else Control(stiffness)
-    return Problem(profile, half_space, task.work_of_adhesion, control)
+    material = campaign.material
+    strength = strength_of(task.work_of_adhesion, material.adhesion_range, material.strength)
+    return Problem(profile, half_space, task.work_of_adhesion, control, strength)
 
 
 def check_task(campaign: Campaign, task: Task) -> None:

@@ -34,7 +34,7 @@ from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.registry import METHOD_NAMES, MethodName
-from adhesis.solver.values import ByValue
+from adhesis.solver.values import ByValue, finite
 
 QUANTITIES = {
     "loss": "J/m²",
@@ -227,6 +227,8 @@ def loss_of_trace(
     load_steps: int = 40,
     method: MethodName = "auto",
     accuracy: float = 1e-3,
+    adhesion_range: float | None = None,
+    strength: float | None = None,
     quick: bool = False,
     processes: int | None = None,
     progress: bool = False,
@@ -253,6 +255,9 @@ def loss_of_trace(
     method : {"auto", "sharp", "grid"}
     accuracy : float
         Wanted relative error of the loss of each loop.
+    adhesion_range, strength : float, optional
+        Range δ of adhesion in m, or instead the strength in Pa at which patches open from inside
+        (:class:`~adhesis.Problem`).
     quick : bool
         Without the two tables.
     processes : int, optional
@@ -285,6 +290,8 @@ def loss_of_trace(
         method,
         accuracy,
         control,
+        adhesion_range,
+        strength,
     )
     check(prepared, cycle)
     flag("quick", quick)
@@ -328,6 +335,8 @@ def make_cycle(
     method: MethodName,
     accuracy: float,
     control: Control | None = None,
+    adhesion_range: float | None = None,
+    strength: float | None = None,
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -348,7 +357,12 @@ def make_cycle(
             raise ValueError(f"{name} is empty: it must hold one number at least")
     for point in turns:
         check_cycle(point, load_steps, control)
-    return Cycle(half_space, gammas, turns, load_steps, method, accuracy, control)
+    cycle = Cycle(
+        half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength
+    )
+    for gamma in gammas:
+        cycle.strength_at(gamma)
+    return cycle
 
 
 def check(prepared: Prepared, cycle: Cycle) -> None:
@@ -356,7 +370,8 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
     instance("prepared", prepared, Prepared, "prepare_trace(read_trace(source))")
     profile = prepared.profile()
     for gamma in cycle.works_of_adhesion:
-        Problem(profile, cycle.half_space, gamma)
+        strength = cycle.strength_at(gamma)
+        Problem(profile, cycle.half_space, gamma, strength=strength)
 
 
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
@@ -495,6 +510,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "poisson": cycle.half_space.poisson,
         "work_of_adhesion": cycle.works_of_adhesion[0],
         "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
+        "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
         "max_penetration": None if cycle.control.is_load else cycle.turning_points[0],
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
         "load_steps": cycle.load_steps,

@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     contact.add_argument("--young", type=float, required=True, metavar="E", help="Pa")
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
+    add_strength_arguments(contact)
     add_cycle_arguments(contact)
     contact.add_argument(
         "--method", default="auto", metavar="NAME", help="grid, sharp or auto (default auto)"
@@ -74,6 +75,18 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         help="instead: the stiffness of a layer of this thickness, 1mm",
     )
     group.add_argument("--load-steps", type=int, default=40, metavar="N", help="(default 40)")
+
+
+def add_strength_arguments(group: argparse._ArgumentGroup) -> None:
+    """Declare the strength of the interface; ``adhesis loop`` shares it."""
+    group.add_argument(
+        "--adhesion-range",
+        type=length,
+        metavar="D",
+        help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
+        "(default: zero range, they never do)",
+    )
+    group.add_argument("--strength", type=float, metavar="S", help="Pa: instead, that strength")
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:

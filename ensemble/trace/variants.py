@@ -16,6 +16,7 @@ from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.worker import Job
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
+from adhesis.solver.model.problem import strength_of
 from adhesis.solver.model.profile import Profile
 from adhesis.solver.registry import MethodName
 from adhesis.solver.values import ByValue
@@ -45,6 +46,8 @@ class Cycle:
     method: MethodName = "auto"
     accuracy: float = 1e-3
     control: Control = field(default_factory=Control)
+    adhesion_range: float | None = None
+    strength: float | None = None
 
     def turn(self, point: float) -> str:
         """Describe a turning point: "Δ/h_max = 0.9"."""
@@ -53,6 +56,10 @@ class Cycle:
         if self.control.is_fixed:
             return f"Δ/h_max = {point:g}"
         return f"u_tot/h_max = {point:g} of a stiffness of {self.control.stiffness:.4g} Pa/m"
+
+    def strength_at(self, work_of_adhesion: float) -> float:
+        """Return the strength of the interface in Pa at a work of adhesion in J/m²."""
+        return strength_of(work_of_adhesion, self.adhesion_range, self.strength)
 
 
 @dataclass(frozen=True)
@@ -249,18 +256,20 @@ def _tables(cycle: Cycle) -> list[Run]:
 
 def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
+    gamma = gamma if run.work_of_adhesion is None else run.work_of_adhesion
     return Job(
         name=run.name,
         period=profile.period,
         coefficients=profile.coefficients,
         young=cycle.half_space.young,
         poisson=cycle.half_space.poisson,
-        work_of_adhesion=gamma if run.work_of_adhesion is None else run.work_of_adhesion,
+        work_of_adhesion=gamma,
         turning_point=point if run.turning_point is None else run.turning_point,
         stiffness=cycle.control.stiffness,
         load_steps=cycle.load_steps,
         method=cycle.method,
         accuracy=cycle.accuracy,
+        strength=cycle.strength_at(gamma),
     )
 
 

@@ -50,6 +50,7 @@ class Job(ByValue):
     method: MethodName
     accuracy: float
     stiffness: float = math.inf
+    strength: float = math.inf
 
 
 def main() -> None:
@@ -76,7 +77,7 @@ def main() -> None:
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists."""
     from adhesis.solver.loading.loop import run_loop
-    from adhesis.solver.loading.zero_range import range_warnings
+    from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
     from adhesis.solver.method import Branch, ContactState
     from adhesis.solver.model.control import Control
     from adhesis.solver.model.half_space import HalfSpace
@@ -94,7 +95,7 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
 
     profile = Profile(job.period, job.coefficients)
     half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
-    problem = Problem(profile, half_space, job.work_of_adhesion, control)
+    problem = Problem(profile, half_space, job.work_of_adhesion, control, strength=job.strength)
     method = make_method(job.method, problem, accuracy=job.accuracy)
     name = "max_stress" if control.is_load else "max_penetration"
     turn: Any = {name: job.turning_point}
@@ -103,7 +104,8 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     return loop.numbers() | {
         "range_warnings": range_warnings(
             problem, loop.valid_range, loop.loss, loop.contact_fraction
-        ),
+        )
+        + opening_warnings(loop.jumps, loop.loss),
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),

@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adhesis.solver.crack import largest_excess
 from adhesis.solver.grid.contact import Contact, Mask
 from adhesis.solver.grid.edges import patch_ranges
+from adhesis.solver.grid.opening import Openings
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import state_of
 from adhesis.solver.method import ContactState, PathError
@@ -21,6 +23,8 @@ _OVERLAP = 1e-6  # of h_max: a smaller overlap counts as touch
 _NEAREST = 1e-8  # of the range: resolution of the location of first touch
 _APART = 0.1  # shortest waves between edges of different minima
 _FEWEST_APART = 2  # nodes
+_STRENGTH_EXCEEDED = 1e-3  # of the strength: by so much a tension may exceed it when it opens
+_MOST_OPENINGS = 1000  # one after the other at one place of a path; more are an endless loop
 
 
 @dataclass
@@ -81,6 +85,7 @@ class Steps:
             self.scale = h_max + problem.stress_scale / control.stiffness
         self.adhesion_scale = problem.work_of_adhesion * self.period
         # Relative error of a drop.
+        self.openings = Openings(problem, self.lattice)
         self.coarse = (
             min(1.0, _COARSE * self.lattice.dx / first_width(problem))
             if self.adhesion_scale
@@ -120,6 +125,7 @@ class Steps:
         step = prescribed - contact.prescribed
         # In shorter steps a jump is relaxed to its end, which shows how precisely it is located.
         self.least = self.accuracy * self.scale
+        left, contact = self._open(contact)
         while contact.prescribed != prescribed:
             remaining = prescribed - contact.prescribed
             if abs(step) >= abs(remaining) * (1 - 1e-9):
@@ -133,10 +139,15 @@ class Steps:
                 self.count.bisections += 1
                 step *= self.share
                 continue
+            excess, _ = self.openings.least(after)
+            if not located and self._is_late(excess, abs(step)):
+                self.count.bisections += 1
+                step *= min(max(left / (left - excess), 0.02), 0.98) if left > 0 else 0.5
+                continue
             self.count.substeps += 1
             if not located:
                 self._append(after)
-            contact = after
+            left, contact = self._open(after)
             if not control.is_fixed and np.count_nonzero(~contact.mask) <= 1:
                 raise PathError(self.problem.full_contact(target))
             if control.is_load and not contact.mask.any():
@@ -144,6 +155,40 @@ class Steps:
             step *= 2
         if not self.states or self.reached != prescribed:
             self._append(contact)
+
+    def _is_late(self, excess: float, stride: float) -> bool:
+        """Whether a step passed an opening, and a shorter one would locate it better."""
+        return excess < -_STRENGTH_EXCEEDED and stride > 0.05 * self.accuracy * self.scale
+
+    def _open(self, contact: Contact) -> tuple[float, Contact]:
+        """Let patches open inside where the tension has reached the strength, one after the other.
+
+        Returns the least value of all maxima of tension that is left, and the contact.
+
+        Raises
+        ------
+        PathError
+            If patches open and close without end.
+        """
+        for _ in range(_MOST_OPENINGS):
+            least, cracks = self.openings.least(contact)
+            if least > 0:
+                return least, contact
+            opened = self.openings.seeded(contact, cracks)
+            self.solver.solve(opened, self.relaxation.tight)
+            relaxed = self.relaxation.relax(opened)
+            assert relaxed is not None
+            if (relaxed.mask == contact.mask).all():
+                self.openings.healed += largest_excess(cracks)
+                continue
+            before = state_of(self.lattice, contact)
+            self.states.append(before)
+            self._jump(before, opened, relaxed, self.openings.barrier(cracks))
+            contact = relaxed
+        raise PathError(
+            f"method 'grid' finds no state at a mean gap of {contact.separation:.6g} m: patches "
+            "open and close in turn; the method 'sharp', or other nodes, may"
+        )
 
     def _substep(
         self, contact: Contact, target: float, divisible: bool
@@ -267,8 +312,13 @@ class Steps:
         self.reached = contact.prescribed
         return state
 
-    def _jump(self, before: ContactState, start: Contact, after: Contact) -> None:
-        """Append the jump to ``after``, the minimum reached by descent from ``start``."""
+    def _jump(
+        self, before: ContactState, start: Contact, after: Contact, barrier: float = 0.0
+    ) -> None:
+        """Append the jump to ``after``, the minimum reached by descent from ``start``.
+
+        ``barrier`` in J/m² is that of an opening.
+        """
         other = self._rival(start, after)
         lost = self.lattice.control.is_load and not after.mask.any()
         if lost:
@@ -278,8 +328,9 @@ class Steps:
         if other is not None:
             at_stake = abs(self.energy(other) - self.energy(after)) / self.period
         jump = Jump.between(
-            before, end, self.branch, self.period, raced=other is not None, at_stake=at_stake
-        )
+            before, end, self.branch, self.period, raced=other is not None, at_stake=at_stake,
+            barrier=barrier,
+        )  # fmt: skip
         if lost:
             # The work of the load is not counted (adhesis.solver.model.control).
             jump = replace(jump, energy_drop=before.energy / self.period)

@@ -141,6 +141,16 @@ class EquilibriumPath(ByValue, Viewed):
         return sum(jump.raced for jump in self.jumps)
 
     @property
+    def openings(self) -> int:
+        """Number of jumps that begin with a gap that opens inside a patch."""
+        return sum(jump.kind == "opening" for jump in self.jumps)
+
+    @property
+    def barrier(self) -> float:
+        """Sum of the barriers of these openings, in J/m² (:class:`Jump`)."""
+        return float(sum(jump.barrier for jump in self.jumps))
+
+    @property
     def energy_at_stake(self) -> float:
         """Sum over the jumps of the energy that depends on the assumed kinetics, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
@@ -155,7 +165,8 @@ class EquilibriumPath(ByValue, Viewed):
         """
         problem, half_space = self.problem, self.problem.half_space
         own = (*self._numbers, "loss_from_drops", "audit_residual", "loss_error", "races")
-        more = ("energy_at_stake", "largest_contact_fraction", "largest_interior_tension")
+        own = (*own, "energy_at_stake", "openings", "barrier")
+        more = ("largest_contact_fraction", "largest_interior_tension")
         values = {name: getattr(self, name) for name in (*own, *more)}
         gamma = problem.work_of_adhesion
         return {
@@ -164,6 +175,7 @@ class EquilibriumPath(ByValue, Viewed):
             "poisson": half_space.poisson,
             "work_of_adhesion": gamma,
             "stiffness": finite(problem.control.stiffness),
+            "strength": finite(problem.strength),
             "full_contact_energy": problem.full_contact_energy,
             "load_steps": self.load_steps,
             **values,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from adhesis.solver.checks import choice, counted, reals
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.loading.zero_range import range_summary, range_warnings
+from adhesis.solver.loading.zero_range import opening_warnings, range_summary, range_warnings
 from adhesis.solver.method import Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch
@@ -117,6 +117,7 @@ class LoopResult(EquilibriumPath):
                 f"J/m², is larger than {most:g} of it, the relative error allowed"
             )
         found += range_warnings(self.problem, self.valid_range, self.loss, self.contact_fraction)
+        found += opening_warnings(self.jumps, self.loss)
         return tuple(found)
 
     @property

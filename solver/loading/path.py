@@ -26,7 +26,7 @@ from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
 from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
 from adhesis.solver.loading.loop_result import estimated_error
 from adhesis.solver.loading.path_record import Axis, Record
-from adhesis.solver.loading.zero_range import range_warnings
+from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
 from adhesis.solver.method import ContactState, Method, PathError
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
@@ -141,7 +141,8 @@ class PathResult(EquilibriumPath):
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what makes the work doubtful; none for most paths."""
         lost = self.loss_from_drops
-        return tuple(range_warnings(self.problem, self.valid_range, lost, self.contact_fraction))
+        found = range_warnings(self.problem, self.valid_range, lost, self.contact_fraction)
+        return (*found, *opening_warnings(self.jumps, lost))
 
     @property
     def loss(self) -> float:

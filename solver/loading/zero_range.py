@@ -27,6 +27,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import ContactState, Method
 from adhesis.solver.model.jump import Branch, Jump
@@ -38,6 +39,12 @@ DOUBTFUL_RANGE = 1e-9
 
 DOUBTFUL_LOSS = 20.0
 """Loss over γ A_max/A0 above which a loss is doubtful (docs/zero-range.md)."""
+
+DOUBTFUL_EXCESS = 1.1
+"""Tension inside patches over a finite strength above which a loss is doubtful."""
+
+DOUBTFUL_BARRIER = 0.1
+"""Barriers of all openings over the loss above which a loss is doubtful (docs/zero-range.md)."""
 
 # Tension is looked at before so many jumps of unloading, those with the largest drops: what carries
 # the largest tension is what gives way with a large drop. And at so many states of the whole path.
@@ -173,6 +180,21 @@ class HasRanges(Protocol):
     """A loop or a path."""
 
     @property
+    def problem(self) -> Problem:
+        """What was solved."""
+        ...
+
+    @property
+    def openings(self) -> int:
+        """Number of openings from inside."""
+        ...
+
+    @property
+    def barrier(self) -> float:
+        """Sum of their barriers, in J/m²."""
+        ...
+
+    @property
     def interior(self) -> InteriorTension | None:
         """Largest tension inside patches."""
         ...
@@ -191,6 +213,16 @@ class HasRanges(Protocol):
 def range_summary(result: HasRanges) -> str:
     """Return in a line for a terminal below which ranges of adhesion the zero-range limit holds."""
     interior = result.interior
+    strength = result.problem.strength
+    if math.isfinite(strength):
+        range_ = result.problem.work_of_adhesion / strength
+        largest = 0.0 if interior is None else interior.tension
+        return (
+            f"adhesion of a range of {range_:.3g} m: patches open from inside at {strength:.3g} "
+            f"Pa, {counted(result.openings, 'opening')} with barriers of {result.barrier:.2g} "
+            f"J/m²; largest tension inside patches {largest:.3g} Pa; at edges "
+            f"{result.edge_range:.3g} m"
+        )
     if interior is None:
         return "no tension inside patches"
     return (
@@ -200,14 +232,41 @@ def range_summary(result: HasRanges) -> str:
     )
 
 
+def opening_warnings(jumps: Sequence[Jump], loss: float) -> list[str]:
+    """Return the sentence of doubt where barriers of openings are not small beside the loss.
+
+    Parameters
+    ----------
+    jumps : sequence of Jump
+    loss : float
+        In J/m².
+    """
+    barrier = sum(jump.barrier for jump in jumps)
+    if barrier <= DOUBTFUL_BARRIER * abs(loss):
+        return []
+    return [
+        f"the barriers of openings add up to {barrier:.2g} J/m², more than {DOUBTFUL_BARRIER:g} "
+        f"of the loss ({loss:.3g} J/m²): how patches open, which zero range leaves open, matters "
+        "for it (docs/zero-range.md)"
+    ]
+
+
 def beyond_limit(
-    valid_range: Any, loss: Any, work_of_adhesion: Any, largest_contact_fraction: Any
+    valid_range: Any,
+    loss: Any,
+    work_of_adhesion: Any,
+    largest_contact_fraction: Any,
+    *,
+    opens: bool = False,
 ) -> NDArray[np.bool_]:
     """Return which losses are those of the zero-range limit alone; values or arrays of one shape.
 
     Their valid range is below :data:`DOUBTFUL_RANGE`, or they are more than :data:`DOUBTFUL_LOSS`
-    times the work of adhesion of the largest contact.
+    times the work of adhesion of the largest contact. None of them is where patches open from
+    inside, at a finite strength.
     """
+    if opens:
+        return np.zeros(np.shape(loss), dtype=np.bool_)
     most = DOUBTFUL_LOSS * np.asarray(work_of_adhesion) * np.asarray(largest_contact_fraction)
     above = (np.asarray(loss) > most) & (np.asarray(work_of_adhesion) > 0)
     return np.asarray((np.asarray(valid_range) < DOUBTFUL_RANGE) | above)
@@ -216,8 +275,21 @@ def beyond_limit(
 def range_warnings(
     problem: Problem, range_: float, loss: float, contact_fraction: Sequence[float] | Array
 ) -> list[str]:
-    """Return the sentences of doubt where a loss is that of the zero-range limit alone."""
-    out = []
+    """Return the sentences of doubt where a loss is that of the zero-range limit alone.
+
+    At a finite strength patches open from inside; doubtful is then a tension that exceeds it where
+    no crack grows.
+    """
+    out: list[str] = []
+    if math.isfinite(problem.strength):
+        excess = problem.work_of_adhesion / range_ / problem.strength
+        if excess > DOUBTFUL_EXCESS:
+            out.append(
+                f"the tension inside patches reaches {excess:.3g} times the strength "
+                f"({problem.strength:.3g} Pa) where no crack that fits grows: how such places "
+                "yield, which zero range leaves open, may matter for the loss (docs/zero-range.md)"
+            )
+        return out
     if range_ < DOUBTFUL_RANGE:
         out.append(
             f"valid_range is {range_:.2g} m: the zero-range limit holds only for ranges of "

@@ -10,8 +10,11 @@ The first kind that applies is assigned (a jump may run through several events):
 ``spreading``   edges advance, the patches stay the same.
 ``receding``    edges recede, the patches stay the same.
 
+A jump that begins with a gap that opens inside a patch, at a finite strength of the interface, has
+the kind ``opening``, whatever comes of it.
+
 Spreading and receding are the small-scale mechanism (an edge moves over the roughness of one
-patch); the others are the large-scale mechanism (patches form, merge, split and vanish).
+patch); the others are the large-scale mechanism (patches form, merge, split, open and vanish).
 """
 
 from __future__ import annotations
@@ -32,7 +35,7 @@ Branch = Literal["loading", "unloading"]
 BRANCHES: tuple[Branch, ...] = get_args(Branch)
 
 JumpKind = Literal[
-    "pull-off", "snap-in", "merging", "vanishing", "splitting", "spreading", "receding"
+    "pull-off", "snap-in", "merging", "vanishing", "splitting", "spreading", "receding", "opening"
 ]
 JUMP_KINDS: tuple[JumpKind, ...] = get_args(JumpKind)
 SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
@@ -63,6 +66,9 @@ class Jump(Shown):
     at_stake : float
         |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
         under the other assumed edge kinetics; 0 unless ``raced``.
+    barrier : float
+        Of an opening, the energy per unit nominal area, in J/m², up to the crack that grows by
+        itself, which adhesion of zero range has to be lifted over; else 0.
 
     References
     ----------
@@ -80,6 +86,7 @@ class Jump(Shown):
     patch_length: float
     raced: bool = False
     at_stake: float = 0.0
+    barrier: float = 0.0
 
     @classmethod
     def between(
@@ -91,6 +98,7 @@ class Jump(Shown):
         *,
         raced: bool = False,
         at_stake: float = 0.0,
+        barrier: float = 0.0,
     ) -> Jump:
         """Make the jump from one contact state to another at the same prescribed value.
 
@@ -100,10 +108,12 @@ class Jump(Shown):
         branch : {"loading", "unloading"}
         period : float
             λ in m.
-        raced, at_stake
-            As in the class.
+        raced, at_stake, barrier
+            As in the class; a jump with a barrier is an opening.
         """
         kind, length = classify(before.edges, after.edges, period)
+        if barrier > 0:
+            kind = "opening"
         return cls(
             branch=branch,
             separation=before.separation,
@@ -116,6 +126,7 @@ class Jump(Shown):
             patch_length=length,
             raced=raced,
             at_stake=at_stake,
+            barrier=barrier,
         )
 
     @property

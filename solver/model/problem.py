@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import InitVar, dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
-from adhesis.solver.checks import RMS_SLOPE, WORK_OF_ADHESION, instance, plain, real
+from adhesis.solver.checks import (
+    ADHESION_RANGE,
+    RMS_SLOPE,
+    STRENGTH,
+    WORK_OF_ADHESION,
+    instance,
+    plain,
+    real,
+)
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -15,6 +24,9 @@ from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
 
 Value = TypeVar("Value", float, Array)
+
+# Of the shortest wave: a crack that opens a patch may be this long at most (docs/zero-range.md).
+_LONGEST_CRACK = 0.25
 
 # Rounding of a separation over h_max: smaller penetrations count as 0.
 _ROUNDING = 8 * float(np.finfo(float).eps)
@@ -38,11 +50,37 @@ def check_slope(rms_slope: float) -> None:
         raise ValueError(f"rms slope is {shown}: it must be {RMS_SLOPE.text}")
 
 
+def strength_of(
+    work_of_adhesion: float, adhesion_range: float | None, strength: float | None = None
+) -> float:
+    """Compute the strength σ_th in Pa from either the range of adhesion in m or itself.
+
+    Infinite if neither is given, or without adhesion, where nothing is in tension.
+
+    Raises
+    ------
+    ValueError
+        If both are given, or one is out of its bounds.
+    TypeError
+        If one is not a number.
+    """
+    if adhesion_range is None:
+        found = math.inf if strength is None else real("strength", strength, STRENGTH)
+    else:
+        if strength is not None and strength != math.inf:
+            raise ValueError(
+                f"adhesion_range is {adhesion_range!r} and strength is {strength!r}: give one of "
+                "them, strength = work_of_adhesion/adhesion_range"
+            )
+        found = work_of_adhesion / real("adhesion_range", adhesion_range, ADHESION_RANGE)
+    return found if work_of_adhesion > 0 else math.inf
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Problem(ByValue):
     """A rigid periodic profile pressed into an elastic half-space with zero-range adhesion.
 
-    Immutable; two problems are equal if all four parts are.
+    Immutable; two problems are equal if all five parts are.
 
     Parameters
     ----------
@@ -53,12 +91,19 @@ class Problem(ByValue):
         γ in J/m², 0 (contact without adhesion) or from 1e-30 to 1e30.
     control : Control
         Prescribed quantity; the separation by default.
+    strength : float
+        σ_th in Pa: where the tension inside a patch reaches it, the patch opens from inside.
+        Infinite by default, that of adhesion of zero range (docs/zero-range.md).
+    adhesion_range : float, optional
+        Instead of the strength, the range δ of adhesion in m: σ_th = γ/δ.
 
     Raises
     ------
     ValueError
-        If γ is out of bounds, or the rms slope far beyond small strain, as it is when heights and
-        period have different units.
+        If γ or the strength is out of bounds, both strength and range are given, the strength is so
+        low that Griffith's crack at that tension is longer than a quarter of the shortest wave, or
+        the rms slope is far beyond small strain, as it is when heights and period have different
+        units.
     TypeError
         If a part is of another class, or γ not a number.
 
@@ -71,14 +116,44 @@ class Problem(ByValue):
     half_space: HalfSpace
     work_of_adhesion: float
     control: Control = field(default_factory=Control)
+    strength: float = math.inf
+    adhesion_range: InitVar[float | None] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, adhesion_range: float | None) -> None:
         instance("profile", self.profile, Profile, "single_wave or profile_from_heights")
         instance("half_space", self.half_space, HalfSpace, "HalfSpace(young, poisson)")
         gamma = real("work_of_adhesion", self.work_of_adhesion, WORK_OF_ADHESION)
         object.__setattr__(self, "work_of_adhesion", gamma)
         instance("control", self.control, Control, "Control(stiffness), for a load Control(0)")
         check_slope(float(np.sqrt(self.profile.m2)))
+        object.__setattr__(self, "strength", strength_of(gamma, adhesion_range, self.strength))
+        self._check_strength(adhesion_range)
+
+    def _check_strength(self, adhesion_range: float | None) -> None:
+        """Refuse a strength at which a crack as long as the waves would have to be put."""
+        most = _LONGEST_CRACK * self.profile.shortest_wavelength
+        if math.isinf(self.strength) or self.critical_crack <= most:
+            return
+        least = math.sqrt(4 * self.half_space.modulus * self.work_of_adhesion / (math.pi * most))
+        if adhesion_range is None:
+            given, rule = f"strength is {self.strength:g} Pa", f"at least {least:.3g} Pa"
+        else:
+            given = f"adhesion_range is {adhesion_range:g} m"
+            rule = f"at most {self.work_of_adhesion / least:.3g} m"
+        raise ValueError(
+            f"{given}: it must be {rule} for this profile, or the crack that opens a patch, "
+            f"{self.critical_crack:.3g} m long, exceeds a quarter of the shortest wave, and edges "
+            "of zero range do not describe it"
+        )
+
+    @property
+    def critical_crack(self) -> float:
+        """Length 4 E*γ/(πσ_th²) in m of Griffith's crack at the strength; 0 if that is infinite.
+
+        Under a uniform tension σ_th a longer gap inside a patch grows, a shorter one closes.
+        """
+        modulus = self.half_space.modulus
+        return 4 * modulus * self.work_of_adhesion / (math.pi * self.strength**2)
 
     @property
     def stress_scale(self) -> float:

@@ -41,6 +41,7 @@ from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
+from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import States, hold_of
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 from adhesis.solver.sharp.output.interior_tension import largest_tension
@@ -158,8 +159,9 @@ class SharpMethod(Method):
         self.nucleation = Nucleation(problem, self.edges)
         self.jumps = Jumps(self.edges, self.nucleation, self.states)
         self.follower = Follower(
-            self.edges, self.nucleation, self.states, self.jumps, self.resolution
-        )
+            self.edges, self.nucleation, Openings(problem, self.edges), self.states, self.jumps,
+            self.resolution,
+        )  # fmt: skip
         self._loaded: list[ContactState] = []  # without adhesion: the way back
 
     def report(self) -> SharpReport:

@@ -466,3 +466,21 @@ def test_a_missing_file_and_unwritable_places_are_refused(wave_file, tmp_path, c
 @pytest.mark.usefixtures("exact_method")
 def test_a_device_is_written_in_place(wave_file):
     assert run(*wave_words(wave_file, "--load-steps", 2, "--json", "/dev/null")) == 0
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_the_strength_of_the_interface_is_an_option_and_stands_in_the_json(
+    wave_file, tmp_path, capsys
+):
+    out = tmp_path / "loop.json"
+    for words in (("--strength", 1e4), ("--adhesion-range", GAMMA / 1e4)):
+        assert run(*wave_words(wave_file, "--max-penetration", 0.8, "--json", out, *words)) == 0
+        data = json.loads(out.read_text())
+        assert data["strength"] == pytest.approx(1e4)
+        assert (data["openings"], data["barrier"]) == (0, 0.0)
+        assert {jump["barrier"] for jump in data["jumps"]} == {0.0}
+    capsys.readouterr()
+    assert run(*wave_words(wave_file, "--strength", 1e4, "--adhesion-range", 1e-9)) == 2
+    assert capsys.readouterr().err.startswith("adhesis loop: --adhesion-range is 1e-09 and")
+    assert run(*wave_words(wave_file, "--strength", 1e-4)) == 2
+    assert "--strength is 0.0001 Pa: it must be at least" in capsys.readouterr().err

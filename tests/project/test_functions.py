@@ -25,7 +25,8 @@ MATHEMATICAL = {
     "descent/gradient_flow.py": {"AT_REST", "VANISHED", "STEP_LIMIT", "NO_FIELD", "REJOINED"},
     "output/grid_fields.py": {"_FIELD_NODES", "_FINER"},  # nodes of an output, not of a loop
     # nodes and numbers of trials of a diagnosis, which no loss depends on
-    "output/interior_tension.py": {"_PER_WAVE", "_POINTS", "_COARSE", "_MOVES", "_CANDIDATES"},
+    "field/patch_tension.py": {"_PER_WAVE", "_COARSE", "_POINTS", "_MOVES"},
+    "output/interior_tension.py": {"_CANDIDATES"},
     "field/assembly.py": {"_PERIODIC_SERIES", "_MAPPED_SERIES"},  # ranges of series
     "field/cholesky.py": {"BLOCK"},
     "field/opening_series.py": {"_MANY_NODES", "_PER_UNIT"},  # sizes of tables

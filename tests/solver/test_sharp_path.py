@@ -112,7 +112,7 @@ def test_a_touch_on_the_last_step_to_a_fold_is_found_with_edges_held():
     assert 0.2 * h_max < found.point.at < 0.8 * h_max
     np.testing.assert_array_equal(found.point.gaps, point.gaps)
     _, opening = explicit_openings(profile, point.gaps, found.point.at)
-    touch = found.touches[0]
+    touch = found.seeds[0]
     assert touch.opening == pytest.approx(0, abs=1e-6 * h_max)
     assert opening.min() == pytest.approx(0, abs=1e-4 * h_max)  # at the nodes next to the touch
 

@@ -9,10 +9,11 @@ within both errors, where nothing raced; and for every twentieth that ``grid`` d
 refused (PathError) is counted.
 
     python tools/fuzz/loops.py --seed N [--scenes 2000] [--log FILE] [--number K]
-        [--tight] [--waves M]
+        [--tight] [--waves M] [--strength]
 
 With ``--tight`` only the scenes are followed that are compared with a far more accurate run, with
-``--waves`` only those of at most so many waves: they are cheap.
+``--waves`` only those of at most so many waves: they are cheap. With ``--strength`` patches open
+from inside, at ranges of adhesion over four decades; then no state may exceed the strength inside.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ _PATIENCE = 20  # times as many seconds of the clock, should a process only slee
 
 
 def _work(tasks: Any, results: Any) -> None:
-    for seed, number in iter(tasks.get, None):
-        results.put((number, judge(draw(seed, number), number)))
+    for seed, number, strength in iter(tasks.get, None):
+        results.put((number, judge(draw(seed, number, strength), number)))
 
 
 class Worker:
@@ -61,9 +62,9 @@ class Worker:
         clock = (~self.process.pid << 3) | 2  # Linux: the CPU clock of another process
         return time.clock_gettime(clock)
 
-    def judge(self, seed: int, number: int) -> dict[str, Any]:
+    def judge(self, seed: int, number: int, strength: bool) -> dict[str, Any]:
         """Judge one scene; a process that dies or takes too long is a failure."""
-        self.tasks.put((seed, number))
+        self.tasks.put((seed, number, strength))
         started, begun = self._spent(), time.monotonic()
         spent = 0.0
         while spent < LIMIT and time.monotonic() - begun < _PATIENCE * LIMIT:
@@ -108,11 +109,12 @@ def main() -> int:
     parser.add_argument("--number", type=int, help="this scene alone")
     parser.add_argument("--tight", action="store_true", help="only scenes that are compared so")
     parser.add_argument("--waves", type=float, default=np.inf, help="highest wave number over q0")
+    parser.add_argument("--strength", action="store_true", help="patches open from inside")
     parser.add_argument("--log", type=Path, help="a line of JSON for each scene")
     args = parser.parse_args()
     if args.number is not None:
-        print(draw(args.seed, args.number))
-        one = judge(draw(args.seed, args.number), args.number)
+        print(draw(args.seed, args.number, args.strength))
+        one = judge(draw(args.seed, args.number, args.strength), args.number)
         print(one)
         return int(bool(one["wrong"]))
     end, shown = time.monotonic() + args.seconds, time.monotonic()
@@ -123,12 +125,12 @@ def main() -> int:
     for number in range(args.first, args.first + args.scenes):
         if time.monotonic() > end and everything:
             break
-        scene = draw(args.seed, number)
+        scene = draw(args.seed, number, args.strength)
         if scene.n0 * scene.ratio > args.waves or (
             args.tight and not compared_tightly(scene, number)
         ):
             continue
-        found = worker.judge(args.seed, number)
+        found = worker.judge(args.seed, number, args.strength)
         if not worker.process.is_alive():
             worker = Worker()
         everything.append(found)
@@ -136,16 +138,19 @@ def main() -> int:
         races += bool(found.get("races"))
         if args.log is not None:
             with args.log.open("a") as log:
-                line = {"number": number, **found, "scene": asdict(draw(args.seed, number))}
+                line = {"number": number, **found, "scene": asdict(scene)}
                 print(json.dumps(line), file=log)
         if found["wrong"]:
             failures += 1
             again = f"python tools/fuzz/loops.py --seed {args.seed} --number {number}"
-            print(f"{'; '.join(found['wrong'])}\n    {again}\n    {draw(args.seed, number)}")
+            again += " --strength" if args.strength else ""
+            print(f"{'; '.join(found['wrong'])}\n    {again}\n    {scene}")
         if time.monotonic() - shown > 14:
             shown = time.monotonic()
             count = len(everything)
             print(f"fuzz: {count} loops, {failures} wrong, {races} with races", flush=True)
+    if args.strength:
+        print(f"fuzz: {sum(found.get('openings', 0) for found in everything)} openings")
     seconds = sum(found.get("seconds", 0.0) for found in everything)
     print(
         f"fuzz: {len(everything)} loops in {seconds:.0f} s of CPU time, {failures} wrong, "

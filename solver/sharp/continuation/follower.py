@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from adhesis.solver.crack import Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
@@ -13,15 +14,19 @@ from adhesis.solver.sharp.continuation.history import ComputedJump, History
 from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
-from adhesis.solver.sharp.nucleation.nucleation import Located, Nucleation
+from adhesis.solver.sharp.nucleation.location import Located, locate
+from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
+from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import Memory, States
 from adhesis.solver.sharp.tolerances import (
     FINER_FIELD,
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
+    MOST_OPENINGS,
     PREDICTED_MOTION,
     SAME_BRANCH,
 )
@@ -34,6 +39,9 @@ class Follower:
     ----------
     edges : EdgeMechanics
     nucleation : Nucleation
+        Contact that appears in gaps.
+    openings : Openings
+        Gaps that appear in contact.
     states : States
     jumps : Jumps
     resolution : Resolution
@@ -43,18 +51,20 @@ class Follower:
         self,
         edges: EdgeMechanics,
         nucleation: Nucleation,
+        openings: Openings,
         states: States,
         jumps: Jumps,
         resolution: Resolution,
     ) -> None:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
-        self.resolution = resolution
+        self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
         self._last: tuple[Memory, Point] | None = None
 
     def remembered(self, memory: Memory | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
         self.nucleation.clearances.seen = NOT_SEEN if memory is None else memory.seen
+        self.openings.healed = []
         if memory is None or memory.course is None:
             return None
         if self._last is not None and self._last[0] is memory:
@@ -70,6 +80,10 @@ class Follower:
         at, point
             d reached and the stable point there, None if no contact is left.
         """
+        jump = self._opening_at(history, point, target)
+        if jump is not None:
+            history.commit(jump)
+            return jump.at, jump.point
         branch = Branch(self.edges, self.closing, self.resolution, point, target)
         while branch.point.at != target.at:
             event = branch.advance()
@@ -110,14 +124,14 @@ class Follower:
         if event.is_output:
             fixed = self.edges.is_fixed and point.at == target.at
             output = self.states.of_point(point, target.prescribed if fixed else None)
-        touched = None
+        jump = None
         # Every state that is handed out is searched; between states only if a gap may have closed.
         if event.is_output or event.may_touch:
-            touched = self._search(branch)
-        if output is not None and (touched is None or self._is_before(output, touched, target)):
+            jump = self._nucleation_jump(branch, target)
+        if output is not None and (jump is None or self._is_before(output, jump, target)):
             history.states.append(output)
-        if touched is not None:
-            return self._touch_jump(touched, target)
+        if jump is not None:
+            return jump
         if event.remaining is None:
             return None
         states = () if event.is_output else (self.states.of_point(point),)
@@ -129,9 +143,9 @@ class Follower:
         self, history: History, branch: Branch, fold: Fold, target: Target
     ) -> ComputedJump | None:
         """Return the jump at the end of a branch; None if the branch goes on, or is refined."""
-        touched = self._search(branch)
-        if touched is not None:
-            return self._touch_jump(touched, target)
+        jump = self._nucleation_jump(branch, target)
+        if jump is not None:
+            return jump
         touched = self._touch_before_fold(fold)
         if touched is not None:
             touching = self._touch_jump(touched, target)
@@ -154,32 +168,87 @@ class Follower:
             return None
         return jump
 
-    def _search(self, branch: Branch) -> Located | None:
-        """Search the trail for the first touch; without one it begins anew."""
+    def _nucleation_jump(self, branch: Branch, target: Target) -> ComputedJump | None:
+        """Compute the jump where contact first appears in a gap, or a gap in contact; else None.
+
+        The trail is searched for both; without a touch it begins anew.
+        """
         trail = branch.trail
         if len(trail.points) == 1:
             return None
-        touched, clearance = self.nucleation.located(
-            trail.points, self.resolution.jump, trail.clearance
+        points = trail.points
+        touched, clearance = locate(
+            self.nucleation, self.edges, points, self.resolution.jump, trail.clearance
         )
         trail.restart(clearance)
-        return touched
+        if self.openings.is_possible:
+            opened, _ = locate(self.openings, self.edges, points, self.resolution.finest, 0.0)
+            start = points[0].at
+            if opened is not None and (
+                touched is None
+                or abs(opened.point.at - start) < abs(touched.point.at - start)
+            ):
+                jump = self._opening_jump(opened, target)
+                if jump is not None:
+                    return jump
+        return None if touched is None else self._touch_jump(touched, target)
 
-    def _is_before(self, state: ContactState, touched: Located, target: Target) -> bool:
+    def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
-        return direction * (self.states.place(state) - touched.point.at) < 0
+        return direction * (self.states.place(state) - jump.at) < 0
 
-    def _touch_jump(self, touched: Located, target: Target) -> ComputedJump:
+    def _opening_at(self, history: History, point: Point, target: Target) -> ComputedJump | None:
+        """Compute the jump at the start of a branch where patches open at once; else None."""
+        if not self.openings.is_possible:
+            return None
+        while True:
+            least, found = self.openings.least(point.field)
+            if least > 0:
+                return None
+            opened = Located(point, self.openings.ready(found), 0.0)
+            jump = self._opening_jump(opened, target)
+            if jump is not None:
+                self._check_openings(history, jump)
+                return jump
+
+    def _opening_jump(self, opened: Located[Crack], target: Target) -> ComputedJump | None:
+        """Compute the jump from a point at which patches open inside; None if they heal."""
+        point, gaps = opened.point, opened.point.field.gaps
+        before = self.states.of_point(point)
+        jump = self.jumps.compute(
+            before,
+            self.openings.seeded(gaps, opened.seeds),
+            point.at,
+            target.branch,
+            known=point,
+            barrier=sum(crack.barrier for crack in opened.seeds),
+        )
+        if jump.point is not None and self.jumps.is_same(jump.point.gaps, gaps):
+            self.openings.heal(opened.seeds)
+            return None
+        late = self.states.work(before, jump.states[-1], opened.late)
+        return replace(jump, states=(before, *jump.states), misplaced=late)
+
+    def _check_openings(self, history: History, jump: ComputedJump) -> None:
+        """Raise where patches open and close without end."""
+        last = history.jumps[-MOST_OPENINGS:]
+        here = jump.jump.separation
+        if len(last) == MOST_OPENINGS and all(
+            one.kind == "opening" and one.separation == here for one in last
+        ):
+            raise NoState("patches open and close in turn", jump.at)
+
+    def _touch_jump(self, touched: Located[Touch], target: Target) -> ComputedJump:
         """Compute the jump from the point of a branch at which surfaces touch inside a gap."""
         point = touched.point
         before = self.states.of_point(point)
         jump = self.jumps.compute(
-            before, point.field.gaps, point.at, target.branch, touched.touches, point
+            before, point.field.gaps, point.at, target.branch, touched.seeds, point
         )
         late = self.states.work(before, jump.states[-1], touched.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 
-    def _touch_before_fold(self, fold: Fold) -> Located | None:
+    def _touch_before_fold(self, fold: Fold) -> Located[Touch] | None:
         """Locate a touch on the last step to a fold, its edges being held; None if there is none.
 
         The fold lies somewhere on that step, too: which of the two comes first is not resolved.

@@ -52,11 +52,13 @@ class Jumps:
         branch: Branch,
         touches: list[Touch] | None = None,
         known: Point | None = None,
+        barrier: float = 0.0,
     ) -> ComputedJump:
         """Descend at d = ``at`` from the gaps ``start`` to the next state in which nothing touches.
 
-        The gaps are those of a ``known`` equilibrium, or nearly. The point of the result is the
-        minimum as it was found: next to a fold it may not be found again from its own edges.
+        The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
+        ``barrier`` is that of these. The point of the result is the minimum as it was found: next
+        to a fold it may not be found again from its own edges.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals, known)
@@ -75,7 +77,7 @@ class Jumps:
             else:
                 if not self._alike(rival, point):
                     other = self._after(before, rival, at)
-        jump = self.states.jump(before, after, branch, other)
+        jump = self.states.jump(before, after, branch, other, barrier)
         if known is not None and point is not None and self.edges.uses_windows(point.gaps):
             point = point.carry_rates(known, CORRECTED * self.edges.wave)
         return ComputedJump(at, (after,), jump, point)
@@ -125,7 +127,7 @@ class Jumps:
             if least > 0:
                 return point.with_clearance(least)
             grown = descend(point.field.gaps, self.nucleation.ready(minima), point)
-            if grown is not None and self._same(grown.field.gaps, point.field.gaps):
+            if grown is not None and self.is_same(grown.field.gaps, point.field.gaps):
                 if adhesive and least < -self.nucleation.overlap:
                     break
                 return point
@@ -140,7 +142,7 @@ class Jumps:
         apart = max(OTHER_MINIMUM * self.edges.wave, 10 * self.edges.coarse)
         return here.shape == there.shape and bool(np.abs(here - there).max() < apart)
 
-    def _same(self, one: Array, other: Array) -> bool:
+    def is_same(self, one: Array, other: Array) -> bool:
         """Whether two equilibria are one to the accuracy at which they are known."""
         return one.shape == other.shape and bool(np.abs(one - other).max() < 10 * self.edges.coarse)
 

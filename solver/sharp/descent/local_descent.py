@@ -60,7 +60,11 @@ class KnownState:
         known = self._gaps
         count = len(known)
         nearest = np.minimum(np.searchsorted(gaps[:, 0], known[:, 0]), len(gaps) - 1)
-        changed = np.flatnonzero((gaps[nearest] != known).any(axis=1))
+        differs = (gaps[nearest] != known).any(axis=1)
+        if not differs.any() and len(gaps) > count:  # a crack lies in the patch before this gap
+            new = np.setdiff1d(gaps[:, 0], known[:, 0])
+            differs[np.searchsorted(known[:, 0], new) % count] = True
+        changed = np.flatnonzero(differs)
         if changed.size == 0:
             changed = np.array([self._leading_gap])
         # the longest run of unchanged gaps lies outside

@@ -58,6 +58,14 @@ def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
     return np.asarray(ends.reshape(-1, 2))
 
 
+def with_gaps(gaps: Array, centres: Array, widths: Array) -> Array:
+    """Put gaps of the given widths into patches."""
+    left = centres % (2 * np.pi) - widths / 2
+    left = np.where(left < gaps[-1, 1] - 2 * np.pi, left + 2 * np.pi, left)
+    both = np.concatenate([gaps, np.stack([left, left + widths], axis=1)])
+    return np.asarray(both[np.argsort(both[:, 0], kind="stable")])
+
+
 def without_small(gaps: Array, smallest: float) -> Array | None:
     """Drop closed gaps or vanished patches; None if all are as long as ``smallest``."""
     length, patch = widths(gaps)

@@ -10,7 +10,9 @@ touch: it is put when the overlap is large enough for the narrowest patch that i
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,13 +28,8 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.clearance import Clearances
 from adhesis.solver.sharp.nucleation.closing import Closing
 from adhesis.solver.sharp.nucleation.gap_minima import bottoms_of
-from adhesis.solver.sharp.tolerances import (
-    BISECTION_EVERY,
-    CLEAR_TRIALS,
-    CORRECTED,
-    OVERLAP,
-    TOUCH_TRIALS,
-)
+from adhesis.solver.sharp.nucleation.location import Located
+from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, OVERLAP, TOUCH_TRIALS
 
 
 @dataclass(frozen=True)
@@ -53,13 +50,11 @@ class Minima:
     curvature: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Located:
-    """The point of a branch at which surfaces touch, where, and how late (in d) at most."""
+class TrackedGaps(NamedTuple):
+    """Gaps that close on a stretch of a branch: their clearances, and how these are computed."""
 
-    point: Point
-    touches: list[Touch]
-    late: float
+    closing: Closing
+    values: Callable[[GapField], Array]
 
 
 @compiled
@@ -87,7 +82,7 @@ def clearances(
 
 
 class Nucleation:
-    """Finds touching points and puts seeds there."""
+    """Finds touching points and puts seeds there: a criterion of ``location.locate``."""
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
@@ -149,75 +144,19 @@ class Nucleation:
         self.clearances.note(field, place, left)
         return float(left.min()), minima
 
-    def located(
-        self, trail: list[Point], resolution: float, clearance: float
-    ) -> tuple[Located | None, float]:
-        """First point of a trail at which surfaces touch inside a gap, with the touches.
+    @property
+    def tolerance(self) -> float:
+        """Overlap that is allowed."""
+        return self.overlap
 
-        Else None and the least clearance at the end of the trail. The trail starts at a point known
-        to be clear, by ``clearance`` at least; between its points the touch is located to
-        ``resolution`` (q0 s).
-        """
-        hit = trail[-1]
-        hit_value, hit_minima = self.least(hit.field)
-        if hit_value > 0:
-            return None, hit_value
-        clear_value = np.nan
-        # over the points of the trail, then within one step of it
-        low, high = 0, len(trail) - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            value, minima = self.least(trail[middle].field)
-            if value > 0:
-                low, clear_value = middle, value
-            else:
-                high, hit, hit_minima, hit_value = middle, trail[middle], minima, value
-        last = trail[low]
-        clear = last.at
-        # Of many gaps each aim is dear: those at both ends tell where to begin, and the least
-        # overlap is touch enough.
-        many = self.edges.uses_windows(last.gaps)
-        if many and low == 0 and clearance > 0:
-            clear_value = clearance
-        closing, closed = self._closing(last, hit) if many else (None, None)
-        cleared = 0  # aims one after the other that were clear
-        for aims in range(1, TOUCH_TRIALS + 1):
-            near = many or abs(clear - hit.at) <= resolution
-            if hit_value == 0 or (near and hit_value > -0.5 * self.overlap):
-                break
-            share = 0.5
-            if closing is not None and aims % BISECTION_EVERY:
-                share = closing.aim(clear, hit.at, -0.2 * self.overlap)
-            # The least clearance may be another gap's than the overlap: then a secant creeps.
-            elif closing is None and np.isfinite(clear_value) and cleared < CLEAR_TRIALS:
-                # secant to half of the overlap that is allowed, kept off the ends
-                aimed = clear_value + 0.2 * self.overlap
-                share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
-            aim = clear + (hit.at - clear) * share
-            point = None
-            reach = CORRECTED * self.edges.wave
-            if many:
-                point = self.edges.equilibrium(last.interpolate(hit, aim), aim, reach)
-            for start in (last, hit) if share < 0.5 else (hit, last):
-                if point is None:
-                    point = self.edges.equilibrium(start.extrapolate(aim), aim, reach)
-            if point is None:
-                break
-            value, minima = self.least(point.field)
-            if closing is not None and closed is not None:
-                closing.note(aim, self._clearance_of(point.field, closed))
-            cleared = cleared + 1 if value > 0 else 0
-            if value > 0:
-                last, clear, clear_value = point, aim, value
-            else:
-                hit, hit_minima, hit_value = point, minima, value
-        if hit_value < -self.overlap and self.edges.critical > 0:
-            raise NoState("surfaces overlap, and no first touch is found", hit.at)
-        # the surfaces touched so much earlier as the overlap says
-        late = abs(clear - hit.at)
-        if clear_value > hit_value:
-            late *= -hit_value / (clear_value - hit_value)
-        return Located(hit, self.ready(hit_minima), late), 0.0
+    def is_located(self, value: float, many: bool, near: bool) -> bool:
+        """Whether a touch with this clearance is exact enough; see ``location.Criterion``."""
+        return value == 0 or ((many or near) and value > -0.5 * self.overlap)
+
+    def check_located(self, value: float, at: float) -> None:
+        """Raise if surfaces overlap at the touch that was found."""
+        if value < -self.overlap and self.edges.critical > 0:
+            raise NoState("surfaces overlap, and no first touch is found", at)
 
     def _clearance_of(self, field: GapField, gaps: Integers) -> Array:
         """Clearance of each of some gaps."""
@@ -226,18 +165,19 @@ class Nucleation:
         np.minimum.at(out, where, self.clearance(minima.opening, minima.curvature))
         return out[gaps]
 
-    def _closing(self, clear: Point, hit: Point) -> tuple[Closing | None, Integers]:
-        """How the gaps close that are open at one point and overlap at another, and which."""
+    def tracked(self, clear: Point, hit: Point) -> TrackedGaps | None:
+        """Track the gaps that are open at one point and overlap at another."""
         left, _ = self.clearances.left(hit.field)
         closed = np.flatnonzero(left <= 0)
         after = self._clearance_of(hit.field, closed)
         closed, after = closed[after < 0], after[after < 0]
         if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:
-            return None, closed
+            return None
         before = self._clearance_of(clear.field, closed)
-        return Closing(clear.at, hit.at, before, after), closed
+        closing = Closing(clear.at, hit.at, before, after)
+        return TrackedGaps(closing, lambda field: self._clearance_of(field, closed))
 
-    def located_held(self, point: Point, clearance: float, end: float) -> Located | None:
+    def located_held(self, point: Point, clearance: float, end: float) -> Located[Touch] | None:
         """Where surfaces touch between a point with this clearance and ``end``, edges held."""
         clear, low, hit = point.at, clearance, end
         cleared = 0

@@ -177,12 +177,23 @@ class States:
         return abs(conjugate[0] - conjugate[1]) * way * unit
 
     def jump(
-        self, before: ContactState, after: ContactState, branch: Branch, other: ContactState
+        self,
+        before: ContactState,
+        after: ContactState,
+        branch: Branch,
+        other: ContactState,
+        barrier: float = 0.0,
     ) -> Jump:
-        """Jump between two states; ``other`` is where another rule of descent would have led."""
+        """Jump between two states; ``other`` is where another rule of descent would have led.
+
+        ``barrier`` is that of an opening, in units of γ/q0.
+        """
         raced = other is not after
         at_stake = abs(other.potential - after.potential) / self.period
-        jump = Jump.between(before, after, branch, self.period, raced=raced, at_stake=at_stake)
+        barrier *= self.problem.work_of_adhesion / (self.q0 * self.period)
+        jump = Jump.between(
+            before, after, branch, self.period, raced=raced, at_stake=at_stake, barrier=barrier
+        )
         if self.problem.control.is_load and not after.patches:
             # The load's own work is not counted, which may leave less than nothing.
             jump = replace(jump, energy_drop=before.energy / self.period)

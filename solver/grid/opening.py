@@ -1,0 +1,102 @@
+"""Where patches open inside on a grid: nodes that leave contact, the mirror of nodes that touch."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from adhesis.solver.crack import (
+    IN_PATCH,
+    LONGEST,
+    NEAR_STRENGTH,
+    Crack,
+    has_healed,
+    judge_maximum,
+    largest_excess,
+)
+from adhesis.solver.grid.contact import Contact
+from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.states import EDGE_OFFSET
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.peaks import highest_peaks
+
+_MOST_MAXIMA = 32
+_HEALED_PLACE = 0.05  # of the shortest wave
+
+
+class Openings:
+    """Finds maxima of tension inside patches that reach the strength, and opens patches there.
+
+    Parameters
+    ----------
+    problem : Problem
+    lattice : Lattice
+
+    Attributes
+    ----------
+    healed : list of Crack
+        Cracks that closed again: nothing opens there unless the tension is larger.
+    """
+
+    def __init__(self, problem: Problem, lattice: Lattice) -> None:
+        self._lattice, self._strength = lattice, problem.strength
+        self._wave = problem.profile.shortest_wavelength
+        self._modulus, self._gamma = problem.half_space.modulus, problem.work_of_adhesion
+        self.healed: list[Crack] = []
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether anything opens at all."""
+        return math.isfinite(self._strength)
+
+    def least(self, contact: Contact) -> tuple[float, list[Crack]]:
+        """Return the least value of all maxima of tension of a solved contact, and these maxima."""
+        far = 1 - NEAR_STRENGTH
+        if not self.is_possible or not contact.mask.any():
+            return far, []
+        tension = np.where(contact.mask, -contact.stress, np.nan)
+        nodes = highest_peaks(tension, _MOST_MAXIMA, NEAR_STRENGTH * self._strength)
+        cracks = [self._crack_at(contact, tension, node) for node in nodes]
+        near, period = _HEALED_PLACE * self._wave, self._lattice.elastic.period
+        cracks = [c for c in cracks if not has_healed(c, self.healed, near, period)]
+        return min((crack.value for crack in cracks), default=far), cracks
+
+    def seeded(self, contact: Contact, cracks: list[Crack]) -> Contact:
+        """Return an unsolved copy without the nodes of the cracks that open first."""
+        dx, n = self._lattice.dx, self._lattice.n
+        opened = contact.copy()
+        for crack in largest_excess(cracks):
+            width = max(1, math.ceil(crack.length / dx - 2 * EDGE_OFFSET))
+            first = round(crack.position / dx - 0.5 * (width - 1))
+            nodes = np.arange(first, first + width) % n
+            opened.mask[nodes] = False
+        return opened
+
+    def barrier(self, cracks: list[Crack]) -> float:
+        """Sum the barriers of the cracks that open first, in J/m² of nominal area."""
+        total = sum(crack.barrier for crack in largest_excess(cracks))
+        return self._gamma * total / self._lattice.elastic.period
+
+    def _crack_at(self, contact: Contact, tension: Array, node: int) -> Crack:
+        """Judge the maximum of tension at a node; a parabola through its neighbours refines it."""
+        dx, n = self._lattice.dx, self._lattice.n
+        before, here, after = tension[node - 1], tension[node], tension[(node + 1) % n]
+        shift = 0.5 * (before - after) / (before - 2 * here + after)
+        # nodes from the middle to the nearest edge
+        turned = np.roll(contact.mask, -node)
+        free = np.flatnonzero(~turned)
+        edge = min(int(free[0]), n - int(free[-1])) if free.size else n
+        toughness = float(self._lattice.adhesion[node]) / self._gamma
+        places, thrice = np.arange(-n, 2 * n) * dx, np.tile(-contact.stress, 3)
+        return judge_maximum(
+            (node + shift) * dx,
+            float(here - 0.25 * (before - after) * shift),
+            self._strength,
+            balanced=2 * self._modulus * self._gamma * toughness / math.pi,
+            toughness=toughness,
+            tension_at=lambda x: np.interp(x, places, thrice),
+            shortest=(0.5 + EDGE_OFFSET) * dx,
+            longest=min(LONGEST * self._wave, IN_PATCH * edge * dx),
+        )

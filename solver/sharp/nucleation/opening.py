@@ -1,0 +1,137 @@
+"""Where a gap opens inside a patch, and the crack that is put there: the mirror of a touch.
+
+An interface of finite strength gives way at a local maximum of tension that reaches the strength,
+away from the edges, where tension is singular. The crack is that of ``solver.crack``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from adhesis.solver.crack import (
+    IN_PATCH,
+    LONGEST,
+    NEAR_STRENGTH,
+    Crack,
+    has_healed,
+    judge_maximum,
+    largest_excess,
+)
+from adhesis.solver.model.problem import Problem
+from adhesis.solver.model.profile import Array
+from adhesis.solver.peaks import highest_peaks
+from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.patch_tension import NodalTension, RefinedTension
+from adhesis.solver.sharp.gap.ends import with_gaps
+from adhesis.solver.sharp.gap.full_contact_stress import measure_at
+from adhesis.solver.sharp.mechanics import EdgeMechanics
+from adhesis.solver.sharp.tolerances import (
+    HEALED_PLACE,
+    MOST_MAXIMA,
+    SHORTEST_CRACK,
+    STRENGTH_EXCEEDED,
+)
+
+
+class Openings:
+    """Finds where patches open inside and puts cracks there: a criterion of ``location.locate``.
+
+    Parameters
+    ----------
+    problem : Problem
+    edges : EdgeMechanics
+
+    Attributes
+    ----------
+    strength : float
+        σ_th in units of E*/2; infinite where nothing opens.
+    tolerance : float
+        Share of the strength by which a tension may exceed it.
+    healed : list of Crack
+        Cracks that closed again: nothing opens there unless the tension is larger.
+    heals : int
+        Number of cracks that closed again, so far.
+    """
+
+    tolerance = STRENGTH_EXCEEDED
+
+    def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
+        self.edges = edges
+        self.strength = problem.strength / (problem.half_space.modulus / 2)
+        self.healed: list[Crack] = []
+        self.heals = 0
+        self._nodal = NodalTension(problem.profile) if self.is_possible else None
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether anything opens at all."""
+        return math.isfinite(self.strength)
+
+    def least(self, field: GapField) -> tuple[float, list[Crack]]:
+        """Return the least value of all maxima of tension of a field, and those near the strength.
+
+        Positive, too, where tension falls from all edges.
+        """
+        if self._nodal is None:
+            return 1.0, []
+        tension = self._nodal.of(field)
+        nodes = highest_peaks(tension, MOST_MAXIMA, NEAR_STRENGTH * self.strength)
+        if not nodes:
+            return 1 - NEAR_STRENGTH, []
+        refined = RefinedTension.of(field)
+        near = HEALED_PLACE * self.edges.wave
+        found = []
+        for node in nodes:
+            maximum = refined.maximum(node * self._nodal.step, self._nodal.step)
+            if maximum is not None:
+                crack = self._crack_at(field, refined, *maximum)
+                if not has_healed(crack, self.healed, near, 2 * np.pi):
+                    found.append(crack)
+        return min((crack.value for crack in found), default=1 - NEAR_STRENGTH), found
+
+    def ready(self, places: list[Crack]) -> list[Crack]:
+        """Return the crack of the largest excess, and those that equal it."""
+        return largest_excess(places)
+
+    def seeded(self, gaps: Array, cracks: list[Crack]) -> Array:
+        """Return the gaps with a crack at each place."""
+        centres = np.array([crack.position for crack in cracks])
+        return with_gaps(gaps, centres, np.array([crack.length for crack in cracks]))
+
+    def heal(self, cracks: list[Crack]) -> None:
+        """Note cracks that closed again."""
+        self.healed += cracks
+        self.heals += len(cracks)
+
+    def is_located(self, value: float, many: bool, near: bool) -> bool:
+        """Whether a place with this value is exact enough.
+
+        A maximum may appear with a tension above the strength: then no place is exact.
+        """
+        return near or value > -0.5 * self.tolerance
+
+    def tracked(self, clear: Point, hit: Point) -> None:
+        """Follow no maximum by itself."""
+
+    def check_located(self, value: float, at: float) -> None:
+        """Accept every place: see :meth:`is_located`."""
+
+    def _crack_at(
+        self, field: GapField, refined: RefinedTension, theta: float, tension: float
+    ) -> Crack:
+        """Judge one maximum of tension."""
+        wave, critical = self.edges.wave, self.edges.critical
+        measure, _ = measure_at(theta, field.source.panels)
+        return judge_maximum(
+            theta,
+            tension,
+            self.strength,
+            balanced=0.5 * critical**2 * measure,  # γ = π E* C_c²/(16 q0), σ = E* S/2
+            toughness=measure,
+            tension_at=refined.at,
+            shortest=0.5 * SHORTEST_CRACK * wave,
+            longest=min(LONGEST * wave, IN_PATCH * refined.edge_distance(theta)),
+        )

@@ -1,0 +1,258 @@
+"""Patches that open from inside at a finite strength of the interface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from adhesis import (
+    HalfSpace,
+    LoopResult,
+    Problem,
+    Profile,
+    make_method,
+    run_loop,
+    self_affine_profile,
+)
+from adhesis.solver.crack import Crack, griffith_length, judge_maximum, largest_excess
+from adhesis.solver.loading.zero_range import beyond_limit, opening_warnings, range_warnings
+from adhesis.solver.model.contact_state import ContactState
+from adhesis.solver.references.last_gap import LastGap
+from adhesis.solver.references.periodic_punch import pull_off_stress
+from adhesis.solver.sharp.equilibrium.griffith import imbalance
+from adhesis.solver.sharp.gap.ends import with_gaps
+
+PERIOD = 2e-3
+# Two troughs, of which the one at x = λ/2 is the shallower.
+TROUGHS = Profile(1e-3, np.array([0.0, -0.15, -0.5]) * 1e-9)
+SOLID = HalfSpace(1e6, 0.5)
+GAMMA, STRENGTH = 1e-10, 4.0
+
+
+def rough(seed: int = 0, ratio: int = 8) -> Profile:
+    return self_affine_profile(0.8, period=PERIOD, n0=2, ratio=ratio, seed=seed, h_rms=1e-6)
+
+
+@cache
+def rough_loop(
+    strength: float, name: str = "sharp", seed: int = 0
+) -> tuple[LoopResult, tuple[ContactState, ...]]:
+    return loop_of(rough(seed), strength, 0.04, name)
+
+
+def loop_of(
+    profile: Profile, strength: float, gamma: float, name: str = "sharp"
+) -> tuple[LoopResult, tuple[ContactState, ...]]:
+    problem = Problem(profile, HalfSpace(1e9, 0.5), gamma, strength=strength)
+    states: list[ContactState] = []
+    loop = run_loop(
+        make_method(name, problem),
+        max_penetration=0.9,
+        load_steps=20,
+        on_state=lambda branch, state: states.append(state),
+    )
+    return loop, tuple(states)
+
+
+def troughs_problem(strength: float = STRENGTH) -> Problem:
+    return Problem(TROUGHS, SOLID, GAMMA, strength=strength)
+
+
+def test_a_closed_trough_opens_where_its_tension_reaches_the_strength():
+    method = make_method("sharp", troughs_problem(), accuracy=1e-4)
+    loop = run_loop(method, max_penetration=0.99, load_steps=5)
+    exact = LastGap(TROUGHS, SOLID.modulus, GAMMA)
+    b = exact.half_length_at(STRENGTH, TROUGHS.period / 2, 5e-5, 2e-4)
+    first = next(jump for jump in loop.jumps if jump.kind == "opening")
+    assert first.branch == "unloading"
+    assert first.separation == pytest.approx(exact.separation(b), rel=1e-4)
+    assert first.patches_after == first.patches_before + 1
+    length = griffith_length(STRENGTH, SOLID.modulus, GAMMA)
+    assert first.barrier * TROUGHS.period == pytest.approx(GAMMA * length / 2, rel=0.01)
+    assert 0 < loop.barrier < 0.1 * loop.loss
+
+
+def test_grid_opens_a_closed_trough_there_too():
+    method = make_method("grid", troughs_problem())
+    loop = run_loop(method, max_penetration=0.99, load_steps=5)
+    exact = LastGap(TROUGHS, SOLID.modulus, GAMMA)
+    b = exact.half_length_at(STRENGTH, TROUGHS.period / 2, 5e-5, 2e-4)
+    first = next(jump for jump in loop.jumps if jump.kind == "opening")
+    assert first.separation == pytest.approx(exact.separation(b), rel=5e-3)
+
+
+def test_the_last_gap_between_flat_surfaces_is_koiters_crack():
+    flat = Profile(1e-3, np.array([0.0, 1e-20]))
+    found = LastGap(flat, 1e6, 0.02).mean_stress(1e-4)
+    assert found == pytest.approx(float(pull_off_stress(4e-4, 1e-3, 1e6, 0.02)), rel=1e-9)
+
+
+def test_griffiths_crack_in_a_closed_trough_is_balanced():
+    """The release rate of the solved field passes γ at the length of the closed form."""
+    method = make_method("sharp", troughs_problem(), accuracy=1e-5)
+    exact = LastGap(TROUGHS, SOLID.modulus, GAMMA)
+    b = 1.2e-4
+    q0, tension = TROUGHS.q0, exact.tension(b, TROUGHS.period / 2)
+    length = griffith_length(tension, SOLID.modulus, GAMMA) * q0
+    for share, sign in ((0.9, -1), (1.1, 1)):
+        crack = np.pi + np.array([-0.5, 0.5]) * share * length
+        gaps = np.array([crack, [2 * np.pi - b * q0, 2 * np.pi + b * q0]])
+        field = method.edges.field(gaps, exact.separation(b) * q0)
+        found, _ = imbalance(field.solution, method.edges.law, method.edges.source.panels)
+        assert np.sign(found[:2]).tolist() == [sign, sign]
+
+
+@pytest.mark.parametrize("name", ["sharp", "grid"])
+def test_a_strength_that_is_never_reached_changes_no_bit(name):
+    gamma, profile = 0.04, rough(ratio=3)
+    zero_range, _ = loop_of(profile, math.inf, gamma, name)
+    strong, _ = loop_of(profile, 1e12, gamma, name)
+    for column in ("separation", "mean_stress", "contact_fraction", "energy"):
+        assert np.array_equal(getattr(zero_range, column), getattr(strong, column))
+    assert (zero_range.loss, zero_range.jumps) == (strong.loss, strong.jumps)
+    assert zero_range.openings == strong.openings == 0
+
+
+def test_no_state_that_is_kept_is_above_the_strength_inside():
+    """But those from which patches open, which are at it."""
+    loop, states = rough_loop(4e6)
+    assert loop.openings > 0
+    assert abs(loop.audit_residual) < 1e-4
+    opened = {jump.separation for jump in loop.jumps if jump.kind == "opening"}
+    kept = [state for state in states if state.patches and state.separation not in opened]
+    found = loop.new_method().largest_tension(kept)
+    assert found.tension < 4e6 * (1 + 1e-3)
+
+
+def test_energy_rises_in_no_jump_but_by_a_barrier():
+    loop, _ = rough_loop(4e6)
+    assert all(jump.energy_drop > -jump.barrier - 1e-9 * loop.loss for jump in loop.jumps)
+    assert all((jump.barrier > 0) == (jump.kind == "opening") for jump in loop.jumps)
+
+
+def test_openings_lose_less_than_valleys_that_are_held_closed():
+    assert rough_loop(4e6)[0].loss < 0.8 * rough_loop(math.inf)[0].loss
+
+
+@pytest.mark.parametrize(
+    ("change", "times"),
+    [
+        (lambda p: p.mirrored(), 1.0),
+        (lambda p: p.shifted(0.3 * PERIOD), 1.0),
+        (lambda p: p.scaled(2.0, 2.0), 2.0),
+    ],
+    ids=["mirror", "shift", "scale"],
+)
+def test_openings_keep_the_symmetries_of_the_problem(change, times):
+    """A profile twice as large, with γ and range twice as large, has the same strength."""
+    loop, _ = loop_of(change(rough()), 4e6, 0.04 * times)
+    reference, _ = rough_loop(4e6)
+    assert [jump.kind for jump in loop.jumps] == [jump.kind for jump in reference.jumps]
+    assert loop.loss == pytest.approx(times * reference.loss, rel=1e-3)
+
+
+def test_grid_and_sharp_agree():
+    profile = rough(1, 3)
+    sharp, _ = loop_of(profile, 3e6, 0.04)
+    grid, _ = loop_of(profile, 3e6, 0.04, "grid")
+    assert sharp.openings > 0
+    assert grid.openings == sharp.openings
+    assert abs(grid.loss - sharp.loss) < grid.loss_error + sharp.loss_error
+
+
+# ---------------------------------------------------------------------- the crack
+
+
+def judged(tension, strength=1.0, balanced=0.01, shortest=1e-3, longest=1.0, bend=0.0):
+    return judge_maximum(
+        0.0, tension, strength, balanced, 1.0, lambda x: tension * (1 - bend * x**2), shortest,
+        longest,
+    )  # fmt: skip
+
+
+def test_a_crack_in_a_uniform_tension_is_griffiths_and_its_barrier_the_closed_form():
+    crack = judged(1.5)
+    half = 0.01 / 1.5**2
+    assert crack.length == pytest.approx(2 * 1.1 * half, rel=1e-9)
+    assert crack.barrier == pytest.approx(half, rel=0.02)
+    assert crack.value == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize(
+    ("tension", "options", "opens"),
+    [
+        (0.999, {}, False),  # below the strength
+        (1.0, {}, True),
+        (1.0, {"bend": 1e4}, False),  # so peaked that no crack grows
+        (1.0, {"longest": 0.009}, False),  # longer than the patch
+        (1.0, {"shortest": 0.05}, True),
+    ],
+)
+def test_a_patch_opens_where_strength_and_growth_allow_it(tension, options, opens):
+    crack = judged(tension, **options)
+    assert (crack.value <= 0) == opens
+    assert (crack.length > 0) == opens
+
+
+def test_the_largest_excess_opens_first_with_what_equals_it():
+    cracks = [Crack(float(i), 1 - value, value) for i, value in enumerate((0.1, -0.2, -0.1, -0.2))]
+    assert [crack.position for crack in largest_excess(cracks)] == [1.0, 3.0]
+    assert largest_excess(cracks[:1]) == []
+    assert largest_excess([]) == []
+
+
+@pytest.mark.parametrize(
+    ("centre", "place"),
+    [(3.0, 1), (0.1, 0), (2 * np.pi - 0.01, 2), (-0.3, 2)],
+)
+def test_a_gap_put_into_a_patch_lies_between_its_neighbours(centre, place):
+    gaps = np.array([[0.5, 1.0], [4.0, 5.0]])
+    found = with_gaps(gaps, np.array([centre]), np.array([0.1]))
+    assert len(found) == 3
+    assert np.all(np.diff(np.append(found.ravel(), found[0, 0] + 2 * np.pi)) > 0)
+    assert found[place].mean() % (2 * np.pi) == pytest.approx(centre % (2 * np.pi))
+
+
+# ---------------------------------------------------------------------- doubts
+
+
+def test_barriers_and_tensions_that_are_not_small_make_a_loss_doubtful():
+    problem = troughs_problem()
+    opened = [jump for jump in rough_loop(4e6)[0].jumps if jump.kind == "opening"]
+    barrier = sum(jump.barrier for jump in opened)
+    assert opening_warnings(opened, 11 * barrier) == []
+    assert "add up to" in opening_warnings(opened, 9 * barrier)[0]
+    assert range_warnings(problem, GAMMA / (1.05 * STRENGTH), 1.0, [0.5]) == []
+    (excess,) = range_warnings(problem, GAMMA / (2 * STRENGTH), 1.0, [0.5])
+    assert "reaches 2 times the strength (4 Pa)" in excess
+    assert not beyond_limit([1e-12], [1.0], 0.02, 0.5, opens=True).any()
+
+
+# ---------------------------------------------------------------------- the problem
+
+
+def test_a_range_is_a_strength():
+    problem = Problem(rough(), SOLID, 1e-4, adhesion_range=1e-10)
+    assert problem.strength == 1e6
+    assert problem == Problem(rough(), SOLID, 1e-4, strength=1e6)
+    assert replace(problem, work_of_adhesion=2e-4).strength == 1e6
+    assert Problem(rough(), SOLID, 0.0, adhesion_range=1e-10).strength == math.inf
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"adhesion_range": 1e-9, "strength": 1e6}, "adhesion_range is 1e-09 and strength is"),
+        ({"adhesion_range": 0.0}, "adhesion_range is 0.0: it must be"),
+        ({"strength": -1.0}, "strength is -1.0: it must be"),
+        ({"strength": 1e3}, r"strength is 1000 Pa: it must be at least .* Pa for this profile"),
+        ({"adhesion_range": 1e-6}, r"adhesion_range is 1e-06 m: it must be at most .* m for this"),
+    ],
+)
+def test_a_strength_has_to_be_one_that_edges_of_zero_range_describe(options, message):
+    with pytest.raises(ValueError, match=message):
+        Problem(rough(), SOLID, 0.04, **options)
