@@ -27,6 +27,8 @@ _VALUES = {
 EXAMPLES = {
     "profile.m2": "1e-4",
     "profile.c0": "1e-14",
+    "material.adhesion_range": '"0.3 nm"',
+    "material.strength": "1e8",
     "cycle.max_stress": "200",
     "cycle.stiffness": "1e9",
     "solver.nodes_per_wave": "64",
@@ -73,7 +75,7 @@ def _entry(key: str, entry: Field[Any]) -> str:
         return f"{comment}{entry.name} = {_VALUES[key]}\n"
     if key in EXAMPLES:
         return f"{comment}# {entry.name} = {EXAMPLES[key]}  # example; left out by default\n"
-    assert entry.default is not MISSING, f"{key} has neither default nor example"
+    assert entry.default not in (MISSING, None), f"{key} has neither default nor example"
     return f"{comment}# {entry.name} = {_literal(entry.default)}\n"
 
 

@@ -62,7 +62,7 @@ def test_heights_of_a_metre_are_asked_about_and_a_nan_is_left_to_its_rule() -> N
 # Options that are numbers, but no lengths.
 NUMBERS = (
     *("--hurst", "--m2", "--c0", "--work-of-adhesion", "--young", "--poisson", "--stiffness"),
-    *("--accuracy", "--field-penetrations", "--budget"),
+    *("--accuracy", "--field-penetrations", "--budget", "--strength"),
 )
 
 
@@ -74,7 +74,7 @@ def test_every_option_that_is_a_length_takes_a_unit() -> None:
             options[action.type].add(action.option_strings[-1])  # type: ignore[index]
     assert options[height] == {"--h-rms"}
     lengths = {"--period", "--step", "--cut-off", "--tip-radius", "--longest-gap", "--layer"}
-    assert options[length] == lengths
+    assert options[length] == lengths | {"--adhesion-range"}
     assert options[float] == set(NUMBERS)
 
 
