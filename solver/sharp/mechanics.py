@@ -34,16 +34,6 @@ _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
 class EdgeMechanics(EdgeProblem):
     """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
-    Parameters
-    ----------
-    source : StressSource
-    critical : float
-        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
-    tolerance : float
-        Relative accuracy of the field.
-    device : LoadingDevice
-        What prescribes the quantity d.
-
     Attributes
     ----------
     many : int
@@ -73,9 +63,7 @@ class EdgeMechanics(EdgeProblem):
         """Solve the field of these gaps, to a ``share`` of the tolerance."""
         self.count.fields += 1
         solution = self.system(gaps).solution(gaps, prescribed, share)
-        return GapField(
-            self.source, gaps, prescribed, share * self.tolerance, self.model.device, solution
-        )
+        return self.solved(gaps, prescribed, solution, share)
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
@@ -117,22 +105,12 @@ class EdgeMechanics(EdgeProblem):
         """
         if not shortest_length(gaps) > 0:
             return None, -1
-        system = self.system(gaps)
         try:
-            result = system.equilibrium(
+            return self.system(gaps).equilibrium(
                 gaps, prescribed, max(reach, self.settled), orders, patient=patient
             )
         except np.linalg.LinAlgError:
             return None, -1
-        if not result.found:
-            return None, result.lost_edge
-        field = GapField(
-            self.source, result.gaps, prescribed, self.tolerance, self.model.device, result.solution
-        )
-        point = Point(
-            prescribed, field, result.rate, result.slope, linearisation=result.linearisation
-        )
-        return point, -1
 
     def linearisation(self, point: Point) -> Linearisation:
         """Linearise a point of many gaps, for the windows that are set up on it."""

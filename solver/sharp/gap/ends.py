@@ -5,6 +5,8 @@ Gaps are an array of shape (L, 2) of θ = q0 x: left and right ends, ascending.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,8 +23,14 @@ def widths(gaps: Array) -> tuple[Array, Array]:
 
 def outward(gaps: Array) -> Array:
     """Return +1 at left gap ends, where contact grows to the right, else -1, shape (2L,)."""
-    sign = np.ones(2 * len(gaps))
-    sign[1::2] = -1.0
+    return _signs(len(gaps))
+
+
+@cache
+def _signs(gaps: int) -> Array:
+    """Make the signs of :func:`outward`, read-only."""
+    sign = np.tile([1.0, -1.0], gaps)
+    sign.setflags(write=False)
     return sign
 
 

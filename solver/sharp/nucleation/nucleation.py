@@ -53,6 +53,9 @@ class Minima:
     curvature: Array
 
 
+NO_MINIMA = Minima(np.empty(0), np.empty(0), np.empty(0))
+
+
 @dataclass(frozen=True, eq=False)
 class Located:
     """The point of a branch at which surfaces touch, where, and how late (in d) at most."""
@@ -143,9 +146,11 @@ class Nucleation:
         """
         left, place = self.clearances.left(field)
         fresh = np.flatnonzero(place < 0)
-        minima, where = self.minima(field, fresh)
-        left[fresh] = np.inf
-        np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
+        minima = NO_MINIMA
+        if fresh.size > 0:
+            minima, where = self.minima(field, fresh)
+            left[fresh] = np.inf
+            np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
         self.clearances.note(field, place, left)
         return float(left.min()), minima
 
