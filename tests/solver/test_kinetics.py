@@ -200,9 +200,9 @@ def test_a_saddle_counts_where_forces_grow_soon_after_it(step, close):
     assert (passed is not None) == close
     if passed is not None:
         begin, beyond = passed
-        # from where the gaps became two, and compared from the place of eight times the force
+        # from where the gaps became two; compared from where the force is eight times that of 0.1
         assert np.array_equal(begin, way[0].reshape(2, 2))
-        assert np.array_equal(beyond.of(4)[0], way[5])
+        assert np.array_equal(beyond.of(4)[0], way[6])
 
 
 def test_nothing_races_where_the_rules_agree():

@@ -10,12 +10,12 @@ from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-SADDLE_REACH = 2.0
 from adhesis.solver.sharp.tolerances import (
     HELD_BACK,
     RAN,
     SADDLE_FORCE,
     SADDLE_PASSED,
+    SADDLE_REACH,
     SHORTENED_STEPS,
 )
 

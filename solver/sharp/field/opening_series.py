@@ -22,7 +22,6 @@ from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.conformal_map import (
     ALPHA,
     LEFT,
-    RIGHT,
     eta_at,
     pole_distances,
     theta_at,

@@ -90,7 +90,7 @@ class Clearances:
 
     def note(self, field: GapField, place: NDArray[np.int64], clearance: Array) -> None:
         """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
-        if np.array_equal(place, np.arange(len(self.seen.gaps))):
+        if len(place) == len(self.seen.gaps) and (place == np.arange(len(place))).all():
             return  # nothing was looked at, and no gap has gone
         of = field.solution
         self.seen = noted(
