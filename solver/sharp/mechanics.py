@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
@@ -13,9 +15,7 @@ from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
 from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation, linearise_equilibrium
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, LoadingDevice
 from adhesis.solver.sharp.gap.ends import outward, widths, without_small
-from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.system.dense import DenseSystem
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
@@ -40,20 +40,15 @@ class EdgeMechanics(EdgeProblem):
         From so many gaps on the hierarchical system takes the place of the dense one.
     """
 
-    def __init__(
-        self,
-        source: StressSource,
-        critical: float,
-        tolerance: float,
-        device: LoadingDevice = FIXED_SEPARATION,
-    ) -> None:
-        super().__init__(source, critical, tolerance, device)
-        self.many = HIERARCHICAL_FROM
-        self._dense, self._hierarchical = DenseSystem(self), HierarchicalSystem(self)
+    many = HIERARCHICAL_FROM
+
+    @cached_property
+    def _systems(self) -> tuple[EdgeSystem, EdgeSystem]:
+        return DenseSystem(self), HierarchicalSystem(self)
 
     def system(self, gaps: Array) -> EdgeSystem:
         """Return the system of edges by which these gaps are solved."""
-        return self._dense if len(gaps) < self.many else self._hierarchical
+        return self._systems[len(gaps) >= self.many]
 
     def uses_windows(self, gaps: Array) -> bool:
         """Whether these gaps are followed in windows."""

@@ -34,11 +34,6 @@ def _signs(gaps: int) -> Array:
     return sign
 
 
-def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:
-    """Drop the closed gaps: their patches merge."""
-    return gaps[keep]
-
-
 def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
     """Drop the patches that ``keep`` (one value for the patch right of each gap) excludes."""
     if not keep.any():
@@ -72,7 +67,7 @@ def without_small(gaps: Array, smallest: float) -> Array | None:
     if length.min() < smallest and len(gaps) > 1:
         keep = length >= smallest
         keep[int(np.argmax(length))] = True  # the last gap never closes
-        return without_gaps(gaps, keep)
+        return gaps[keep]  # the patches beside a closed gap merge
     if patch.min() < smallest:
         return without_patches(gaps, patch >= smallest)
     return None
