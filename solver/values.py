@@ -28,8 +28,9 @@ class ByValue(Shown):
 
     def __post_init__(self) -> None:
         """Make every array read-only; the owner of its memory may still write to it."""
-        for name, value in list(self.__dict__.items()):
-            if isinstance(value, np.ndarray) and value.flags.writeable:
+        arrays = [entry for entry in self.__dict__.items() if isinstance(entry[1], np.ndarray)]
+        for name, value in arrays:
+            if value.flags.writeable:
                 view = value.view()
                 view.setflags(write=False)
                 self.__dict__[name] = view

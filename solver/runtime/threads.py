@@ -59,8 +59,17 @@ def on_one_thread(function: F) -> F:
 
     @wraps(function)
     def limited(*args: Any, **kwargs: Any) -> Any:
-        with _in_use, _libraries().limit(limits=1):
-            return function(*args, **kwargs)
+        with _in_use:
+            # ThreadpoolController.limit() also asks each library for its version: 20 times as long
+            libraries = _libraries().lib_controllers
+            before = [library.num_threads for library in libraries]
+            try:
+                for library in libraries:
+                    library.set_num_threads(1)
+                return function(*args, **kwargs)
+            finally:
+                for library, threads in zip(libraries, before, strict=True):
+                    library.set_num_threads(threads)
 
     decorated: Any = limited
     result: F = decorated

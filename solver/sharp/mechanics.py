@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
@@ -13,9 +15,7 @@ from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
 from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation, linearise_equilibrium
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, LoadingDevice
 from adhesis.solver.sharp.gap.ends import outward, widths, without_small
-from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.system.dense import DenseSystem
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
@@ -34,36 +34,21 @@ _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
 class EdgeMechanics(EdgeProblem):
     """Fields, equilibria and descents of the edges of one problem, in units of 1/q0.
 
-    Parameters
-    ----------
-    source : StressSource
-    critical : float
-        4 sqrt(q0 γ/(π E*)): the critical opening on a flat piece.
-    tolerance : float
-        Relative accuracy of the field.
-    device : LoadingDevice
-        What prescribes the quantity d.
-
     Attributes
     ----------
     many : int
         From so many gaps on the hierarchical system takes the place of the dense one.
     """
 
-    def __init__(
-        self,
-        source: StressSource,
-        critical: float,
-        tolerance: float,
-        device: LoadingDevice = FIXED_SEPARATION,
-    ) -> None:
-        super().__init__(source, critical, tolerance, device)
-        self.many = HIERARCHICAL_FROM
-        self._dense, self._hierarchical = DenseSystem(self), HierarchicalSystem(self)
+    many = HIERARCHICAL_FROM
+
+    @cached_property
+    def _systems(self) -> tuple[EdgeSystem, EdgeSystem]:
+        return DenseSystem(self), HierarchicalSystem(self)
 
     def system(self, gaps: Array) -> EdgeSystem:
         """Return the system of edges by which these gaps are solved."""
-        return self._dense if len(gaps) < self.many else self._hierarchical
+        return self._systems[len(gaps) >= self.many]
 
     def uses_windows(self, gaps: Array) -> bool:
         """Whether these gaps are followed in windows."""
@@ -73,9 +58,7 @@ class EdgeMechanics(EdgeProblem):
         """Solve the field of these gaps, to a ``share`` of the tolerance."""
         self.count.fields += 1
         solution = self.system(gaps).solution(gaps, prescribed, share)
-        return GapField(
-            self.source, gaps, prescribed, share * self.tolerance, self.model.device, solution
-        )
+        return self.solved(gaps, prescribed, solution, share)
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
@@ -117,22 +100,12 @@ class EdgeMechanics(EdgeProblem):
         """
         if not shortest_length(gaps) > 0:
             return None, -1
-        system = self.system(gaps)
         try:
-            result = system.equilibrium(
+            return self.system(gaps).equilibrium(
                 gaps, prescribed, max(reach, self.settled), orders, patient=patient
             )
         except np.linalg.LinAlgError:
             return None, -1
-        if not result.found:
-            return None, result.lost_edge
-        field = GapField(
-            self.source, result.gaps, prescribed, self.tolerance, self.model.device, result.solution
-        )
-        point = Point(
-            prescribed, field, result.rate, result.slope, linearisation=result.linearisation
-        )
-        return point, -1
 
     def linearisation(self, point: Point) -> Linearisation:
         """Linearise a point of many gaps, for the windows that are set up on it."""

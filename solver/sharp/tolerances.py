@@ -141,6 +141,10 @@ RAN = 0.05
 """λ_min. An edge that moved further than this in a descent has run."""
 SADDLE_PASSED = 8.0
 """Forces so many times larger before and after a point have passed a saddle there."""
+SADDLE_REACH = 2.0
+"""λ_min. Edges that run further until forces have grown so much passed the saddle at a seventh of
+this or more, 0.3 λ_min; trajectories of short and long steps were 0.1 λ_min apart, and where they
+parted at a saddle edges ran 0.2 to 1.2 λ_min."""
 SADDLE_FORCE = 0.1
 """C_c². Smaller forces are those of the fold at which a jump begins."""
 SHORTENED_STEPS = 0.25

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
+from adhesis.solver.sharp.continuation.races import RaceCheck
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
 from adhesis.solver.sharp.descent.saddle import leaving_step
+from adhesis.solver.sharp.descent.track import Stage, Track
 from adhesis.solver.sharp.equilibrium.griffith import edge_tangent, imbalance, move_edges
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
@@ -180,6 +184,25 @@ def test_a_jump_whose_end_the_length_of_the_steps_decides_is_flagged(
     assert abs(usual.loss / short.loss - 1) > 1e-3
     assert usual.races >= 1
     assert usual.energy_at_stake > abs(usual.loss - short.loss)
+
+
+@pytest.mark.parametrize(("step", "close"), [(0.1, True), (1.0, False)])
+def test_a_saddle_counts_where_forces_grow_soon_after_it(step, close):
+    """Edges that run far until the forces have grown passed the saddle at a distance."""
+    forces = np.array([1.0, 0.5, 0.05, 0.1, 0.2, 0.45, 1.0])
+    way = np.outer(step * np.arange(8.0), [1.0, 1.0, 0.0, 0.0])
+    taken = np.zeros((4, 4))
+    taken[0, 1] = 1.0  # the second edge takes force from the first
+    stages = [Stage(np.zeros(6), np.zeros((6, 6))), Stage(way[-1], taken)]
+    track = Track(ways=[np.zeros((3, 6)), way], forces=[np.ones(2), forces], stages=stages)
+    check = RaceCheck(SimpleNamespace(wave=1.0, critical=1.0))
+    passed = check.beyond_saddle(np.zeros((3, 2)), None, track)
+    assert (passed is not None) == close
+    if passed is not None:
+        begin, beyond = passed
+        # from where the gaps became two; compared from where the force is eight times that of 0.1
+        assert np.array_equal(begin, way[0].reshape(2, 2))
+        assert np.array_equal(beyond.of(4)[0], way[6])
 
 
 def test_nothing_races_where_the_rules_agree():

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.sharp.continuation.corrector import correct, correct_in_window
@@ -20,6 +19,7 @@ from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
+from adhesis.solver.sharp.equilibrium.griffith import shortest_length
 from adhesis.solver.sharp.gap.ends import without_small
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
@@ -126,7 +126,7 @@ class Branch:
     def _correct(self, step: float, at: float) -> tuple[Point | None, LocalBranch | None]:
         """Return the equilibrium at d = ``at``, if it is within reach, and the window it is in."""
         predictor = self._predictor
-        no_fold = np.isinf(predictor.fold_distance)
+        no_fold = math.isinf(predictor.fold_distance)
         if no_fold and predictor.fastest * abs(step) > 2 * PREDICTED_MOTION * self._edges.wave:
             return None, None
         if not (self.in_windows and self._edges.uses_windows(predictor.point.gaps)):
@@ -149,7 +149,8 @@ class Branch:
             If its state is needed, and it is no equilibrium of all edges.
         """
         error = self._trapezoid_error(self._output, reached)
-        remaining = without_small(reached.gaps, self._edges.smallest)
+        gaps, smallest = reached.gaps, self._edges.smallest
+        remaining = without_small(gaps, smallest) if shortest_length(gaps) < smallest else None
         closed = self._closing.over(self.point, reached, self._target.branch)
         may_touch = self.trail.closed + closed >= self.trail.clearance or remaining is not None
         is_output = error > 1 or reached.at == self._target.at

@@ -170,9 +170,10 @@ class Jumps:
                 if not track.rejoined and not self._alike(rival, point):
                     rivals.append(rival)
                     return point
-                beyond = self.races.beyond_saddle(gaps, point, track)
-                if beyond is not None:
-                    rival = self._relax(gaps, at, shortened=SHORTENED_STEPS, track=beyond)
+                passed = self.races.beyond_saddle(gaps, point, track)
+                if passed is not None:
+                    begin, beyond = passed
+                    rival = self._relax(begin, at, shortened=SHORTENED_STEPS, track=beyond)
                     if not beyond.rejoined and not self._alike(rival, point):
                         rivals.append(rival)
             except FullContact as full:

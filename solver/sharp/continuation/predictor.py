@@ -9,7 +9,7 @@ edge leads, the rates give a parabola in d.
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.branch_point import Point
@@ -43,31 +43,32 @@ class Predictor:
 
     def __init__(self, point: Point) -> None:
         self.point = point
-        self.way, self.fold_distance = 0.0, np.inf
+        self.way, self.fold_distance = 0.0, math.inf
         # d as a polynomial of how far the leading edge goes on; both in units of their ways
         self._way_by_lead: tuple[float, float, float] | None = None
-        self._fold = np.inf  # where that has its extremum
+        self._fold = math.inf  # where that has its extremum
         rate = point.rate
-        self._lead = lead = int(np.argmax(np.abs(rate)))
+        self._lead = lead = int(abs(rate).argmax())
         self.fastest = abs(float(rate[lead]))
         earlier = point.previous
         if earlier is None or earlier.rate.shape != rate.shape or earlier.at == point.at:
             return
         self.way = way = point.at - earlier.at
         self._earlier = earlier
-        gone = float(point.gaps.flat[lead] - earlier.gaps.flat[lead]) * (1 - 2 * (lead % 2))
+        edge = divmod(lead, 2)
+        gone = float(point.gaps[edge] - earlier.gaps[edge]) * (1 - 2 * edge[1])
         self._gone = gone
-        slopes = gone / (way * float(earlier.rate[lead])), gone / (way * float(rate[lead]))
-        if min(slopes) > 0 and np.isfinite(slopes).all():
-            self._look_ahead(*slopes)
+        before, here = gone / (way * float(earlier.rate[lead])), gone / (way * float(rate[lead]))
+        if 0 < before < math.inf and 0 < here < math.inf:
+            self._look_ahead(before, here)
 
     def _look_ahead(self, before: float, here: float) -> None:
         """Find the fold from d's derivatives by the way of the leading edge at both points."""
         square, cube = 2 * here + before - 3, here + before - 2
         self._way_by_lead = here, square, cube
         root = square * square - 3 * cube * here
-        if root >= 0 and np.sqrt(root) > square:
-            fold = here / (np.sqrt(root) - square)
+        if root >= 0 and math.sqrt(root) > square:
+            fold = here / (math.sqrt(root) - square)
             if fold < CUBIC_TRUSTED:
                 self._fold = fold
                 self.fold_distance = abs(self.way) * fold * (here + fold * (square + fold * cube))
@@ -96,7 +97,7 @@ class Predictor:
             else:
                 low = lead
             slope = here + lead * (2 * square + 3 * lead * cube)
-            newton = lead - value / slope if slope > 0 else np.inf
+            newton = lead - value / slope if slope > 0 else math.inf
             if abs(newton - lead) < 1e-9 * high:
                 break
             lead = newton if low < newton < high else 0.5 * (low + high)
@@ -107,6 +108,7 @@ class Predictor:
         point = self.point
         on = at - point.at
         rate = point.rate
+        sign = outward(point.gaps)
         motion = rate * on
         if on * self.way > 0 and abs(on) < PREDICTION_TRUSTED * abs(self.way):
             earlier = self._earlier
@@ -115,14 +117,14 @@ class Predictor:
                 here = rate * (self._gone / rate[self._lead])
                 before = earlier.rate * (self._gone / earlier.rate[self._lead])
                 if led < CUBIC_OF_OTHERS_TRUSTED:
-                    gone = outward(point.gaps) * (point.gaps - earlier.gaps).ravel()
+                    gone = sign * (point.gaps - earlier.gaps).ravel()
                     square, cube = 2 * here + before - 3 * gone, here + before - 2 * gone
                     motion = led * (here + led * (square + led * cube))
                 else:
                     motion = led * (here + led * (here - before) / 2)
             else:
                 motion += (rate - earlier.rate) * on * on / (2 * self.way)
-        gaps: Array = point.gaps + (outward(point.gaps) * motion).reshape(-1, 2)
+        gaps: Array = point.gaps + (sign * motion).reshape(-1, 2)
         return gaps
 
     def reach(self, most: float, finest: float) -> float:
@@ -131,7 +133,7 @@ class Predictor:
         Towards a fold it leads near to it, and from next to it (``finest``) across.
         """
         straight: float = most / max(self.fastest, 1e-300)
-        if np.isinf(self.fold_distance):
+        if math.isinf(self.fold_distance):
             return straight
         if self.fold_distance < 0.8 * finest:
             return self.across(finest)

@@ -15,6 +15,7 @@ from adhesis.solver.sharp.tolerances import (
     RAN,
     SADDLE_FORCE,
     SADDLE_PASSED,
+    SADDLE_REACH,
     SHORTENED_STEPS,
 )
 
@@ -51,11 +52,15 @@ class RaceCheck:
         stiffness = opening[:, None] * self._edges.stiffness(end, runners)
         return self._hold_back(way[runners], (stiffness + stiffness.T) * way[runners])
 
-    def beyond_saddle(self, start: Array, end: Point | None, track: Track) -> Track | None:
+    def beyond_saddle(
+        self, start: Array, end: Point | None, track: Track
+    ) -> tuple[Array, Track] | None:
         """Return the part of a descent after the last saddle that it passed, or None.
 
         Next to a saddle the forces are small, and little decides to which side edges run on. That
-        counts where runners hold each other back, and gaps or patches went.
+        counts where runners hold each other back, gaps or patches went, and the forces grow soon
+        after the saddle: the further edges run until then, the further away they passed it. Also
+        returns where the descent began with the gaps that it had at the saddle.
         """
         same_gaps = end is not None and end.gaps.shape == start.shape
         if same_gaps or not track.is_complete:
@@ -68,14 +73,16 @@ class RaceCheck:
             after = np.maximum.accumulate(forces[::-1])[::-1]
             ran = before > SADDLE_FORCE * self._edges.critical**2
             saddles = np.flatnonzero(ran & (np.minimum(before, after) > SADDLE_PASSED * forces))
-            if saddles.size > 0:
-                last = saddles[-1]
-                left = np.flatnonzero(forces[last:] > SADDLE_PASSED * forces[last])[0]
+            for saddle in saddles[::-1]:
+                left = saddle + np.flatnonzero(forces[saddle:] > SADDLE_PASSED * forces[saddle])[0]
+                if np.abs(way[left] - way[saddle]).max() > SADDLE_REACH * self._edges.wave:
+                    continue
                 # segments are compared that are no longer than those of short steps
-                points = way[last + left :]
+                points = way[left:]
                 places = np.arange(0, len(points) - 1 + 1e-9, SHORTENED_STEPS)
                 fine = [np.interp(places, np.arange(len(points)), edge) for edge in points.T]
-                return Track(ways=[np.ascontiguousarray(np.transpose(fine))], has_left=True)
+                beyond = Track(ways=[np.ascontiguousarray(np.transpose(fine))], has_left=True)
+                return way[0].reshape(-1, 2), beyond
         return None
 
     def _runners(self, way: Array) -> NDArray[np.int64]:

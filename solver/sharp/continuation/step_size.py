@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.tolerances import FOLD_RESOLVED, STEP_GROWTH, STEP_REDUCTION
@@ -26,8 +26,8 @@ class StepSize:
     def __init__(self, finest: float) -> None:
         self.finest = finest
         self.crosses_fold = False
-        self._largest = np.inf
-        self._failed = np.inf  # distance of the nearest d at which no equilibrium was found
+        self._largest = math.inf
+        self._failed = math.inf  # distance of the nearest d at which no equilibrium was found
 
     def next(self, predictor: Predictor, target: float, motion: float) -> float:
         """Return the next step in d.
@@ -43,7 +43,7 @@ class StepSize:
         if self.crosses_fold:
             size = predictor.across(self.finest)
         left = target - predictor.point.at
-        return left if size >= abs(left) else float(np.copysign(size, left))
+        return left if size >= abs(left) else math.copysign(size, left)
 
     def is_smallest(self, step: float) -> bool:
         """Whether a failure of this step is that of a fold, not of the prediction."""
@@ -71,16 +71,16 @@ class StepSize:
         self._largest = STEP_GROWTH * abs(step)
         self.crosses_fold = False
         # only before a fold is a failure more than that of a prediction
-        sees_fold = np.isfinite(ahead.fold_distance)
-        self._failed = self._failed - abs(step) if sees_fold else np.inf
+        sees_fold = math.isfinite(ahead.fold_distance)
+        self._failed = self._failed - abs(step) if sees_fold else math.inf
 
     def restart(self, largest: float) -> None:
         """Begin again from an earlier point, with a step of ``largest`` at most."""
-        self._largest, self._failed = largest, np.inf
+        self._largest, self._failed = largest, math.inf
 
     def forget_failures(self) -> None:
         """Go on from where a fold turned out to be none."""
-        self.crosses_fold, self._failed = False, np.inf
+        self.crosses_fold, self._failed = False, math.inf
 
     def refine(self, finest: float) -> None:
         """Locate the fold ahead to ``finest``."""

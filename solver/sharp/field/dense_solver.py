@@ -31,6 +31,7 @@ K is that of t = (4K/E*) sqrt(r/2π) at the distance r, in m, from an edge. (1) 
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -87,10 +88,8 @@ class GapField:
 
     Attributes
     ----------
-    opening : array, shape (L, 2)
-        C at each gap end.
-    pressure : float
-        p = 2p̄/E*.
+    pressure, separation : float
+        p = 2p̄/E* and q0 s.
 
     Raises
     ------
@@ -112,12 +111,15 @@ class GapField:
             model = FieldModel(device, float(-np.log(tolerance)), GAUSS_RULES, source.panels)
             orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
             solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
-        if np.isnan(solution.pressure):
+        if math.isnan(solution.pressure):
             raise FloatingPointError("the matrix of the gaps is not positive definite")
         self.solution = solution
-        self.pressure = float(solution.pressure)
-        self.separation = float(solution.separation)
-        self.opening = solution.opening.reshape(-1, 2)
+        self.pressure, self.separation = solution.pressure, solution.separation
+
+    @property
+    def opening(self) -> Array:
+        """C at each gap end, shape (L, 2)."""
+        return self.solution.opening.reshape(-1, 2)
 
     @property
     def pressure_by_prescribed(self) -> float:

@@ -22,20 +22,20 @@ from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.conformal_map import (
     ALPHA,
     LEFT,
-    RIGHT,
     eta_at,
     pole_distances,
     theta_at,
 )
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, interpolate
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules, Integers
 from adhesis.solver.sharp.gap.sine_transform import Circle, sine_sums, tabulate_circle
 from adhesis.solver.sharp.tolerances import ENERGY_NODES, FEWEST_SINE_NODES, SHAPE_NODES
 
 _MANY_NODES = 500  # from so many on, sizes of the transform lie closer to each other
 
 _PER_UNIT = 32  # entries of the table of exp(y) - 1 for a unit of y
-_EXPM1 = np.expm1(np.arange(20 * _PER_UNIT) / _PER_UNIT)
+# y is at most the α of a gap, twice: below 40, as patches are wider than rounding
+_EXPM1 = np.expm1(np.arange(40 * _PER_UNIT) / _PER_UNIT)
 
 
 @dataclass(frozen=True)
@@ -85,25 +85,20 @@ def _fine_nodes(gap: Array, circle: Circle, theta: Array, span: Array) -> None:
     As :func:`theta_at`, many at a time, with exp(y) - 1 from a table.
     """
     alpha = 2 * gap[ALPHA]
-    left_near, left_far = pole_distances(gap, 0)
-    right_near, right_far = pole_distances(gap, 1)
-    for i in range(theta.shape[0]):
-        c = circle.cosine[i + 1]
-        from_left = c < 0
-        near = left_near if from_left else right_near
-        far = left_far if from_left else right_far
-        y = alpha * (1 + c if from_left else 1 - c)
-        place = int(y * _PER_UNIT)
-        if place < _EXPM1.shape[0]:
+    middle = (theta.shape[0] + 1) // 2  # nodes up to it are measured from the right end
+    for side in range(2):
+        near, far = pole_distances(gap, side)
+        inwards = 1.0 - 2 * side
+        for i in range(0 if side == 1 else middle, middle if side == 1 else theta.shape[0]):
+            y = alpha * (1 + inwards * circle.cosine[i + 1])
+            place = int(y * _PER_UNIT)
             x = y - place / _PER_UNIT
             grown = 1 / 24 + x * (1 / 120 + x * (1 / 720 + x / 5040))
             grown = x * (1 + x * (0.5 + x * (1 / 6 + x * grown)))
             grown = _EXPM1[place] + grown * (1 + _EXPM1[place])
-        else:
-            grown = np.expm1(y)
-        r = grown * near * far / (far + (1 + grown) * near)
-        span[i] = alpha * (near + r) * (far - r) / (near + far) * circle.sine[i + 1]
-        theta[i] = gap[LEFT] + r if from_left else gap[RIGHT] - r
+            r = grown * near * far / (far + (1 + grown) * near)
+            span[i] = alpha * (near + r) * (far - r) / (near + far) * circle.sine[i + 1]
+            theta[i] = gap[LEFT + side] + inwards * r
 
 
 @compiled
@@ -122,19 +117,19 @@ def _fine_moments(
 
 
 @compiled
-def _work_of_high_modes(nodes: Nodes, rules: GaussRules, top: int, panels: Panels) -> float:
-    """Sum π/2 s_n²/(n+1) over the modes of all gaps above those of f."""
+def _work_of_high_modes(table: Array, modes_below: Integers, top: int, panels: Panels) -> float:
+    """Sum π/2 s_n²/(n+1) over the modes of all gaps above those of f, which has so many a gap."""
     total = 0.0
     last = 0
     circle = tabulate_circle(4)
-    for k in range(nodes.orders.shape[0]):
-        count = count_sine_nodes(nodes.table[k], top, ENERGY_NODES)
+    for k in range(table.shape[0]):
+        count = count_sine_nodes(table[k], top, ENERGY_NODES)
         if count != last:
             circle = tabulate_circle(count + 1)
             last = count
         theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
-        _fine_moments(nodes.table[k], panels, circle, theta, span, modes)
-        for n in range(rules.counts[nodes.orders[k]], count):
+        _fine_moments(table[k], panels, circle, theta, span, modes)
+        for n in range(modes_below[k], count):
             total += modes[n] * modes[n] / (n + 1)
     return np.pi / 2 * total
 
@@ -142,7 +137,10 @@ def _work_of_high_modes(nodes: Nodes, rules: GaussRules, top: int, panels: Panel
 def work_of_gaps(field: GapField) -> float:
     """Integrate S_full T dθ over the gaps."""
     state, source = field.solution, field.source
-    high = _work_of_high_modes(state.nodes, GAUSS_RULES, source.top, source.panels)
+    nodes = state.nodes
+    high = _work_of_high_modes(
+        nodes.table, GAUSS_RULES.counts[nodes.orders], source.top, source.panels
+    )
     return float(state.equations.load[:, 0] @ state.scaled_opening) - high
 
 

@@ -5,6 +5,8 @@ Gaps are an array of shape (L, 2) of θ = q0 x: left and right ends, ascending.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,14 +23,15 @@ def widths(gaps: Array) -> tuple[Array, Array]:
 
 def outward(gaps: Array) -> Array:
     """Return +1 at left gap ends, where contact grows to the right, else -1, shape (2L,)."""
-    sign = np.ones(2 * len(gaps))
-    sign[1::2] = -1.0
+    return _signs(len(gaps))
+
+
+@cache
+def _signs(gaps: int) -> Array:
+    """Make the signs of :func:`outward`, read-only."""
+    sign = np.tile([1.0, -1.0], gaps)
+    sign.setflags(write=False)
     return sign
-
-
-def without_gaps(gaps: Array, keep: NDArray[np.bool_]) -> Array:
-    """Drop the closed gaps: their patches merge."""
-    return gaps[keep]
 
 
 def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
@@ -72,7 +75,7 @@ def without_small(gaps: Array, smallest: float) -> Array | None:
     if length.min() < smallest and len(gaps) > 1:
         keep = length >= smallest
         keep[int(np.argmax(length))] = True  # the last gap never closes
-        return without_gaps(gaps, keep)
+        return gaps[keep]  # the patches beside a closed gap merge
     if patch.min() < smallest:
         return without_patches(gaps, patch >= smallest)
     return None

@@ -90,6 +90,8 @@ class Clearances:
 
     def note(self, field: GapField, place: NDArray[np.int64], clearance: Array) -> None:
         """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
+        if len(place) == len(self.seen.gaps) and (place == np.arange(len(place))).all():
+            return  # nothing was looked at, and no gap has gone
         of = field.solution
         self.seen = noted(
             field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, place, clearance

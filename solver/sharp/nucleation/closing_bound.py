@@ -44,4 +44,4 @@ class ClosingBound:
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """
         factor = self._edges.system(point.gaps).closing_factor
-        return float(factor * 2 * np.pi / np.diff(point.gaps, axis=1).sum())
+        return float(factor * 2 * np.pi / (point.gaps[:, 1] - point.gaps[:, 0]).sum())

@@ -50,6 +50,9 @@ class Minima:
     curvature: Array
 
 
+NO_MINIMA = Minima(np.empty(0), np.empty(0), np.empty(0))
+
+
 class TrackedGaps(NamedTuple):
     """Gaps that close on a stretch of a branch: their clearances, and how these are computed."""
 
@@ -138,9 +141,11 @@ class Nucleation:
         """
         left, place = self.clearances.left(field)
         fresh = np.flatnonzero(place < 0)
-        minima, where = self.minima(field, fresh)
-        left[fresh] = np.inf
-        np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
+        minima = NO_MINIMA
+        if fresh.size > 0:
+            minima, where = self.minima(field, fresh)
+            left[fresh] = np.inf
+            np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
         self.clearances.note(field, place, left)
         return float(left.min()), minima
 

@@ -20,7 +20,7 @@ from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
-from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Integers
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
 from adhesis.solver.sharp.tolerances import FASTEST_CLOSING
 
 
@@ -44,14 +44,16 @@ class DenseSystem(EdgeSystem):
 
     def equilibrium(
         self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
-    ) -> Equilibrium:
+    ) -> tuple[Point | None, int]:
         """Iterate for the equilibrium near these gaps, by the matrix of all edges."""
         problem = self._problem
         found, at, solution, rate, slope, steps = equilibrium(
             gaps, prescribed, reach, orders, patient, problem.law, problem.model, NO_EXTERIOR
         )
         problem.count.newton(steps)
-        return Equilibrium(found, at, solution, rate, slope)
+        if not found:
+            return None, -1
+        return Point(prescribed, problem.solved(at, prescribed, solution), rate, slope), -1
 
     def descend(
         self,

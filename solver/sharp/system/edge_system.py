@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -14,40 +13,10 @@ from adhesis.solver.sharp.descent.gradient_flow import Descent
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
-from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 
 Integers = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """Result of Newton's iteration for C_e = C_c.
-
-    Attributes
-    ----------
-    found : bool
-        Whether the iteration converged to a stable equilibrium within reach.
-    gaps : array, shape (L, 2)
-    solution : Solution
-    rate : array, shape (2L,)
-        dn/dd of every edge along the branch.
-    slope : float
-        dY/dd along the branch.
-    lost_edge : int
-        Where nothing was found, the edge that moved away; -1 if it is unknown.
-    linearisation : Linearisation or None
-        Of many gaps: with which windows are set up.
-    """
-
-    found: bool
-    gaps: Array
-    solution: Solution
-    rate: Array
-    slope: float
-    lost_edge: int = -1
-    linearisation: Linearisation | None = None
 
 
 class EdgeSystem(ABC):
@@ -83,8 +52,15 @@ class EdgeSystem(ABC):
     @abstractmethod
     def equilibrium(
         self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
-    ) -> Equilibrium:
+    ) -> tuple[Point | None, int]:
         """Iterate for the equilibrium near these gaps.
+
+        Returns
+        -------
+        Point or None
+            None unless the iteration converged to a stable equilibrium within reach.
+        int
+            Where nothing was found, the edge that moved away; -1 if it is unknown.
 
         Raises
         ------

@@ -21,7 +21,7 @@ from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
-from adhesis.solver.sharp.system.edge_system import EdgeSystem, Equilibrium, Integers
+from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
 from adhesis.solver.sharp.tolerances import CLOSING_BY_MOTION, CLOSING_OF_MANY
 
 
@@ -49,17 +49,17 @@ class HierarchicalSystem(EdgeSystem):
 
     def equilibrium(
         self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
-    ) -> Equilibrium:
+    ) -> tuple[Point | None, int]:
         """Iterate for the equilibrium near these gaps, the edges of each gap eliminated."""
         problem = self._problem
         found, at, about, rate, slope, steps = equilibrium_many(
             gaps, prescribed, reach, orders, patient, problem.law, problem.model
         )
         problem.count.newton(steps)
-        lost = -1
-        if not found and np.isfinite(rate).all():
-            lost = int(np.argmax(np.abs(rate)))
-        return Equilibrium(found, at, about.solution, rate, slope, lost, about)
+        if not found:
+            return None, int(np.argmax(np.abs(rate))) if np.isfinite(rate).all() else -1
+        field = problem.solved(at, prescribed, about.solution)
+        return Point(prescribed, field, rate, slope, linearisation=about), -1
 
     def descend(
         self,
