@@ -6,6 +6,7 @@ are those that the program makes, and that it separates a right reading from a w
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from tools.study.collect import COLUMNS, collect_all
 from tools.study.data import Rows, Study, read
 from tools.study.page import ALL, filled
 from tools.study.readings import Losses, Reading
+from tools.study.table1 import all_readings, every_reading
 
 STUDY = Path(__file__).resolve().parents[2] / "docs" / "study"
 PAGE = "\n".join(page.read_text(encoding="utf-8") for page in sorted(STUDY.glob("*.md")))
@@ -74,6 +76,15 @@ def test_the_results_are_those_of_the_campaigns(study):
         assert set(rows["hurst"].tolist()) <= set(campaign.sweep.hurst)
         assert set(rows["work_of_adhesion"].tolist()) <= set(campaign.sweep.work_of_adhesion)
         assert len(rows) <= campaign.task_count
+
+
+def test_the_list_of_readings_is_what_the_results_make(study):
+    """The verdicts do not depend on whether the paper used one set of profiles for all cells."""
+    with (STUDY / "readings.csv").open(encoding="utf-8") as stream:
+        written = list(csv.reader(stream))[1:]
+    assert written == all_readings(study)[1]
+    for reading in every_reading(study):
+        assert replace(reading, shared=0.0).verdict == reading.verdict
 
 
 def drawn(rng, realisations, means, spread=0.3):
