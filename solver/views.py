@@ -47,8 +47,8 @@ class Viewed(Shown):
         >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
         >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
         >>> loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
-        >>> [axes.get_ylabel() for axes in loop.plot().axes]
-        ['mean stress (kPa)', 'contact fraction A/A0']
+        >>> len(loop.plot().axes)  # mean stress, contact fraction
+        2
         """
         return maker().plot(self)
 

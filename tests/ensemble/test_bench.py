@@ -266,7 +266,7 @@ def test_full_benchmark_adds_the_growth(no_runs, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "reported"),
     [
-        (["--budget", "0"], "--budget is 0.0: it must be positive"),
+        (["--budget", "0"], "--budget is 0.0: it must be a positive number of seconds"),
         (["--to", "{file}"], "--to is"),
     ],
 )

@@ -99,7 +99,7 @@ DIMENSIONAL = {
     "J/m": {"energy", "elastic_energy", "adhesion_energy"},
     "J/m²": {
         *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),
-        *("energy_at_stake", "work_gained", "work_spent", "full_contact_energy"),
+        *("energy_at_stake", "barrier", "work_gained", "work_spent", "full_contact_energy"),
         *("effective_work_of_approach", "effective_work_of_separation"),
     },
     "Pa/m": {"stiffness"},

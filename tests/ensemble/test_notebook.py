@@ -96,7 +96,7 @@ def test_a_notebook_shows_the_main_numbers_and_the_figure(result):
     assert len(page) < 200_000
     figure = result.plot()
     assert isinstance(figure, Figure)
-    assert [axes.get_xlabel() for axes in figure.axes] == ["penetration Δ/h_max"] * 2
+    assert [axes.get_xlabel() for axes in figure.axes] == [r"penetration $\Delta/h_{\max}$"] * 2
 
 
 # ---------------------------------------------------------------------- tables and files

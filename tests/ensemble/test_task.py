@@ -40,10 +40,29 @@ def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
         for i, kind in enumerate(kinds)
     )
     return LoopResult(
-        problem, top, top, n, branch, on_axis, penetration,
-        problem.separation(0) * (1 - penetration), value, value, value.astype(int), value, value,
-        catalogue, 2.0, 3.0, 1.5, 0.02, 1.0, 3.0, 0.1, MethodReport("grid", None),
-    )  # fmt: skip
+        problem=problem,
+        turning_point=top,
+        max_penetration=top,
+        load_steps=n,
+        branch=branch,
+        load_step=on_axis,
+        penetration=penetration,
+        separation=problem.separation(0) * (1 - penetration),
+        mean_stress=value,
+        contact_fraction=value,
+        patches=value.astype(int),
+        elastic_energy=value,
+        adhesion_energy=value,
+        jumps=catalogue,
+        loss=2.0,
+        loss_dimensionless=3.0,
+        loss_from_drops=1.5,
+        loss_error=0.02,
+        work_gained=1.0,
+        work_spent=3.0,
+        seconds=0.1,
+        method=MethodReport("grid", None),
+    )
 
 
 def loop_row(campaign, loop):

@@ -188,7 +188,7 @@ WORDS = FRAME.assign(**{"z (um)": "high"})
 REFUSED_IN_MEMORY: dict[str, tuple[object, dict[str, object], type[Exception], str]] = {
     "no unit": (BOTH, {}, InputError, "array states no unit"),
     "no step": (Z, {"unit": "m"}, InputError, "array has heights without positions.*give step"),
-    "three columns": (FRAME, {}, InputError, "the table has 3 columns: columns X,Z names"),
+    "three columns": (FRAME, {}, InputError, "the table has 3 columns: give columns X,Z"),
     "no such column": (FRAME, {"columns": ["x", "z"]}, InputError, r"columns is 'x': the table ha"),
     "words": (WORDS, {"columns": [1, 2]}, InputError, "the table holds more than numbers"),
     "complex": (1j * Z, {"step": STEP}, InputError, "array holds complex128"),

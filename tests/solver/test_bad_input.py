@@ -586,7 +586,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         "self_affine_profile",
         lambda: spectral(ratio=10**5),
         ValueError,
-        "n0 · ratio is 200000: at most 100000 waves",
+        "n0 · ratio is 200000: it must be at most 100000",
     ),
     (
         "self_affine_profile",

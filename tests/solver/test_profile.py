@@ -169,7 +169,7 @@ def test_coefficients_must_describe_a_profile():
 
 
 def test_an_absurd_spectrum_is_refused_before_it_fills_the_memory():
-    with pytest.raises(ValueError, match="at most 100000 waves"):
+    with pytest.raises(ValueError, match="must be at most 100000"):
         spectral(0.8, period=1.0, n0=10, ratio=100_000, seed=1, h_rms=1e-6)
 
 
