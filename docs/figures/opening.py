@@ -1,7 +1,7 @@
 """Draws opening.png: the loss against E of zero range, and where patches open from inside.
 
 Run it as ``.venv/bin/python docs/figures/opening.py [FILE [PROFILES]]``; it prints the table of
-docs/zero-range.md. The range of adhesion is 0.3 nm, and ten profiles are taken unless fewer are asked for.
+docs/zero-range.md. The range of adhesion is 0.3 nm, and ten profiles are taken by default.
 """
 
 from __future__ import annotations

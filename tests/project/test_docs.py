@@ -32,6 +32,7 @@ PAGES = [
 
 # Commands that are read by their parser, or whose files are looked for, but that are not run here.
 NOT_RUN = {
+    "adhesis report paper.h5 --to paper": "of 90 loops; tests/ensemble/test_report.py",
     "make run": "sets a machine up; tests/project/test_setup.py",
     "make test": "is this",
     "make setup": "sets a machine up; tests/project/test_setup.py",
