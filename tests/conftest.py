@@ -30,9 +30,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
     """Name the tests under way when none ends for long."""
-    reporter = config.pluginmanager.get_plugin("terminalreporter")
-    if "PYTEST_XDIST_WORKER" not in os.environ and reporter is not None:
-        config.pluginmanager.register(Waiting(reporter.write_line), "waiting")
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        # The standard output of now: that of a test belongs to the test.
+        terminal = os.fdopen(os.dup(1), "w", buffering=1)
+        config.pluginmanager.register(Waiting(terminal), "waiting")
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from typing import TextIO
 
 _EVERY = 10.0  # s
 
@@ -16,14 +16,14 @@ class Waiting:
 
     Parameters
     ----------
-    write : callable
-        Writes a line to the terminal.
+    terminal : TextIO
+        Where the lines go: a stream of its own, which no test captures.
     every : float
         Longest time without a line, in s.
     """
 
-    def __init__(self, write: Callable[[str], None], every: float = _EVERY) -> None:
-        self._write = write
+    def __init__(self, terminal: TextIO, every: float = _EVERY) -> None:
+        self._terminal = terminal
         self._every = every
         self._begun: dict[str, float] = {}
         self._last = time.monotonic()
@@ -50,4 +50,5 @@ class Waiting:
                 continue
             self._last = now
             under_way = [f"{name} ({now - begun:.0f} s)" for name, begun in self._begun.items()]
-            self._write(f"waiting for {', '.join(under_way) or 'the tests to be collected'}")
+            waited = ", ".join(under_way) or "the tests to be collected"
+            print(f"\nwaiting for {waited}", file=self._terminal)
