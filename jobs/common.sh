@@ -73,13 +73,14 @@ choose_launcher() {
 # handles signals only between commands or in `wait`, so the command runs in the background.
 follow() {
     local number
-    run='' terminated=''
+    run='' terminated='' signalled=''
     for number in USR1 TERM INT HUP; do
         # shellcheck disable=SC2064
         trap "pass_on $number" "$number"
     done
     "$@" </dev/null &
     run=$!
+    if [ -n "$signalled" ]; then kill -s USR1 "$run" 2>/dev/null || true; fi # it came before run was set
     while :; do
         signalled='' code=0
         wait "$run" || code=$?

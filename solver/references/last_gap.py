@@ -19,6 +19,7 @@ their faces.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -27,7 +28,11 @@ from scipy.optimize import brentq
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.references.full_contact import full_contact_stress
 
-_NODES = 200
+
+@cache
+def _gauss() -> tuple[Array, Array]:
+    """Return Gauss-Legendre nodes and weights for the integrals over φ."""
+    return legendre.leggauss(200)
 
 
 @dataclass(frozen=True)
@@ -93,14 +98,14 @@ class LastGap:
 
     def _nodes(self, b: float) -> tuple[Array, Array]:
         """Return Gauss nodes φ from 0 to π/2, and the places inside the gap that belong to them."""
-        nodes, _ = legendre.leggauss(_NODES)
+        nodes, _ = _gauss()
         angle = np.pi / 4 * (nodes + 1)
         inside = np.arcsin(np.sin(self._beta(b)) * np.sin(angle))
         return angle, np.asarray(inside * self.profile.period / np.pi)
 
     def _mean(self, values: Array) -> float:
         """Average over φ: (2/π) ∫_0^{π/2} … dφ."""
-        _, weights = legendre.leggauss(_NODES)
+        _, weights = _gauss()
         return float(values @ weights) / 2
 
     def _full(self, x: Array) -> Array:

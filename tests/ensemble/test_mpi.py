@@ -20,7 +20,7 @@ from adhesis.ensemble.results.merge import merge
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.session import Options, run_campaign
+from adhesis.ensemble.run.session import Options, Summary, run_campaign
 from tests.support.campaign_support import (
     MPIRUN,
     ROOT,
@@ -35,25 +35,32 @@ from tests.support.campaign_support import (
     wait_until,
     write_campaign,
 )
+from tests.support.fake_run import fake_engine
 
 pytestmark = pytest.mark.mpi
 
 
-@pytest.fixture
-def whole(tmp_path):
+def here(path, out, fake="") -> Summary:
+    """Run a campaign of fake tasks, or resume it, in this process."""
+    return run_campaign(load_campaign(path), out, engine=fake_engine(fake))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
     """The fake campaign, undisturbed, by one process."""
-    out = tmp_path / "whole.h5"
-    assert adhesis("run", write_campaign(tmp_path), "--out", out, fake="").returncode == 0
-    return out
+    folder = tmp_path_factory.mktemp("whole")
+    assert here(write_campaign(folder), folder / "whole.h5").done == 8
+    return folder / "whole.h5"
 
 
 def test_real_loops_have_the_same_bits_for_any_number_of_ranks(tmp_path):
-    path = write_campaign(tmp_path)
-    for ranks in (1, 2, 3, 4):
+    """No worker, one and three; two workers are those of the next test."""
+    path, alone = write_campaign(tmp_path, realisations="1"), tmp_path / "alone.h5"
+    assert run_campaign(load_campaign(path), alone).done == 4
+    for ranks in (2, 4):
         process = adhesis("run", path, "--out", tmp_path / f"{ranks}.h5", ranks=ranks)
         assert process.returncode == 0, process.stderr
-    for ranks in (2, 3, 4):
-        assert differences(tmp_path / "1.h5", tmp_path / f"{ranks}.h5") == []
+        assert differences(alone, tmp_path / f"{ranks}.h5") == []
 
 
 def test_turning_points_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_path):
@@ -78,7 +85,7 @@ def test_turning_points_have_the_same_bits_on_ranks_resumed_and_in_parts(tmp_pat
     assert differences(tmp_path / "merged.h5", whole) == []
 
 
-def test_more_ranks_than_tasks(tmp_path, whole):
+def test_more_ranks_than_tasks(tmp_path):
     path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
     process = adhesis("run", path, "--out", tmp_path / "r.h5", ranks=4, fake="")
     assert process.returncode == 0
@@ -99,8 +106,7 @@ def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
         assert process.returncode not in (0, 1, 2, 75)
     process.communicate()
     kept = done_rows(out)
-    resumed = adhesis("run", path, "--out", out, ranks=3, fake=f"log={log}")
-    assert resumed.returncode == 0, resumed.stderr
+    assert here(path, out, f"log={log}").done == 8
     assert differences(out, whole) == []
     # Ranks that outlived their launcher by a moment may have finished a row meanwhile.
     assert 8 - kept - 2 <= len(log.read_text().splitlines()) <= 8 - kept
@@ -152,8 +158,7 @@ def test_ranks_end_with_a_run_that_is_killed_and_the_next_one_resumes(tmp_path, 
     process.kill()
     process.wait()
     wait_until(lambda: all(map(has_ended, left)))
-    resumed = adhesis("run", path, "--out", out, fake="")
-    assert resumed.returncode == 0, resumed.stderr
+    assert here(path, out).done == 8
     assert differences(out, whole) == []
 
 
@@ -213,7 +218,7 @@ def test_kills_at_random_moments(tmp_path, victim):
     """The file opens after each kill, nothing done is computed again, and all bits are the same."""
     random.seed(victim)
     path, out, whole = write_campaign(tmp_path, realisations="4"), tmp_path / "r.h5", tmp_path / "w"
-    assert adhesis("run", path, "--out", whole, fake="").returncode == 0
+    assert here(path, whole).done == 16
     killed = 0
     while killed < KILLS:
         done = rows_done(out)
@@ -260,8 +265,7 @@ def test_a_signal_stops_every_rank_within_a_load_step(tmp_path, whole, to):
     assert process.returncode == 75, errors
     assert "stopped early: SIGUSR1 received" in errors
     kept = done_rows(out)
-    resumed = adhesis("run", path, "--out", out, ranks=2, fake=f"log={log}")
-    assert resumed.returncode == 0, resumed.stderr
+    assert here(path, out, f"log={log}").computed == 8 - kept
     assert len(log.read_text().splitlines()) == 8 - kept
     assert differences(out, whole) == []
 
@@ -312,7 +316,7 @@ def test_growing_from_10_to_20_realisations_computes_exactly_the_new_ones(tmp_pa
     assert {task: after[task] for task in before} == before
     assert set(after) - set(before) == set(new)
     whole = tmp_path / "whole.h5"
-    assert adhesis("run", tmp_path / "c.toml", "--out", whole, fake="").returncode == 0
+    assert here(tmp_path / "c.toml", whole).done == 80
     assert differences(out, whole) == []
 
 
@@ -407,14 +411,14 @@ def test_the_endurance_benchmark_runs(tmp_path):
         rows = (line.strip().split("  ", 1) for line in process.stdout.splitlines()[1:])
         return {row[0]: row[1].strip() for row in rows if len(row) == 2}
 
-    path = write_campaign(tmp_path)
+    path = write_campaign(tmp_path, realisations="1")
     words = ("empty", "--campaign", path, "--tasks", 40, "--seconds", 0.05, "--dir", tmp_path)
     shown = table(*words)
     assert float(shown["tasks a second"].split()[0]) > 0
     assert shown["master, of a core"].endswith("under 2 %")
     shown = table("campaign", path, "--out", "r.h5")
     assert float(shown["makespan / ideal"].split()[0]) >= 1
-    assert done_rows(tmp_path / "r.h5") == 8
+    assert done_rows(tmp_path / "r.h5") == 4
     assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "r.h5"]
 
 

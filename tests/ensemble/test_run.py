@@ -20,7 +20,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run import session
+from adhesis.ensemble.run import launch, session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
@@ -28,6 +28,7 @@ from adhesis.ensemble.task.compute import check_task
 from tests.support.campaign_support import (
     TESTS,
     adhesis,
+    adhesis_here,
     differences,
     done_rows,
     environment,
@@ -39,14 +40,15 @@ from tests.support.fake_run import fake_engine, fake_result
 
 
 def run(folder, *words, fake="", **changes):
-    """Run the fake campaign of a folder to its end; returns the process and the results file."""
+    """Run the fake campaign of a folder to its end; returns how it ended and the results file."""
     path = write_campaign(folder, **changes)
     out = folder / "r.h5"
-    return adhesis("run", path, "--out", out, *words, fake=fake), out
+    return adhesis_here("run", path, "--out", out, *words, fake=fake), out
 
 
 def test_a_run_from_nothing_to_done(tmp_path):
-    process, out = run(tmp_path)
+    out = tmp_path / "r.h5"
+    process = adhesis("run", write_campaign(tmp_path), "--out", out, fake="")
     assert process.returncode == 0
     assert process.stdout == ""
     assert f"{out}: 8 tasks to do" in process.stderr
@@ -59,25 +61,15 @@ def test_a_run_from_nothing_to_done(tmp_path):
         assert file.attrs["seed"] == 5
 
 
-def test_where_there_is_no_launcher_one_process_computes(tmp_path):
-    path = write_campaign(tmp_path)
-    code = (
-        "import sys; from adhesis.ensemble.run import launch; launch.launcher = lambda: None\n"
-        "from adhesis.ensemble.command.main import main; sys.exit(main(sys.argv[1:]))"
-    )
-    words = ("run", path, "--out", tmp_path / "r.h5", "--ranks", "3")
-    process = subprocess.run(
-        [sys.executable, "-c", code, *map(str, words)],
-        env=environment(),
-        capture_output=True,
-        text=True,
-    )
+def test_where_there_is_no_launcher_one_process_computes(tmp_path, monkeypatch):
+    monkeypatch.setattr(launch, "launcher", lambda: None)
+    process, _ = run(tmp_path, "--ranks", "2")
     assert process.returncode == 0
     assert "no mpirun was found, so one process computes" in process.stderr
 
 
 def test_the_version_is_told():
-    process = adhesis("--version")
+    process = adhesis_here("--version")
     assert process.returncode == 0
     assert process.stdout.startswith("adhesis 0.")
 
@@ -135,7 +127,7 @@ def test_a_killed_run_resumes_with_the_same_bits(tmp_path):
 def test_walltime_ends_the_run_in_time(tmp_path):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     words = ("run", path, "--out", out, "--walltime", "3s")
-    process = adhesis(*words, fake="step=0.2 hang=0.8:0.04:1")  # that task would never end
+    process = adhesis_here(*words, fake="step=0.2 hang=0.8:0.04:1")  # that task would never end
     assert process.returncode == 75
     assert "stopped early: " in process.stderr
 
@@ -162,10 +154,10 @@ def test_a_campaign_on_further_axes(tmp_path):
         assert data["ratio"].attrs["long_name"].startswith("highest over lowest")
         assert data["max_penetration"].values.tolist() == [0.3, 0.6] * 4
         assert data["loading_penetration"].values.tolist() == [0, 0.25, 0.5, 0.75, 1]
-    status = json.loads(adhesis("status", out, "--json").stdout)
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert status["axes"] == ["hurst", "work_of_adhesion", "ratio", "max_penetration"]
     assert [g["max_penetration"] for g in status["groups"][:3]] == [0.3, 0.6, 0.3]
-    assert "ratio  max_penetration" in adhesis("status", out).stdout
+    assert "ratio  max_penetration" in adhesis_here("status", out).stdout
     log = tmp_path / "log"
     process, _ = run(tmp_path, young="[1e6, 2e6]", hurst="[0.7, 0.8]", fake=f"log={log}", **axes)
     assert process.returncode == 0, process.stderr
@@ -242,10 +234,10 @@ def test_a_doubtful_loss_is_said(tmp_path):
     assert "2 losses are doubtful: by their own account they may be off by more than 0.1 %" in (
         process.stderr
     )
-    text = adhesis("status", out).stdout
+    text = adhesis_here("status", out).stdout
     assert "2 losses are doubtful" in text
     assert "realisation 1" in text
-    status = json.loads(adhesis("status", out, "--json").stdout)
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert [d["row"] for d in status["doubtful"]] == [1, 3]
 
 
@@ -253,14 +245,14 @@ def test_too_many_failures_stop_the_run(tmp_path):
     process, out = run(tmp_path, "--max-failures", "3", fake="fail=*:*:*")
     assert process.returncode == 1
     assert "stopped early: 3 tasks failed (the limit is --max-failures 3)" in process.stderr
-    status = json.loads(adhesis("status", out, "--json").stdout)
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert (status["failed"], status["pending"]) == (3, 5)
 
 
 def test_a_task_that_hangs_meets_the_time_limit_and_the_limit_may_change(tmp_path):
     process, out = run(tmp_path, fake="hang=0.7:0.01:0", method='"grid"\ntime_limit = 0.6')
     assert process.returncode == 1
-    failure = json.loads(adhesis("status", out, "--json").stdout)["failures"][0]
+    failure = json.loads(adhesis_here("status", out, "--json").stdout)["failures"][0]
     assert failure["error"] == "longer than the time limit of 0.6 s"
     assert failure["seconds"] > 0.5
     process, _ = run(tmp_path, "--redo", "failed", method='"grid"\ntime_limit = 60')
@@ -274,7 +266,7 @@ def refused(folder, *words, **changes):
     """Run with bad input: one sentence, exit code 2, nothing written."""
     path = write_campaign(folder, **changes)
     before = {p: p.read_bytes() for p in folder.iterdir() if p.is_file()}
-    process = adhesis("run", path, "--out", folder / "r.h5", *words)
+    process = adhesis_here("run", path, "--out", folder / "r.h5", *words)
     assert process.returncode == 2, process.stderr
     assert process.stdout == ""
     assert len(process.stderr.splitlines()) == 1, process.stderr
@@ -366,21 +358,21 @@ def test_two_runs_on_one_file(tmp_path):
     started = time.time()
     first = start("run", path, "--out", out, fake="hold=1")
     wait_until(lambda: done_rows(out) >= 1)
-    second = adhesis("run", path, "--out", out, "--patience", "0.1")
+    second = adhesis_here("run", path, "--out", out, "--patience", "0.1")
     assert second.returncode == 2
     assert len(second.stderr.splitlines()) == 1
     assert f"is being written by another run (host {os.uname().nodename}" in second.stderr
-    status = json.loads(adhesis("status", out, "--json").stdout)
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert (status["done"], status["pending"]) == (1, 7)
     assert status["run"]["pid"] == first.pid
     assert started <= status["last_row"] <= time.time()
-    assert f"a run is writing (host {os.uname().nodename}" in adhesis("status", out).stdout
+    assert f"a run is writing (host {os.uname().nodename}" in adhesis_here("status", out).stdout
     first.send_signal(signal.SIGTERM)
     first.communicate(timeout=60)
     assert first.returncode == 75
-    ended = adhesis("status", out).stdout
+    ended = adhesis_here("status", out).stdout
     assert "no run is writing; last row " in ended
-    assert json.loads(adhesis("status", out, "--json").stdout)["run"] is None
+    assert json.loads(adhesis_here("status", out, "--json").stdout)["run"] is None
 
 
 def test_processes_of_another_mpi_are_reported_by_rank_0(tmp_path, monkeypatch):
@@ -399,7 +391,8 @@ def test_processes_of_another_mpi_are_reported_by_rank_0(tmp_path, monkeypatch):
 def test_a_disk_that_fills_while_running(tmp_path):
     """A limit on the size of a file stands for the full disk; the rows before it are kept."""
     _, out = run(tmp_path, fake="")
-    process, _ = run(tmp_path, "--redo", "all", "--realisation", "1", fake="full=20000")
+    words = ("run", tmp_path / "c.toml", "--out", out, "--redo", "all", "--realisation", "1")
+    process = adhesis(*words, fake="full=20000")
     assert process.returncode == 74
     assert "could not be written: File too large; what was done is kept" in process.stderr
     assert "Traceback" not in process.stderr
@@ -411,13 +404,13 @@ def test_a_disk_that_fills_while_running(tmp_path):
 
 def test_status_tells_what_failed_and_why(tmp_path):
     _, out = run(tmp_path, fake="fail=0.7:*:1")
-    text = adhesis("status", out).stdout
+    text = adhesis_here("status", out).stdout
     assert "8 tasks, 6 done, 0 pending, 2 failed" in text
     assert "failed 2×: FloatingPointError: the sum of γ diverged" in text
     assert "H = 0.7, γ = 0.04 J/m², realisation 1" in text
-    status = json.loads(adhesis("status", out, "--json").stdout)
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
     assert [g["done"] for g in status["groups"]] == [1, 1, 2, 2]
-    process = adhesis("status", tmp_path / "none.h5")
+    process = adhesis_here("status", tmp_path / "none.h5")
     assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)
 
 
@@ -530,12 +523,12 @@ def test_watching_a_run_until_it_is_done(tmp_path):
     assert any("an hour, about" in line for line in shown[1:-1])
     assert shown[-1].endswith("8 tasks, 8 done, 0 pending, 0 failed")
     assert any(" ± " in line for line in lines[lines.index(shown[-1]) :])  # the table of losses
-    assert adhesis("status", out, "--watch", "--interval", "x").returncode == 2
+    assert adhesis_here("status", out, "--watch", "--interval", "x").returncode == 2
 
 
 def test_the_losses_that_status_shows(tmp_path):
     _, out = run(tmp_path)
-    status = json.loads(adhesis("status", out, "--json").stdout)
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
     with h5py.File(out) as file:
         mine = (file["hurst"][:] == 0.7) & (file["work_of_adhesion"][:] == 0.04)
         loss = file["loss"][:][mine]

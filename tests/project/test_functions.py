@@ -33,15 +33,18 @@ MATHEMATICAL = {
 }
 
 
-def sources() -> Iterator[tuple[str, ast.Module]]:
-    for folder in FOLDERS:
-        for path in sorted((SHARP / folder).glob("*.py")):
-            yield f"{folder}/{path.name}", ast.parse(path.read_text("utf-8"))
+MODULES = [
+    f"{folder}/{path.name}" for folder in FOLDERS for path in sorted((SHARP / folder).glob("*.py"))
+]
+
+
+def tree_of(name: str) -> ast.Module:
+    return ast.parse((SHARP / name).read_text("utf-8"))
 
 
 def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
-    for name, tree in sources():
-        for node in ast.walk(tree):
+    for name in MODULES:
+        for node in ast.walk(tree_of(name)):
             if isinstance(node, ast.FunctionDef):
                 yield f"{name}: {node.name}", node
 
@@ -60,12 +63,11 @@ def test_functions_have_few_parameters() -> None:
     assert [name for name, f in functions() if count(f) > MOST_PARAMETERS] == []
 
 
-@pytest.mark.parametrize("name", [name for name, _ in sources()])
+@pytest.mark.parametrize("name", MODULES)
 def test_tolerances_stand_in_their_table(name: str) -> None:
-    tree = dict(sources())[name]
     numbers = {
         target.id
-        for node in tree.body
+        for node in tree_of(name).body
         if isinstance(node, ast.Assign)
         and isinstance(node.value, ast.Constant)
         and isinstance(node.value.value, int | float)

@@ -167,6 +167,17 @@ def test_slurm_job_is_requeued_reported_or_left(
     assert (done.returncode, seen) == (code, action), done.stdout + done.stderr
 
 
+def test_signal_between_the_start_of_a_run_and_its_number_reaches_it(cluster: Cluster) -> None:
+    """Bash handles a signal before the next command: here before it has noted the run's number."""
+    script = f""". "{JOBS}/common.sh"
+        set -T
+        trap '[ "$BASH_COMMAND" != "run=\\$!" ] || kill -s TERM $$' DEBUG
+        follow bash -c "trap 'exit 75' USR1; while :; do sleep 0.02; done"
+        echo "$code $terminated"
+    """
+    assert cluster.run("bash", "-c", script).stdout.split()[-2:] == ["75", "yes"]
+
+
 @pytest.mark.parametrize(
     ("env", "ranks"),
     [

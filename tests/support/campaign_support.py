@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import h5py
 import numpy as np
 
+from adhesis.ensemble.command.campaigns import run
+from adhesis.ensemble.command.main import main
+from tests.support.fake_run import fake_engine
 from tests.support.launchers import MPIRUN
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -104,6 +111,19 @@ def adhesis(
         text=True,
         timeout=100,
     )
+
+
+def adhesis_here(*words: object, fake: str | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end in this process, which takes a tenth of the time of a new one."""
+    execute = run.execute if fake is None else partial(run.execute, engine=fake_engine(fake))
+    out, errors = io.StringIO(), io.StringIO()
+    with (
+        patch.object(run, "execute", execute),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(errors),
+    ):
+        code = main(list(map(str, words)))
+    return subprocess.CompletedProcess(list(words), code, out.getvalue(), errors.getvalue())
 
 
 def start(*words: object, ranks: int = 0, fake: str | None = None) -> subprocess.Popen[str]:
