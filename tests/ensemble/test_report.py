@@ -577,7 +577,7 @@ def test_the_same_file_gives_the_same_bytes(file, report, tmp_path, monkeypatch)
             assert (tmp_path / name).read_bytes() == (report / name).read_bytes(), name
 
 
-def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, capsys, laid_out):
+def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, capsys, drawn):
     plan = campaign(hurst=(0.7, 0.8), gamma=(0.01, 0.04), realisations=3)
     values = rows(plan)
     values["status"][:] = [1, 1, 1, 1, 0, 2, 0, 0, 0, 1, 0, 0]
@@ -593,7 +593,7 @@ def test_an_unfinished_campaign_is_reported_and_says_what_is_missing(tmp_path, c
         assert "No task is finished yet for H = 0.8, γ = 0.01 J/m²" in text
         assert "Only one realisation" in text
     assert "row 5: the sum diverged" in page
-    assert len(laid_out) == 13
+    assert len(drawn) == 13
 
 
 def test_one_finished_task_of_one_cell_is_enough(tmp_path, laid_out):

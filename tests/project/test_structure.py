@@ -102,7 +102,8 @@ def modules() -> Iterator[tuple[str, Path]]:
 PATHS = dict(modules())
 
 
-def imported(path: Path) -> set[str]:
+@cache
+def imported(path: Path) -> frozenset[str]:
     """Every module that a file imports, at its top, inside functions or for types only."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text())):
@@ -113,7 +114,7 @@ def imported(path: Path) -> set[str]:
             for alias in node.names:
                 full = f"{node.module}.{alias.name}"
                 found.add(full if full in PATHS else str(node.module))
-    return found
+    return frozenset(found)
 
 
 @cache
