@@ -102,7 +102,7 @@ def test_a_kill_ends_the_job_and_the_next_run_resumes(tmp_path, whole, victim):
     else:
         ranks = ranks_of(process.pid)
         os.kill(ranks[-1] if victim == "worker" else ranks[0], signal.SIGKILL)
-        process.wait(timeout=60)
+        process.wait(timeout=150)
         assert process.returncode not in (0, 1, 2, 75)
     process.communicate()
     kept = done_rows(out)
@@ -142,7 +142,7 @@ def test_ranks_of_a_run_stop_with_it_in_order(tmp_path, number, hangup_counts):
     process = start("run", path, "--out", out, "--ranks", "3", fake="hold=1")
     wait_until(lambda: done_rows(out) >= 1)
     process.send_signal(number)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=150)
     assert process.returncode == 75, errors
     assert "stopped early: SIGUSR1 received" in errors
 
@@ -168,7 +168,7 @@ def test_a_killed_rank_ends_with_what_to_do(tmp_path):
     wait_until(lambda: done_rows(out) >= 1)
     (launcher,) = ranks_of(process.pid)
     os.kill(ranks_of(launcher)[-1], signal.SIGKILL)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=150)
     assert process.returncode == 137
     assert errors.splitlines()[-1].endswith("run the same command again to resume")
 
@@ -183,7 +183,7 @@ def test_tasks_of_a_rank_that_hangs_are_done_by_others_and_the_job_ends(tmp_path
     (launcher,) = ranks_of(process.pid)
     os.kill(ranks_of(launcher)[-1], signal.SIGSTOP)
     free.touch()
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=150)
     assert process.returncode == 0, errors
     assert "rank 2 does not answer for 1 s: 1 of its 1 tasks are handed to others" in errors
     assert "8 of 8 tasks done; 8 computed" in errors
@@ -234,7 +234,7 @@ def test_kills_at_random_moments(tmp_path, victim):
                 kill_all(process)
             else:
                 os.kill(ranks[-1] if victim == "worker" else ranks[0], signal.SIGKILL)
-        process.communicate(timeout=30)
+        process.communicate(timeout=150)
         assert not done & set(log.read_text().split())
         if process.returncode == 0:
             assert differences(out, whole) == []
@@ -261,7 +261,7 @@ def test_a_signal_stops_every_rank_within_a_load_step(tmp_path, whole, to):
     process = start("run", path, "--out", out, ranks=3, fake="step=0.1 hang=0.8:0.04:1")
     wait_until(lambda: done_rows(out) >= 2)
     os.kill(process.pid if to == "launcher" else ranks_of(process.pid)[-1], signal.SIGUSR1)
-    _, errors = process.communicate(timeout=60)  # one of the tasks would never end
+    _, errors = process.communicate(timeout=150)  # one of the tasks would never end
     assert process.returncode == 75, errors
     assert "stopped early: SIGUSR1 received" in errors
     kept = done_rows(out)
@@ -391,7 +391,7 @@ def test_the_status_during_a_run_under_mpirun(tmp_path):
     status = json.loads(adhesis("status", out, "--json").stdout)
     assert 1 <= status["done"] < 8
     assert status["done"] + status["pending"] == 8
-    process.communicate(timeout=30)
+    process.communicate(timeout=150)
     assert process.returncode == 0
 
 
@@ -405,7 +405,7 @@ def test_the_endurance_benchmark_runs(tmp_path):
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=100,
+            timeout=150,
         )
         assert process.returncode == 0, process.stderr
         rows = (line.strip().split("  ", 1) for line in process.stdout.splitlines()[1:])
@@ -441,5 +441,5 @@ def test_waiting_costs_the_master_next_to_nothing(tmp_path):
     wait_until(lambda: begun() == 4)  # the master has waited for two tasks of four load steps
     share = (cpu() - before) / (time.monotonic() - since)
     process.send_signal(signal.SIGUSR1)
-    process.communicate(timeout=60)
+    process.communicate(timeout=150)
     assert share < 0.03

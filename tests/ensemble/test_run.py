@@ -95,7 +95,7 @@ def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path):
     process = start("run", path, "--out", out, fake="hold=2")
     wait_until(lambda: done_rows(out) >= 2)
     process.send_signal(signal.SIGUSR1)
-    _, errors = process.communicate(timeout=60)  # the task would go on for ever
+    _, errors = process.communicate(timeout=150)  # the task would go on for ever
     assert process.returncode == 75
     assert "stopped early: SIGUSR1 received" in errors
     kept = done_rows(out)
@@ -368,7 +368,7 @@ def test_two_runs_on_one_file(tmp_path):
     assert started <= status["last_row"] <= time.time()
     assert f"a run is writing (host {os.uname().nodename}" in adhesis_here("status", out).stdout
     first.send_signal(signal.SIGTERM)
-    first.communicate(timeout=60)
+    first.communicate(timeout=150)
     assert first.returncode == 75
     ended = adhesis_here("status", out).stdout
     assert "no run is writing; last row " in ended
@@ -514,8 +514,8 @@ def test_watching_a_run_until_it_is_done(tmp_path):
     assert watch.stdout is not None
     first = watch.stdout.readline()
     free.touch()
-    rest, _ = watch.communicate(timeout=60)
-    run_.communicate(timeout=60)
+    rest, _ = watch.communicate(timeout=150)
+    run_.communicate(timeout=150)
     assert watch.returncode == 0
     lines = [first.rstrip(), *rest.splitlines()]
     shown = [line for line in lines if " tasks, " in line]

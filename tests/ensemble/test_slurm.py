@@ -70,7 +70,7 @@ class Cluster:
     def call(self, *command: str | Path, cwd: Path | None = None) -> str:
         """Run a command of Slurm's; its output."""
         done = subprocess.run(
-            command, env=self.env, cwd=cwd, capture_output=True, text=True, timeout=60, check=False
+            command, env=self.env, cwd=cwd, capture_output=True, text=True, timeout=150, check=False
         )
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
         return done.stdout

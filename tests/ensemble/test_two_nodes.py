@@ -136,12 +136,12 @@ def test_a_campaign_runs_over_two_nodes_and_outlives_one(nodes: Nodes, tmp_path:
     wait_until(lambda: done_rows(out) >= 2 or process.poll() is not None)
     assert process.poll() is None, process.communicate()[1]
     nodes.kill(1)
-    process.communicate(timeout=60)
+    process.communicate(timeout=150)
     assert process.returncode not in (0, 1, 2, 75)
     kept, log = done_rows(out), tmp_path / "log"
     assert 2 <= kept < 8
     process = nodes.launch("run", path, "--out", out, fake=f"step=0.05 log={log}")
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=150)
     assert process.returncode == 0, errors
     assert len(log.read_text().splitlines()) == 8 - kept
     assert differences(out, whole) == []

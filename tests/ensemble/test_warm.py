@@ -34,7 +34,7 @@ def logged_run(folder: Path, ranks: int, cache: Path) -> tuple[list[list[str]], 
         env=environment(ADHESIS_CACHE=str(cache), **COLD),
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=150,
         check=False,
     )
     assert done.returncode == 0, done.stderr

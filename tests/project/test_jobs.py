@@ -67,7 +67,7 @@ class Cluster:
             env=self.env | env,
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=150,
             check=False,
         )
 

@@ -109,7 +109,7 @@ def adhesis(
         cwd=cwd,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=150,
     )
 
 
@@ -160,7 +160,7 @@ def has_ended(pid: int) -> bool:
     return stat.rpartition(")")[2].split()[0] == "Z"
 
 
-def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+def wait_until(condition: Callable[[], bool], seconds: float = 150.0) -> None:
     """Wait for a condition; AssertionError if it does not come true."""
     end = time.monotonic() + seconds
     while not condition():
