@@ -6,58 +6,49 @@ A small campaign is run and its results file opened: every dataset has labelled 
 units.
 """
 
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-import xarray as xr
+
+import adhesis
 
 # %%
-# Two Hurst exponents, two works of adhesion, four realisations. ``adhesis run`` is what one types;
-# ``mpirun -n 9 adhesis run`` shares the tasks out.
-campaign = """
-[profile]
-period = 2e-3
-n0 = 4
-ratio = 16
-h_rms = 1e-6
-[material]
-young = 1e6
-poisson = 0.5
-[sweep]
-hurst = [0.7, 0.9]
-work_of_adhesion = [0.01, 0.04]
-realisations = 4
-seed = 1
-[cycle]
-max_penetration = 0.8
-load_steps = 16
-"""
-folder = Path(tempfile.mkdtemp())
-(folder / "small.toml").write_text(campaign)
-adhesis = [sys.executable, "-m", "adhesis"]
-done = subprocess.run([*adhesis, "run", "small.toml"], cwd=folder, capture_output=True, check=True)
-print(*(line for line in done.stderr.decode().splitlines() if "computed in" in line))
+# Two Hurst exponents, two works of adhesion, four realisations: sixteen loops, computed here by one
+# process. ``campaign.run(out, ranks=9)`` shares them out, as ``mpirun -n 9 adhesis run`` does.
+campaign = adhesis.Campaign(
+    {
+        "profile": {"period": 2e-3, "n0": 4, "ratio": 16, "h_rms": 1e-6},
+        "material": {"young": 1e6, "poisson": 0.5},
+        "sweep": {
+            "hurst": [0.7, 0.9],
+            "work_of_adhesion": [0.01, 0.04],
+            "realisations": 4,
+            "seed": 1,
+        },
+        "cycle": {"max_penetration": 0.8, "load_steps": 16},
+    }
+)
+out = Path(tempfile.mkdtemp()) / "small.h5"
+print(campaign)
 
 # %%
-# One row a task. Selections are xarray's.
-results = xr.open_dataset(folder / "small.h5", engine="h5netcdf").load()
-done = results.where(results.status == 1, drop=True)
-table = done[["hurst", "work_of_adhesion", "loss"]].to_dataframe()
-print(table.groupby(["hurst", "work_of_adhesion"]).loss.agg(["mean", "sem", "count"]))
+# Each quantity has an axis for the Hurst exponent, the work of adhesion and the realisation.
+# Selections are xarray's.
+with campaign.run(out) as results:
+    loops = results.dataset.load()
+print(loops.loss.mean("realisation").to_dataframe())
 
 # %%
 # The branches of every task lie on one axis each, so their mean is a line.
 figure, panels = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, layout="constrained")
 for axes, gamma in zip(panels, (0.01, 0.04), strict=True):
-    chosen = done.where((done.work_of_adhesion == gamma) & (done.hurst == 0.9), drop=True)
+    chosen = loops.sel(hurst=0.9, work_of_adhesion=gamma)
     for branch, colour in (("loading", "C0"), ("unloading", "C3")):
         stress = chosen[f"{branch}_mean_stress"] / 1e3
         x = chosen[f"{branch}_penetration"]
         axes.plot(x, stress.T, colour, lw=0.5, alpha=0.5)
-        axes.plot(x, stress.mean("task"), colour, lw=2, label=branch)
+        axes.plot(x, stress.mean("realisation"), colour, lw=2, label=branch)
     axes.set(title=f"H = 0.9, $\\gamma$ = {gamma} J/m²", xlim=(-2.5, 0.85))
     axes.set(xlabel="penetration $\\Delta/h_{max}$")
 panels[0].set(ylabel="mean stress (kPa)")
