@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from adhesis import single_wave
-from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.grid.fourier import RealFourier, symbol
+from adhesis.solver.grid.elasticity import ElasticGrid, RealFourier, symbol
 
 PERIOD, MODULUS, N = 2e-3, 1.3e6, 256
 
