@@ -256,7 +256,7 @@ def test_help_and_wrong_options_load_neither_solver_nor_numpy_nor_mpi():
 
 
 def test_checking_numbers_loads_no_masked_arrays():
-    """numpy loads them when they are first named, which took a tenth of `adhesis status`."""
+    """Numpy loads them when they are first named, which took a tenth of `adhesis status`."""
     code = (
         "import sys, numpy\nbefore = 'numpy.ma' in sys.modules\n"
         "from adhesis.solver import checks\n"
