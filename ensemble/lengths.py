@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 
 from adhesis.ensemble.errors import InputError, quoted
@@ -57,13 +58,18 @@ def unit_named(name: str) -> str:
     InputError
         For a name that is no unit of length.
     """
-    plain = name.strip()
-    for known in METRES:
-        if plain == known or plain.lower() == known.lower():
-            return known
-    if plain.lower() in OTHER_NAMES:
-        return OTHER_NAMES[plain.lower()]
+    unit = _unit_or_none(name.strip())
+    if unit is not None:
+        return unit
     raise InputError(f"{name!r} is no unit of length: it must be one of {', '.join(METRES)}")
+
+
+def _unit_or_none(name: str) -> str | None:
+    """Return the unit of this name, capitals or not, or None."""
+    for known in METRES:
+        if name == known or name.lower() == known.lower():
+            return known
+    return OTHER_NAMES.get(name.lower())
 
 
 def length(text: str) -> float:
@@ -121,16 +127,38 @@ def length_with_unit(text: str) -> float:
     InputError
         If it is anything else; the sentence begins with "is".
     """
+    return number_with_unit(text, METRES, _unit_or_none, "a length, as in 5e-6 (m) or 5um")
+
+
+def number_with_unit(
+    text: str, units: Mapping[str, float], named: Callable[[str], str | None], rule: str
+) -> float:
+    """Read a number and its unit, in the SI unit.
+
+    Parameters
+    ----------
+    text : str
+    units : mapping of str to float
+        Size of each unit in the SI unit.
+    named : callable
+        Returns the unit of a name, or None.
+    rule : str
+        What the text must be, for the message.
+
+    Raises
+    ------
+    InputError
+        If it is anything else; the sentence begins with "is".
+    """
     found = _WITH_UNIT.fullmatch(text)
     if not found:
-        raise InputError(f"is {quoted(text)}: it must be a length, as in 5e-6 (m) or 5um")
-    try:
-        unit = unit_named(found[2])
-    except InputError:
-        names = ", ".join(METRES)
-        raise InputError(f"is {quoted(text)}: its unit must be one of {names}") from None
+        raise InputError(f"is {quoted(text)}: it must be {rule}")
+    unit = named(found[2])
+    if unit is None:
+        names = ", ".join(units)
+        raise InputError(f"is {quoted(text)}: its unit must be one of {names}")
     # Decimal numbers, so that 7um is the same number as 7e-6.
-    return float(Decimal(found[1]) * Decimal(repr(METRES[unit])))
+    return float(Decimal(found[1]) * Decimal(repr(units[unit])))
 
 
 def length_text(metres: float, digits: int = 3) -> str:

@@ -125,18 +125,28 @@ class Bar(Protocol):
 
 
 @contextmanager
-def bar(what: str) -> Iterator[Bar]:
+def bar(what: str, *, remaining: bool = False) -> Iterator[Bar]:
     """Show a bar on stderr, or in the notebook.
 
     Parameters
     ----------
     what : str
         Description, until another text is given.
+    remaining : bool
+        Whether the time that is left is estimated, from the pace so far.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    columns = [TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
+    if remaining:
+        columns += [TextColumn("left:"), TimeRemainingColumn()]
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task: Any = progress.add_task(what, total=1.0)
 

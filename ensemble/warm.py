@@ -1,60 +1,92 @@
-"""Compiling before anything is timed, with words where it takes longer than a moment."""
+"""Compile before anything is timed, and report it if it takes longer than a moment."""
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Collection
+from contextlib import ExitStack
 
-from adhesis.solver.precompile import Compilation, compiled_in, processor, warm
+from adhesis.ensemble.reporter import bar, log
+from adhesis.solver.precompile import Compilation, compiled_in, functions_of, processor, warm
 
-_MOMENT = 1.0  # s that pass without a word
+_MOMENT = 1.0  # s of compilation before the first report
 _BETWEEN_LINES = 10.0  # s
 
 
 def warm_up(
-    methods: Collection[str], say: Callable[[str], None], *, to_installation: bool = False
+    methods: Collection[str],
+    write: Callable[[str], None],
+    *,
+    to_installation: bool = False,
+    many_gaps: bool = True,
+    show_bar: bool = False,
 ) -> Compilation:
-    """Compile what the methods need, or load it, and say so if that takes more than a moment.
+    """Compile what the methods need, or load it, and report that if it takes more than a moment.
 
     Parameters
     ----------
     methods : collection of str
         Names of methods.
-    say : callable
-        Gets a line before, now and then, and after; also why code cannot be kept.
+    write : callable
+        Takes a line before, now and then, and after; also why code cannot be kept.
     to_installation : bool
         Keep the code for all users of this installation, if it can be written.
+    many_gaps : bool
+        Whether ``sharp`` is compiled for many gaps, too.
+    show_bar : bool
+        Show a bar instead of the lines between the first and the last, if stderr is a terminal.
     """
-    next_line = _MOMENT
+    total = functions_of(methods, many_gaps=many_gaps)
+    show_bar = show_bar and sys.stderr.isatty()
+    next_report = _MOMENT
 
-    def tell(seen: Compilation) -> None:
-        nonlocal next_line
-        passed = seen.seconds + seen.under_way
-        if passed < next_line:
-            return
-        if next_line == _MOMENT:
-            say(f"compiling {_listed(methods)} for {processor()} (once, in half a minute or so)")
-        else:
-            say(f"compiling: {seen.functions} functions in {passed:.0f} s")
-        next_line = passed + _BETWEEN_LINES
+    with ExitStack() as stack:
+        show = None
 
-    with warnings.catch_warnings(record=True) as caught:
+        def report(seen: Compilation) -> None:
+            nonlocal next_report, show
+            passed = seen.seconds + seen.under_way
+            if passed < next_report:
+                return
+            if next_report == _MOMENT:
+                write(
+                    f"compiling {_listed(methods)} for {processor()}: about {total} functions, "
+                    "once"
+                )
+                if show_bar:
+                    show = stack.enter_context(bar("compiling", remaining=True))
+            elif show is None:
+                write(f"compiling: {seen.functions} of about {total} functions in {passed:.0f} s")
+            if show is not None:
+                show(min(seen.functions, total), total, f"compiling, {seen.functions} functions")
+            next_report = passed if show is not None else passed + _BETWEEN_LINES
+
+        caught = stack.enter_context(warnings.catch_warnings(record=True))
         warnings.simplefilter("always")
-        seen = warm(methods, report=tell, to_installation=to_installation)
+        seen = warm(
+            methods, report=report, to_installation=to_installation, many_gaps=many_gaps
+        )
     for text in dict.fromkeys(str(warning.message) for warning in caught):
-        say(f"warning: {text}")
-    if next_line > _MOMENT:
-        kept = {str(place) for method in methods if (place := compiled_in(method)) is not None}
-        where = f", kept in {' and '.join(sorted(kept))}" if kept else ""
-        say(f"compiled {seen.functions} functions in {seen.seconds:.0f} s{where}")
+        write(f"warning: {text}")
+    if next_report > _MOMENT:
+        places = (compiled_in(method, many_gaps=many_gaps) for method in methods)
+        kept = sorted({str(place) for place in places if place is not None})
+        where = f", kept in {' and '.join(kept)}" if kept else ""
+        write(f"compiled {seen.functions} functions in {seen.seconds:.0f} s{where}")
     return seen
 
 
-def warm_missing(methods: Collection[str], say: Callable[[str], None]) -> None:
-    """Compile those methods whose code is not kept for this processor; see :func:`warm_up`."""
-    missing = [method for method in methods if compiled_in(method) is None]
+def warm_missing(methods: Collection[str], *, quiet: bool = False, many_gaps: bool = True) -> None:
+    """Compile those methods whose code is not kept for this processor, reported on stderr."""
+    missing = [name for name in methods if compiled_in(name, many_gaps=many_gaps) is None]
     if missing:
-        warm_up(missing, say)
+        write = _nowhere if quiet else log
+        warm_up(missing, write, many_gaps=many_gaps, show_bar=not quiet)
+
+
+def _nowhere(_: str) -> None:
+    pass
 
 
 def _listed(methods: Collection[str]) -> str:

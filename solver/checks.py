@@ -190,9 +190,11 @@ def number_of(value: object) -> float | int | None:
 
     A bool is not a number here. A fraction too large for a float gives NaN.
     """
-    if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
+    if isinstance(value, np.ndarray):  # np.ma takes time to load, and is not needed for others
+        if value.ndim > 0 or np.ma.is_masked(value):
+            return None
         value = value.item()
-    if isinstance(value, bool | np.bool_) or value is np.ma.masked:
+    if isinstance(value, bool | np.bool_):
         return None
     if isinstance(value, numbers.Integral):
         return int(value)

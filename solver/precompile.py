@@ -30,11 +30,15 @@ from adhesis.solver.runtime.jit import (
 from adhesis.solver.sharp.method import SharpMethod
 
 COMPILED_METHODS = ("sharp", "grid")
+# Number of functions that each part compiles, numba's own included, for the progress of a
+# compilation. The code of ``sharp`` for many gaps is a part of its own: most loops never call it.
+_FUNCTIONS = {"sharp": 290, "many": 72, "grid": 7}
 
 __all__ = [
     "COMPILED_METHODS",
     "Compilation",
     "compiled_in",
+    "functions_of",
     "in_installation",
     "processor",
     "settings",
@@ -48,6 +52,7 @@ def warm(
     *,
     report: Callable[[Compilation], None] = lambda seen: None,
     to_installation: bool = False,
+    many_gaps: bool = True,
 ) -> Compilation:
     """Compile the functions of the methods, or load their cached code, by running small loops.
 
@@ -59,6 +64,9 @@ def warm(
         Called when the compilation of a function begins.
     to_installation : bool
         Keep the code in the installation, if that can be written, for all its users and nodes.
+    many_gaps : bool
+        Whether ``sharp`` is compiled for many gaps, too. Otherwise that is done when a loop first
+        has as many.
 
     Returns
     -------
@@ -69,10 +77,10 @@ def warm(
         for method in methods:
             if to_installation:
                 with kept_in_installation():
-                    _small_loops(method)
+                    _small_loops(method, many_gaps)
             else:
-                _small_loops(method)
-            _mark(method, to_installation)
+                _small_loops(method, many_gaps)
+            _mark(method, to_installation, many_gaps)
     return seen
 
 
@@ -88,9 +96,20 @@ def _without_garbage_collection() -> Iterator[None]:
             gc.enable()
 
 
-def compiled_in(method: str) -> Path | None:
-    """Return the folder with all code of a method for this processor and settings, or None."""
-    return code_files().find(_marker(method))
+def compiled_in(method: str, *, many_gaps: bool = True) -> Path | None:
+    """Return the folder with the code of a method for this processor and settings, or None."""
+    whole = code_files().find(_marker(method))
+    if whole is None and not many_gaps:
+        return code_files().find(_marker(method, many_gaps=False))
+    return whole
+
+
+def functions_of(methods: Iterable[str], *, many_gaps: bool = True) -> int:
+    """Return about how many functions are compiled for these methods, if none is cached."""
+    parts = list(methods)
+    if many_gaps and "sharp" in parts:
+        parts.append("many")
+    return sum(_FUNCTIONS[part] for part in parts)
 
 
 def in_installation(folder: Path) -> bool:
@@ -98,17 +117,19 @@ def in_installation(folder: Path) -> bool:
     return folder.is_relative_to(installed_folder())
 
 
-def _marker(method: str) -> str:
+def _marker(method: str, many_gaps: bool = True) -> str:
     """Return the name of the file that marks a method as compiled; it changes with this module."""
     made_by = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
-    return f"{method}-{made_by}.json"
+    part = "-few-gaps" if method == "sharp" and not many_gaps else ""
+    return f"{method}{part}-{made_by}.json"
 
 
-def _mark(method: str, to_installation: bool) -> None:
+def _mark(method: str, to_installation: bool, many_gaps: bool) -> None:
     files = code_files(to_installation)
-    if files.read(_marker(method)) is None:
+    marker = _marker(method, many_gaps)
+    if files.read(marker) is None:
         entries = {"method": method, "processor": processor(), **settings()}
-        files.write(_marker(method), json.dumps(entries, indent=1).encode())
+        files.write(marker, json.dumps(entries, indent=1).encode())
 
 
 def small_problem(work_of_adhesion: float) -> Problem:
@@ -125,7 +146,7 @@ def _hierarchical() -> SharpMethod:
     return method
 
 
-def _small_loops(method: str) -> None:
+def _small_loops(method: str, many_gaps: bool = True) -> None:
     """Run loops that call all compiled functions with all types of arguments that occur."""
     for work_of_adhesion in (0.04, 0.0):
         problem = small_problem(work_of_adhesion)
@@ -140,7 +161,7 @@ def _small_loops(method: str) -> None:
             states.append(state)
 
         run_loop(chosen, max_penetration=0.8, load_steps=2, on_state=keep)
-        if isinstance(chosen, SharpMethod) and work_of_adhesion > 0:
+        if isinstance(chosen, SharpMethod) and many_gaps and work_of_adhesion > 0:
             run_loop(_hierarchical(), max_penetration=0.5, load_steps=2)
         state = max(states, key=lambda state: state.patches)
         chosen.fields(state, chosen.nodes or 256)

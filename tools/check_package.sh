@@ -36,11 +36,16 @@ printf '%s\n' '[profile]' 'period = 1e-3' 'n0 = 1' 'ratio = 4' 'h_rms = 1e-6' '[
     >"$place/small.toml"
 adhesis --version
 adhesis sample trace.csv && adhesis new my.toml
-adhesis run my.toml --dry-run >/dev/null
 echo "package: loop (compiles first), run, status, report"
 adhesis loop --hurst 0.8 --seed 1 --period 1e-3 --n0 1 --ratio 4 --max-penetration 0.6 \
-    --load-steps 4 --json loop.json >/dev/null
+    --load-steps 4 --json loop.json 2>&1 >/dev/null | tee "$place/compiling"
 test -s "$place/loop.json"
+# The bar is as long as the compilation: what was announced is what was compiled.
+awk '/about [0-9]+ functions, once/ { sub(/.*about /, ""); announced = $1 }
+    /^compiled / { compiled = $2 }
+    END { exit !(compiled > 0.9 * announced && compiled < 1.1 * announced) }' "$place/compiling" ||
+    { say "the announced number of functions is off by more than a tenth"; exit 1; }
+adhesis run my.toml --dry-run >/dev/null
 adhesis run small.toml
 adhesis status small.h5 >/dev/null
 adhesis report small.h5 --to report >/dev/null

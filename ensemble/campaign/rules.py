@@ -8,8 +8,15 @@ from typing import Any
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.lengths import length_with_unit
+from adhesis.ensemble.stresses import stress_with_unit
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds
+
+# By the unit of a quantity: the reader of a text with another unit, and the end of the rule.
+_WITH_UNIT: dict[str, tuple[Callable[[str], float], str]] = {
+    "m": (length_with_unit, ', or a length as "2 mm"'),
+    "Pa": (stress_with_unit, ', or a stress as "20 kPa"'),
+}
 
 
 @dataclass(frozen=True)
@@ -49,20 +56,20 @@ def shown(value: object) -> str:
 def number_in(bounds: Bounds) -> Rule:
     """A number between the solver's bounds; a whole one, where they say so, without a point.
 
-    A length may also be a text with its unit.
+    A length or a stress may also be a text with its unit.
     """
-    is_length = bounds.unit == "m"
+    read_text, example = _WITH_UNIT.get(bounds.unit, (None, ""))
 
     def read(value: object) -> float:
-        if is_length and isinstance(value, str):
-            value = length_with_unit(value)
+        if read_text is not None and isinstance(value, str):
+            value = read_text(value)
         # TOML has numbers of two types and bool; Python takes the latter for a number too.
         kinds = int if bounds.whole else int | float
         if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError
         return (checks.whole if bounds.whole else checks.real)("", value, bounds)
 
-    return Rule(bounds.text + (', or a length as "2 mm"' if is_length else ""), read)
+    return Rule(bounds.text + example, read)
 
 
 def positive_number(unit: str) -> Rule:

@@ -45,7 +45,8 @@ _HEAD = """\
 #
 # Every key is listed, below its meaning and its rule. A line that begins with "# KEY =" has no
 # effect until "# " is removed; it shows the default, or an example where there is none. Numbers are
-# in SI units, lengths may have a unit as here. docs/campaign-file.md describes the keys.
+# in SI units; lengths and stresses may have a unit, as here and in "1 MPa". The keys are described
+# in docs/campaign-file.md.
 """
 _WIDTH = 96
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder
-from adhesis.ensemble.reporter import log, ticking
+from adhesis.ensemble.reporter import ticking
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -71,7 +71,7 @@ def execute(args: argparse.Namespace) -> int:
     if not (math.isfinite(args.budget) and args.budget > 0):
         raise InputError(f"--budget is {args.budget!r}: it must be a positive number of seconds")
     check_output_folder("--to", args.to, _FILES, {})
-    warm_missing(COMPILED_METHODS, log)  # or the first run of each would do it, silently
+    warm_missing(COMPILED_METHODS)  # or the first run of each would do it, silently
     # A file or a pipe has no width of its own; the tables need this one.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
     live = sys.stderr.isatty()

@@ -25,7 +25,7 @@ from adhesis.ensemble.loop.record import (
 )
 from adhesis.ensemble.outputs import Writing, check_outputs, whole_file, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.reporter import StatusLine, log, ticking
+from adhesis.ensemble.reporter import StatusLine, ticking
 from adhesis.ensemble.trace.options import (
     delimiter_of,
     given,
@@ -72,7 +72,7 @@ def execute(args: argparse.Namespace) -> int:
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
     nodes = _field_nodes(args, method, penetrations) if penetrations else 0
-    warm_missing([method.name], _quiet if args.quiet else log)
+    warm_missing([method.name], quiet=args.quiet, many_gaps=False)
     picked = FieldStates(method, penetrations)
     try:
         results = _run(args, method, cycle, picked.visit if penetrations else None)
@@ -335,10 +335,6 @@ def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool)
 
 
 # ---------------------------------------------------------------------- progress
-
-
-def _quiet(_: str) -> None:
-    pass
 
 
 def _progress(step: float, load: bool) -> Progress:

@@ -53,6 +53,10 @@ def execute(args: argparse.Namespace) -> int:
     print(plan.text, flush=True)
     if args.plan:
         return 0
+    from adhesis.ensemble.warm import warm_missing  # loads the compiler
+
+    method = "grid" if args.method == "grid" else "sharp"
+    warm_missing([method], quiet=args.quiet, many_gaps=False)
     try:
         answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
     except NoAnswer as error:
@@ -105,8 +109,6 @@ class _Progress:
         )
         left = self._left(pool, now)
         line = f"{len(pool.done)} of {len(self.plan.runs)} loops"
-        if not pool.done and self.line.seconds > 8:
-            running += "; the first loop of an installation waits a minute or two for machine code"
         if running:
             line += f"; running {running}"
         line += f"; {self.line.seconds:.0f} s so far"
@@ -116,7 +118,7 @@ class _Progress:
         """Expected wall seconds, corrected by what the loops have taken so far."""
         expected = self.plan.seconds
         running = {name: now - started for name, (started, _, _) in pool.running.items()}
-        ended = list(pool.took)[1:]  # without the first one, which may have made machine code
+        ended = list(pool.took)[1:]  # the first one loads what the processes share
         predicted = sum(expected[name] for name in ended)
         ratio = sum(pool.took[name] for name in ended) / predicted if predicted > 0 else 1.0
         rest = [

@@ -14,7 +14,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.reporter import log, ticking
+from adhesis.ensemble.reporter import ticking
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -48,7 +48,7 @@ def execute(args: argparse.Namespace) -> int:
     for name in args.method or ():
         if name not in METHODS:
             raise InputError(f"--method is {name!r}: it must be one of {', '.join(METHODS)}")
-    warm_missing(names, log)  # a time of compiling is no time of a method
+    warm_missing(names)  # a time of compiling is no time of a method
     live = sys.stderr.isatty()
     lines = not args.json and not sys.stdout.isatty()
     judged: list[Row] = []

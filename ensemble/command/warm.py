@@ -36,7 +36,7 @@ def execute(args: argparse.Namespace) -> int:
     if len(ready) == len(COMPILED_METHODS) and (args.own or all(map(in_installation, ready))):
         say(f"compiled before, for {processor()}: {ready[0]}")
         return 0
-    seen = warm_up(COMPILED_METHODS, say, to_installation=not args.own)
+    seen = warm_up(COMPILED_METHODS, say, to_installation=not args.own, show_bar=True)
     places = [compiled_in(method) for method in COMPILED_METHODS]
     if None in places:
         say("the code cannot be kept: each process compiles it anew")

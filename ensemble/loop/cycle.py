@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.stresses import parse_stress
 from adhesis.solver.loading.loop import check_cycle
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
@@ -94,7 +95,11 @@ def turning_points_of(args: argparse.Namespace, control: Control) -> tuple[float
         raise InputError("--max-stress belongs to load control: give --stiffness 0 with it")
     text = args.max_stress if control.is_load else args.max_penetration
     name = "--max-stress" if control.is_load else "--max-penetration"
-    points = (_MAX_PENETRATION,) if text is None else _numbers(name, str(text).split(","))
+    words = str(text).split(",")
+    if text is None:
+        points: tuple[float, ...] = (_MAX_PENETRATION,)
+    else:
+        points = _stresses(name, words) if control.is_load else _numbers(name, words)
     if len(set(points)) < len(points):
         raise InputError(f"{name} is {text}: turning points must differ")
     return points
@@ -133,3 +138,10 @@ def _numbers(option: str, words: list[str]) -> tuple[float, ...]:
     if not values:
         raise InputError(f"{option} holds no turning point")
     return values
+
+
+def _stresses(option: str, words: list[str]) -> tuple[float, ...]:
+    try:
+        return tuple(parse_stress(word.strip()) for word in words)
+    except InputError as error:
+        raise InputError(f"{option} {error}") from None

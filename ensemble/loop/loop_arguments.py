@@ -1,8 +1,8 @@
 """Compute one loading-unloading loop of one profile: its losses, its jumps and its energy audit.
 
 The profile is either given as heights (one period, equally spaced, band-limited interpolation
-between them), a measured trace, or self-affine with random phases. Lengths are in m unless they
-carry a unit (5um), stresses in Pa.
+between them), a measured trace, or self-affine with random phases. Lengths are in m and stresses
+in Pa, unless they carry a unit (5um, 20kPa).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 from pathlib import Path
 
 from adhesis.ensemble.lengths import height, length
+from adhesis.ensemble.stresses import stress
 from adhesis.ensemble.trace.trace_arguments import (
     add_cycle_arguments,
     add_reading_arguments,
@@ -61,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="J/m² (required unless the profile is that of --hurst; there 0.04)",
     )
     contact.add_argument(
-        "--young", type=float, metavar="E", help="Pa (likewise; with --hurst 1e6)"
+        "--young", type=stress, metavar="E", help="in Pa, or 1MPa (likewise; with --hurst 1e6)"
     )
     contact.add_argument(
         "--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)"

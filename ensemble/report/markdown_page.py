@@ -158,6 +158,8 @@ def _footnote(data: Aggregate) -> str:
         "± loop: mean of the estimated numerical error of a loop",
         f"± steps: {steps}",
     ]
+    if any(cell.work_of_adhesion > 0 for cell in data.cells):
+        parts.append("W/γ: loss over work of adhesion")
     if "resolution" in kinds:
         parts.append(
             "± method: the difference from the campaign with another accuracy or method beside it"

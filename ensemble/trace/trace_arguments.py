@@ -2,7 +2,7 @@
 
 The trace is a text of one or two columns, or an instrument's file. One period of a profile is made
 of it, its loop is run and those that other decisions would have given, and one page is written.
-Lengths are in m unless they carry a unit (5um), stresses in Pa.
+Lengths are in m and stresses in Pa, unless they carry a unit (5um, 20kPa).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 
 from adhesis.ensemble.lengths import length
+from adhesis.ensemble.stresses import stress
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
@@ -29,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others make a "
         "table, as of several turning points",
     )
-    contact.add_argument("--young", type=float, required=True, metavar="E", help="Pa")
+    contact.add_argument("--young", type=stress, required=True, metavar="E", help="in Pa, or 1MPa")
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
     add_strength_arguments(contact)
     add_cycle_arguments(contact)
@@ -59,7 +60,7 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--max-stress",
         metavar="P[,P…]",
-        help="instead, under a load (--stiffness 0): turning points in Pa",
+        help="instead, under a load (--stiffness 0): turning points in Pa, or 20kPa",
     )
     group.add_argument(
         "--stiffness",
@@ -86,7 +87,9 @@ def add_strength_arguments(group: argparse._ArgumentGroup) -> None:
         help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
         "(default: zero range, they never do)",
     )
-    group.add_argument("--strength", type=float, metavar="S", help="Pa: instead, that strength")
+    group.add_argument(
+        "--strength", type=stress, metavar="S", help="instead, that strength, 10MPa"
+    )
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:

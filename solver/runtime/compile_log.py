@@ -39,7 +39,8 @@ class _CompileLogger:
             return
         if self._next == _FIRST_AFTER:
             _log.warning(
-                "compiling for %s, once, in a minute or so (adhesis warm does it ahead)",
+                "compiling for %s, once, which takes one to two minutes "
+                "(adhesis warm does it ahead)",
                 processor(),
             )
         else:

@@ -255,6 +255,21 @@ def test_help_and_wrong_options_load_neither_solver_nor_numpy_nor_mpi():
     assert loaded & heavy == set()
 
 
+def test_checking_numbers_loads_no_masked_arrays():
+    """Numpy loads them when they are first named, which took a tenth of `adhesis status`."""
+    code = (
+        "import sys, numpy\nbefore = 'numpy.ma' in sys.modules\n"
+        "from adhesis.solver import checks\n"
+        "assert checks.real('young', 1e6, checks.YOUNG) == 1e6\n"
+        "print(before, 'numpy.ma' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment(), capture_output=True, text=True
+    )
+    before, after = done.stdout.split()
+    assert before == after, done.stderr
+
+
 def test_the_package_can_be_run():
     done = process("--version")
     assert (done.returncode, done.stderr) == (0, "")

@@ -1,8 +1,9 @@
-"""Lengths with their units: of options and of campaign files, by one reader."""
+"""Lengths and stresses with their units: of options and of campaign files, by one reader."""
 
 from __future__ import annotations
 
 import argparse
+from math import inf
 
 import pytest
 
@@ -10,6 +11,9 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.lengths import height, length, length_text, length_with_unit
+from adhesis.ensemble.loop.cycle import turning_points_of
+from adhesis.ensemble.stresses import stress
+from adhesis.solver.model.control import Control
 from tests.support.campaign_support import campaign_text
 
 READ = {
@@ -61,20 +65,21 @@ def test_heights_of_a_metre_are_asked_about_and_a_nan_is_left_to_its_rule() -> N
 
 # Options that are numbers, but no lengths.
 NUMBERS = (
-    *("--hurst", "--m2", "--c0", "--work-of-adhesion", "--young", "--poisson", "--stiffness"),
-    *("--accuracy", "--field-penetrations", "--budget", "--strength"),
+    *("--hurst", "--m2", "--c0", "--work-of-adhesion", "--poisson", "--stiffness"),
+    *("--accuracy", "--field-penetrations", "--budget"),
 )
 
 
-def test_every_option_that_is_a_length_takes_a_unit() -> None:
+def test_every_option_that_is_a_length_or_a_stress_takes_a_unit() -> None:
     actions = [action for name in COMMANDS for action in parser_of(name)._actions]
-    options = {kind: set[str]() for kind in (length, height, float)}
+    options = {kind: set[str]() for kind in (length, height, stress, float)}
     for action in actions:
         if action.type in options:
             options[action.type].add(action.option_strings[-1])  # type: ignore[index]
     assert options[height] == {"--h-rms"}
     lengths = {"--period", "--step", "--cut-off", "--tip-radius", "--longest-gap", "--layer"}
     assert options[length] == lengths | {"--adhesion-range"}
+    assert options[stress] == {"--young", "--strength"}  # and --max-stress, a list
     assert options[float] == set(NUMBERS)
 
 
@@ -114,8 +119,47 @@ def test_a_campaign_refuses_other_texts(value: str) -> None:
 
 
 def test_other_keys_take_no_unit() -> None:
-    with pytest.raises(InputError, match="young is '1 mm': it must be a positive number"):
+    with pytest.raises(InputError, match="poisson is '1 mm': it must be "):
+        parse_campaign(campaign_text(poisson='"1 mm"'))
+    with pytest.raises(InputError, match=r'young is .1 mm.: .* in Pa, or a stress as "20 kPa"'):
         parse_campaign(campaign_text(young='"1 mm"'))
+
+
+# ---------------------------------------------------------------------- stresses
+
+
+@pytest.mark.parametrize(
+    ("text", "pascals"),
+    [("2e4", 2e4), ("20kPa", 2e4), ("0.3 MPa", 3e5), ("7GPa", 7e9), ("1.5 Pa", 1.5), ("inf", inf)],
+)
+def test_a_stress_is_the_number_nearest_to_its_decimals(text: str, pascals: float) -> None:
+    assert stress(text) == pascals
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "is '': it must be a stress, as in 2e4 (Pa) or 20kPa"),
+        ("1mPa", "is '1mPa': its unit must be one of Pa, kPa, MPa, GPa"),  # a thousandth of 1 Pa
+        ("1 bar", "is '1 bar': its unit must be one of Pa"),
+    ],
+)
+def test_what_is_no_stress_is_refused_with_the_rule(text: str, sentence: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError) as refusal:
+        stress(text)
+    assert sentence in str(refusal.value)
+
+
+def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_units() -> None:
+    parser = parser_of("loop")
+    args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500, 1e-3MPa"])
+    assert turning_points_of(args, Control(0.0)) == (200.0, 500.0, 1000.0)
+    args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,5bar"])
+    with pytest.raises(InputError, match="--max-stress is '5bar': its unit must be one of Pa, kPa"):
+        turning_points_of(args, Control(0.0))
+    assert parse_campaign(campaign_text(young='"1 MPa"')) == parse_campaign(
+        campaign_text(young="1e6")
+    )
 
 
 def test_lengths_are_shown_in_a_unit_of_their_size() -> None:

@@ -129,6 +129,7 @@ def test_losses_csv_holds_the_averages_with_units(report, data):
     for row, cell in zip(table, data.cells, strict=True):
         loss = cell.values["loss"]
         assert float(row["loss_mean [J/m^2]"]) == loss.mean()
+        assert float(row["loss_over_work_of_adhesion"]) == loss.mean() / cell.work_of_adhesion
         assert float(row["loss_sem [J/m^2]"]) == pytest.approx(loss.std(ddof=1) / np.sqrt(5))
         assert float(row["loss_dimensionless_ci_low"]) < float(row["loss_dimensionless_mean"])
         assert float(row["audit_residual_largest"]) == np.abs(cell.values["audit_residual"]).max()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import io
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -126,55 +128,96 @@ def places(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("own", [False, True])
 def test_the_command_keeps_code_for_all_or_for_the_user(places, own, capsys, monkeypatch):
-    monkeypatch.setattr(warm, "_small_loops", lambda method: None)
+    monkeypatch.setattr(warm, "_small_loops", lambda *_: None)
     assert command.execute(argparse.Namespace(own=own)) == 0
     for method in warm.COMPILED_METHODS:
         assert (places[own] / "key" / warm._marker(method)).is_file()
     assert not places[not own].exists()
     capsys.readouterr()
-    monkeypatch.setattr(warm, "_small_loops", lambda method: pytest.fail("compiled again"))
+    monkeypatch.setattr(warm, "_small_loops", lambda *_: pytest.fail("compiled again"))
     assert command.execute(argparse.Namespace(own=own)) == 0
     assert "compiled before" in capsys.readouterr().out
 
 
 def test_the_command_puts_the_users_code_into_the_installation(places, monkeypatch):
-    monkeypatch.setattr(warm, "_small_loops", lambda method: door._files().read("code"))
+    monkeypatch.setattr(warm, "_small_loops", lambda *_: door._files().read("code"))
     CodeFiles("key").write("code", b"machine code")
     assert command.execute(argparse.Namespace(own=False)) == 0
     assert (places[0] / "key" / "code").read_bytes() == b"machine code"
 
 
 def test_code_that_cannot_be_kept_is_told(places, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(warm, "_small_loops", lambda method: None)
+    monkeypatch.setattr(warm, "_small_loops", lambda *_: None)
     (tmp_path / "installed").write_text("")
     (tmp_path / "user").write_text("")
     assert command.execute(argparse.Namespace(own=False)) == 1
     assert "cannot be kept" in capsys.readouterr().out
 
 
-def test_compiling_that_takes_a_while_is_told_and_a_moment_is_not(places, monkeypatch):
-    def compile_for(seconds: float) -> list[str]:
-        def small_loops(method: str) -> None:
-            seen = Compilation(door_tell[-1])
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def compile_for(places, monkeypatch):
+    """A function that runs ``compile`` while a compilation of so many seconds is simulated."""
+    watches = []
+    original = door.watch_compilation
+
+    def watch(report):
+        watches.append(report)
+        return original(report)
+
+    def run(seconds: float, start: Callable[[], object]) -> None:
+        def small_loops(*_: object) -> None:
+            seen = Compilation(watches[-1])
             for i in range(40):
                 seen.functions, seen.seconds = i, seconds * i / 40
                 seen._report(seen)
 
-        door_tell = []
-        monkeypatch.setattr(warm, "_small_loops", small_loops)
-
-        def watch(tell):
-            door_tell.append(tell)
-            return door.watch_compilation(tell)
-
         monkeypatch.setattr(warm, "watch_compilation", watch)
-        said: list[str] = []
-        ensemble_warm.warm_up(["sharp", "grid"], said.append)
-        return said
+        monkeypatch.setattr(warm, "_small_loops", small_loops)
+        start()
 
-    assert compile_for(0.5) == []
-    said = compile_for(32.0)
-    assert said[0].startswith("compiling the methods sharp and grid for ")
-    assert [line.startswith("compiling: ") for line in said[1:-1]] == [True] * 2
-    assert said[-1].startswith("compiled ")
-    assert f"kept in {places[1] / 'key'}" in said[-1]
+    return run
+
+
+def test_compiling_that_takes_a_while_is_reported_and_a_moment_is_not(places, compile_for):
+    lines: list[str] = []
+    compile_for(0.5, lambda: ensemble_warm.warm_up(["sharp", "grid"], lines.append))
+    assert lines == []
+    compile_for(32.0, lambda: ensemble_warm.warm_up(["sharp", "grid"], lines.append))
+    total = warm.functions_of(["sharp", "grid"])
+    assert lines[0].startswith("compiling the methods sharp and grid for ")
+    assert lines[0].endswith(f"about {total} functions, once")
+    assert [line.startswith("compiling: ") for line in lines[1:-1]] == [True] * 2
+    assert f" of about {total} functions in " in lines[1]
+    assert lines[-1].startswith("compiled ")
+    assert f"kept in {places[1] / 'key'}" in lines[-1]
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_on_a_terminal_a_bar_shows_how_far_compiling_is(compile_for, quiet, monkeypatch):
+    terminal = _Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("TERM", "xterm")
+    compile_for(90.0, lambda: ensemble_warm.warm_missing(["sharp"], quiet=quiet, many_gaps=False))
+    shown = terminal.getvalue()
+    if quiet:
+        assert shown == ""
+        return
+    total = warm.functions_of(["sharp"], many_gaps=False)
+    assert f"about {total} functions" in shown
+    assert "compiling, 39 functions" in shown  # the last that is begun
+    assert "left:" in shown
+    assert "compiling: " not in shown  # no lines beside the bar
+
+
+def test_code_for_few_gaps_is_enough_for_a_loop_and_not_for_a_campaign(places, compile_for):
+    compile_for(2.0, lambda: ensemble_warm.warm_missing(["sharp"], quiet=True, many_gaps=False))
+    assert warm.compiled_in("sharp", many_gaps=False) is not None
+    assert warm.compiled_in("sharp") is None
+    compile_for(2.0, lambda: ensemble_warm.warm_missing(["sharp", "grid"], quiet=True))
+    assert None not in [warm.compiled_in(method) for method in warm.COMPILED_METHODS]

@@ -24,7 +24,7 @@ def test_a_minute_is_logged_and_half_a_second_is_not(caplog: pytest.LogCaptureFi
     compiling(0.5)
     assert caplog.messages == []
     compiling(60)
-    assert "once, in a minute or so" in caplog.messages[0]
+    assert "once, which takes one to two minutes" in caplog.messages[0]
     assert caplog.messages[1] == "compiling: 22 functions in 11 s"
     assert len(caplog.messages) == 6  # no silence above ten seconds
     assert {record.levelname for record in caplog.records} == {"WARNING"}

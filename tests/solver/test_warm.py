@@ -23,7 +23,7 @@ from adhesis.solver.sharp.method import SharpMethod
     [("sharp", math.inf), ("sharp", 1e10), ("sharp", 0.0), ("grid", math.inf)],
 )
 def test_after_warming_up_loops_and_fields_compile_nothing(method, stiffness):
-    warm([method])
+    warm([method], many_gaps=False)
     with watch_compilation() as seen:
         problem = replace(small_problem(0.01), control=Control(stiffness))
         turning = {"max_stress": 2e3} if stiffness == 0 else {"max_penetration": 0.9}

@@ -49,6 +49,7 @@ def losses(data: Aggregate) -> Table:
         TableColumn("loss_sem [J/m^2]"),
         TableColumn("loss_ci_low [J/m^2]"),
         TableColumn("loss_ci_high [J/m^2]"),
+        TableColumn("loss_over_work_of_adhesion", "W/γ", number(3), only_if_any=True),
         TableColumn("interval"),
         TableColumn("loss_from_drops_mean [J/m^2]"),
         TableColumn("audit_residual_mean"),
@@ -134,6 +135,7 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         _error_of_resolution(data, cell),
         papers_loss(cell),
         *_five(found["loss"]),
+        _in_works_of_adhesion(found["loss"].mean, cell.work_of_adhesion),
         interval_method(cell.done),
         found["loss_from_drops"].mean,
         found["audit_residual"].mean,
@@ -162,6 +164,11 @@ def _loss_row(data: Aggregate, cell: Cell) -> list[Value]:
         paper.m2(cell.hurst) if paper.is_cell_of(cell) else None,
         found["wall_time"].mean,
     ]
+
+
+def _in_works_of_adhesion(loss: float, work_of_adhesion: float) -> float | None:
+    """Return the loss over the work of adhesion; None without adhesion."""
+    return loss / work_of_adhesion if work_of_adhesion > 0 else None
 
 
 def papers_loss(cell: Cell) -> float | None:
