@@ -14,10 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.report.paper import TABLE_1
-from tools.study import amplitude, jumps, monotone
-from tools.study.collect import COLUMNS, collect_all
+from adhesis.solver.grid.method import GridMethod
+from tools.study import amplitude, coarse, jumps, monotone
+from tools.study.collect import COLUMNS, collect_all, without_detached
 from tools.study.data import Rows, Study, read
 from tools.study.page import ALL, filled
 from tools.study.readings import Losses, Reading
@@ -148,7 +150,7 @@ def amplitudes(peak, realisations, rng, spread=0.1):
             for name in COLUMNS:
                 rows[name].append(row[name])
     loops = Rows({name: np.array(column) for name, column in rows.items()})
-    return Study(loops, loops.where(status="failed"), loops)
+    return Study(loops, loops.where(status="failed"), loops, loops)
 
 
 def test_the_maximum_through_the_amplitude_is_located():
@@ -202,6 +204,31 @@ def test_losses_of_higher_profiles_are_those_of_a_weaker_adhesion(study):
     assert len(found) >= 5
     assert found == pytest.approx({r: there[r] for r in found})
     assert losses.scaled("loss_dimensionless", 0.8, 0.04, 0.8, 100, 1e3) == {}
+
+
+def test_detached_realisations_are_left_out_of_the_average():
+    """Of two that pull equally, the one that holds longer counts alone where the other is apart."""
+    up = np.linspace(1.0, -4.0, 501)
+    down, load = np.array([0.0, 1.0]), np.zeros((2, 2))
+    in_contact = np.array([up >= -1, up >= -3])
+    values = without_detached(down, load, up, -2.0 * in_contact, in_contact)
+    assert values.mean() == pytest.approx(8.0, rel=5e-3)
+    assert values == pytest.approx([6.0, 10.0], rel=1e-2)  # without one, W~ is that of the other
+    alike = in_contact[[0, 0]]
+    assert without_detached(down, load, up, -2.0 * alike, alike) == pytest.approx(4.0, rel=1e-2)
+    with pytest.raises(ValueError, match="before its realisation has detached"):
+        without_detached(down, load, up[:300], -2.0 * in_contact[:, :300], in_contact[:, :300])
+
+
+def test_coarse_steps_become_the_path_of_the_method_grid():
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, h_rms=1e-6, seed=5)
+    problem = Problem(profile, HalfSpace(1e6, 0.5), 0.02)
+    right = run_loop(GridMethod(problem, nodes=256), max_penetration=0.6, load_steps=6)
+    fine, long = coarse.loops(problem, 256, (0.6,), 0.02, (0.02, 0.6))
+    assert fine["loss_dimensionless"] == pytest.approx(right.loss_dimensionless, rel=0.01)
+    assert fine["pull_off_stress"] == pytest.approx(right.pull_off_stress, rel=0.02)
+    errors = [abs(row["loss_dimensionless"] - right.loss_dimensionless) for row in (fine, long)]
+    assert errors[0] < errors[1]
 
 
 def table_of(values, groups=8):
