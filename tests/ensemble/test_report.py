@@ -653,26 +653,6 @@ def test_bad_input_is_refused_in_one_sentence(file, tmp_path, capsys):
 # ---------------------------------------------------------------------- findings
 
 
-def test_findings_compare_with_the_paper(data):
-    text = "\n".join(findings.agreement(data))
-    table = loss_tables.beside_the_paper(data)
-    assert len(table.rows) == 6
-    off = []
-    for row in table.rows:
-        loss = data.cell(*row[:2]).estimates["loss_dimensionless"]
-        value = paper.table_1(*row[:2])
-        assert row[3:7] == (loss.mean, loss.low, loss.high, value)
-        if value is None:
-            assert row[7:] == (None, None)
-        else:
-            off.append(loss.mean / value - 1)
-            assert row[7] == off[-1]
-            assert row[8] == ("yes" if loss.low <= value <= loss.high else "no")
-    assert "Of the 8 losses of the paper's Table 1, 5 have a cell here" in text
-    assert f"{100 * min(off):+.1f} % to {100 * max(off):+.1f} %" in text
-    assert "0.002 against 0.0027 at H = 0.8" in text
-
-
 @pytest.mark.parametrize(
     ("losses", "verb"),
     [
@@ -696,6 +676,26 @@ def test_the_order_of_the_losses_in_m2_is_reported_as_one_through_hurst(losses, 
     data = SimpleNamespace(works_of_adhesion=(0.04,), cells=cells)
     (sentence,) = findings._order_in_slope(data, of_paper=False)
     assert sentence == f"Through H, the mean loss {verb} at γ = 0.04 J/m²."
+
+
+def test_findings_compare_with_the_paper(data):
+    text = "\n".join(findings.agreement(data))
+    table = loss_tables.beside_the_paper(data)
+    assert len(table.rows) == 6
+    off = []
+    for row in table.rows:
+        loss = data.cell(*row[:2]).estimates["loss_dimensionless"]
+        value = paper.table_1(*row[:2])
+        assert row[3:7] == (loss.mean, loss.low, loss.high, value)
+        if value is None:
+            assert row[7:] == (None, None)
+        else:
+            off.append(loss.mean / value - 1)
+            assert row[7] == off[-1]
+            assert row[8] == ("yes" if loss.low <= value <= loss.high else "no")
+    assert "Of the 8 losses of the paper's Table 1, 5 have a cell here" in text
+    assert f"{100 * min(off):+.1f} % to {100 * max(off):+.1f} %" in text
+    assert "0.002 against 0.0027 at H = 0.8" in text
     assert "grows with γ at every H" in text
     ratios = [ratio for cell in data.cells if (ratio := findings.area_ratio(cell)) is not None]
     assert f"at least {min(ratios):.2f}" in text
