@@ -183,6 +183,22 @@ def test_a_rise_and_a_fall_through_the_amplitude_are_seen():
     assert row.p_not_monotone > 0.5
 
 
+def test_the_law_of_scaling_decides_no_verdict(study):
+    """Losses at another γ, corrected by what the law is off at their height, give the same."""
+    off = max(abs(one.mean) for one in amplitude.scaling(study) if one.height <= 2)
+    assert 0 < off < 0.02
+    verdicts = {(h, row.turn): row.verdict for h, row in amplitude.rows(study, "loss")}
+    for factor in (1 + off, 1 - off):
+        columns = dict(study.loops.columns)
+        scaled = np.isin(columns["campaign"], amplitude.KNOWN) & (
+            columns["work_of_adhesion"] != amplitude.GAMMA
+        )
+        columns["loss"] = np.where(scaled, factor * columns["loss"], columns["loss"])
+        changed = replace(study, loops=Rows(columns))
+        found = {(h, row.turn): row.verdict for h, row in amplitude.rows(changed, "loss")}
+        assert found == verdicts
+
+
 def test_a_campaign_without_results_keeps_its_rows(tmp_path):
     (tmp_path / "campaigns").mkdir()
     (tmp_path / "campaigns" / "one.toml").touch()
