@@ -9,6 +9,7 @@ from pathlib import Path
 
 from tools.study.data import Study
 from tools.study.findings import amplitude_findings, answer_text, findings
+from tools.study.more_readings import more_findings
 from tools.study.sentences import answer_note, readings_note, scaling_note
 from tools.study.table1 import all_readings
 from tools.study.tables import TABLES
@@ -21,6 +22,7 @@ ALL: dict[str, Callable[[Study], Table | str]] = {
     "readings_note": readings_note,
     "findings": findings,
     "amplitude_findings": amplitude_findings,
+    "more_findings": more_findings,
     **TABLES,
 }
 
