@@ -10,6 +10,7 @@ import csv
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,9 +18,10 @@ import pytest
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.report.paper import TABLE_1
+from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
 from adhesis.solver.grid.method import GridMethod
 from tools.study import amplitude, coarse, jumps, monotone
-from tools.study.collect import COLUMNS, collect_all, without_detached
+from tools.study.collect import COLUMNS, _chosen, collect_all, without_detached
 from tools.study.data import Rows, Study, read
 from tools.study.page import ALL, filled
 from tools.study.readings import Losses, Reading
@@ -197,6 +199,18 @@ def test_the_law_of_scaling_decides_no_verdict(study):
         changed = replace(study, loops=Rows(columns))
         found = {(h, row.turn): row.verdict for h, row in amplitude.rows(changed, "loss")}
         assert found == verdicts
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"), [("amplitude", [0, 1]), ("amplitude_same", [0, 1, 2])]
+)
+def test_realisations_that_a_cell_lacks_are_left_out(name, kept):
+    """Of two cells and two realisations, one loop failed and one is pending."""
+    results = SimpleNamespace(
+        status=lambda: np.array([DONE, FAILED, DONE, PENDING]),
+        column=lambda _: np.array([0, 0, 1, 1]),
+    )
+    assert _chosen(results, name) == kept
 
 
 def test_a_campaign_without_results_keeps_its_rows(tmp_path):

@@ -29,6 +29,9 @@ COLUMNS = (
 JUMP_COLUMNS = ("hurst", "realisation", "branch", "kind", "energy_drop", "area")
 # Of the jumps only those of one campaign, γ and turning point are kept.
 JUMPS_OF = ("turns", 0.04, 0.9)
+# Campaigns whose loops are compared one by one. Of all others, realisations that some cells lack
+# are left out: the loops that take long would be missing.
+ONE_BY_ONE = ("amplitude_same",)
 # The campaigns whose stored curves reach detachment.
 WHOLE_CURVES = ("curves", "curves001")
 
@@ -80,7 +83,8 @@ def _loops(name: str, results: Results) -> list[list[str]]:
         for key in (f"{branch}_mean_stress", f"{branch}_contact_fraction", f"{branch}_patches")
     }
     rows = []
-    for row in np.flatnonzero((status == DONE) | (status == FAILED)).tolist():
+    chosen = _chosen(results, name)
+    for row in chosen:
         here = results.campaign.at(tasks[row])
         asked = {
             "max_penetration": here.cycle.max_penetration,
@@ -100,19 +104,31 @@ def _loops(name: str, results: Results) -> list[list[str]]:
             )
         rows.append([_text(value) for value in values])
     if name in WHOLE_CURVES:
-        for line, value in zip(rows, _losses_in_contact(results, column, curves), strict=True):
-            line[COLUMNS.index("loss_in_contact")] = _text(value)
+        found = _losses_in_contact(results, column, curves, chosen)
+        for line, row in zip(rows, chosen, strict=True):
+            line[COLUMNS.index("loss_in_contact")] = _text(found.get(row))
     return rows
 
 
+def _chosen(results: Results, name: str) -> list[int]:
+    """Rows that are kept: done or failed, of realisations that no cell lacks."""
+    status = results.status()
+    ended = (status == DONE) | (status == FAILED)
+    if name not in ONE_BY_ONE:
+        realisation = results.column("realisation")
+        ended &= ~np.isin(realisation, realisation[~ended])
+    return np.flatnonzero(ended).tolist()
+
+
 def _losses_in_contact(
-    results: Results, column: dict[str, Any], curves: dict[str, Any]
-) -> list[float | None]:
-    """W~ without detached realisations, in the order of the rows; None of a failed loop."""
+    results: Results, column: dict[str, Any], curves: dict[str, Any], chosen: list[int]
+) -> dict[int, float]:
+    """W~ without detached realisations, by row, of the chosen loops that are done."""
     status, tasks = results.status(), results.tasks()
     cells: dict[tuple[float, ...], list[int]] = {}
-    for row in np.flatnonzero(status == DONE).tolist():
-        cells.setdefault(tasks[row].cell, []).append(row)
+    for row in chosen:
+        if status[row] == DONE:
+            cells.setdefault(tasks[row].cell, []).append(row)
     found: dict[int, float] = {}
     for rows in cells.values():
         here = results.campaign.at(tasks[rows[0]])
@@ -127,8 +143,7 @@ def _losses_in_contact(
             curves["unloading_contact_fraction"][rows] > 0,
         )
         found.update(zip(rows, values.tolist(), strict=True))
-    chosen = np.flatnonzero((status == DONE) | (status == FAILED)).tolist()
-    return [found.get(row) for row in chosen]
+    return found
 
 
 def without_detached(
