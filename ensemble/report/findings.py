@@ -375,7 +375,7 @@ def _along(data: Aggregate, axis: Axis) -> list[str]:
 
 
 def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:
-    """Whether the loss is monotone in m2; the paper's table is not."""
+    """Whether the mean loss is monotone in m2 through H; the paper's table is not."""
     found: dict[str, list[str]] = {}
     for gamma in data.works_of_adhesion:
         cells = [c for c in data.cells if c.work_of_adhesion == gamma and c.done > 1]
@@ -389,7 +389,7 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:
         found.setdefault(verb, []).append(f"{gamma:g}")
     parts = [f"{verb} at γ = {_listed(gammas, ', ')} J/m²" for verb, gammas in found.items()]
     rest = "; the paper's table is not monotone" if of_paper else ""
-    return [f"The mean loss {', and '.join(parts)}{rest}."] if parts else []
+    return [f"Through H, the mean loss {', and '.join(parts)}{rest}."] if parts else []
 
 
 def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:

@@ -11,6 +11,7 @@ import sys
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import matplotlib as mpl
@@ -651,6 +652,31 @@ def test_bad_input_is_refused_in_one_sentence(file, tmp_path, capsys):
 
 
 # ---------------------------------------------------------------------- findings
+
+
+@pytest.mark.parametrize(
+    ("losses", "verb"),
+    [
+        ((1.0, 2.0, 3.0), "grows with m2"),
+        ((3.0, 2.0, 1.0), "falls with m2"),
+        ((1.0, 3.0, 2.0), "is not monotone in m2"),
+    ],
+)
+def test_the_order_of_the_losses_in_m2_is_reported_as_one_through_hurst(losses, verb):
+    cells = [
+        SimpleNamespace(
+            work_of_adhesion=0.04,
+            done=9,
+            estimates={
+                "m2": SimpleNamespace(mean=1e-3 * (k + 1)),
+                "loss_dimensionless": SimpleNamespace(mean=loss),
+            },
+        )
+        for k, loss in enumerate(losses)
+    ]
+    data = SimpleNamespace(works_of_adhesion=(0.04,), cells=cells)
+    (sentence,) = findings._order_in_slope(data, of_paper=False)
+    assert sentence == f"Through H, the mean loss {verb} at γ = 0.04 J/m²."
 
 
 def test_findings_compare_with_the_paper(data):

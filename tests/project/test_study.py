@@ -10,14 +10,18 @@ import csv
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.report.paper import TABLE_1
-from tools.study import amplitude, jumps, monotone
-from tools.study.collect import COLUMNS, collect_all
+from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
+from adhesis.solver.grid.method import GridMethod
+from tools.study import amplitude, coarse, jumps, monotone
+from tools.study.collect import COLUMNS, _chosen, collect_all, without_detached
 from tools.study.data import Rows, Study, read
 from tools.study.page import ALL, filled
 from tools.study.readings import Losses, Reading
@@ -148,7 +152,7 @@ def amplitudes(peak, realisations, rng, spread=0.1):
             for name in COLUMNS:
                 rows[name].append(row[name])
     loops = Rows({name: np.array(column) for name, column in rows.items()})
-    return Study(loops, loops.where(status="failed"), loops)
+    return Study(loops, loops.where(status="failed"), loops, loops)
 
 
 def test_the_maximum_through_the_amplitude_is_located():
@@ -181,6 +185,34 @@ def test_a_rise_and_a_fall_through_the_amplitude_are_seen():
     assert row.p_not_monotone > 0.5
 
 
+def test_the_law_of_scaling_decides_no_verdict(study):
+    """Losses at another γ, corrected by what the law is off at their height, give the same."""
+    off = max(abs(one.mean) for one in amplitude.scaling(study) if one.height <= 2)
+    assert 0 < off < 0.02
+    verdicts = {(h, row.turn): row.verdict for h, row in amplitude.rows(study, "loss")}
+    for factor in (1 + off, 1 - off):
+        columns = dict(study.loops.columns)
+        scaled = np.isin(columns["campaign"], amplitude.KNOWN) & (
+            columns["work_of_adhesion"] != amplitude.GAMMA
+        )
+        columns["loss"] = np.where(scaled, factor * columns["loss"], columns["loss"])
+        changed = replace(study, loops=Rows(columns))
+        found = {(h, row.turn): row.verdict for h, row in amplitude.rows(changed, "loss")}
+        assert found == verdicts
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"), [("amplitude", [0, 1]), ("amplitude_same", [0, 1, 2])]
+)
+def test_realisations_that_a_cell_lacks_are_left_out(name, kept):
+    """Of two cells and two realisations, one loop failed and one is pending."""
+    results = SimpleNamespace(
+        status=lambda: np.array([DONE, FAILED, DONE, PENDING]),
+        column=lambda _: np.array([0, 0, 1, 1]),
+    )
+    assert _chosen(results, name) == kept
+
+
 def test_a_campaign_without_results_keeps_its_rows(tmp_path):
     (tmp_path / "campaigns").mkdir()
     (tmp_path / "campaigns" / "one.toml").touch()
@@ -202,6 +234,31 @@ def test_losses_of_higher_profiles_are_those_of_a_weaker_adhesion(study):
     assert len(found) >= 5
     assert found == pytest.approx({r: there[r] for r in found})
     assert losses.scaled("loss_dimensionless", 0.8, 0.04, 0.8, 100, 1e3) == {}
+
+
+def test_detached_realisations_are_left_out_of_the_average():
+    """Of two that pull equally, the one that holds longer counts alone where the other is apart."""
+    up = np.linspace(1.0, -4.0, 501)
+    down, load = np.array([0.0, 1.0]), np.zeros((2, 2))
+    in_contact = np.array([up >= -1, up >= -3])
+    values = without_detached(down, load, up, -2.0 * in_contact, in_contact)
+    assert values.mean() == pytest.approx(8.0, rel=5e-3)
+    assert values == pytest.approx([6.0, 10.0], rel=1e-2)  # without one, W~ is that of the other
+    alike = in_contact[[0, 0]]
+    assert without_detached(down, load, up, -2.0 * alike, alike) == pytest.approx(4.0, rel=1e-2)
+    with pytest.raises(ValueError, match="before its realisation has detached"):
+        without_detached(down, load, up[:300], -2.0 * in_contact[:, :300], in_contact[:, :300])
+
+
+def test_coarse_steps_become_the_path_of_the_method_grid():
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, h_rms=1e-6, seed=5)
+    problem = Problem(profile, HalfSpace(1e6, 0.5), 0.02)
+    right = run_loop(GridMethod(problem, nodes=256), max_penetration=0.6, load_steps=6)
+    fine, long = coarse.loops(problem, 256, (0.6,), 0.02, (0.02, 0.6))
+    assert fine["loss_dimensionless"] == pytest.approx(right.loss_dimensionless, rel=0.01)
+    assert fine["pull_off_stress"] == pytest.approx(right.pull_off_stress, rel=0.02)
+    errors = [abs(row["loss_dimensionless"] - right.loss_dimensionless) for row in (fine, long)]
+    assert errors[0] < errors[1]
 
 
 def table_of(values, groups=8):

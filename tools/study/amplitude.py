@@ -176,8 +176,9 @@ class Comparison:
     pairs : int
     slope : float
         Half of the largest difference of m2 between the two.
-    mean, largest : float
-        Relative difference of W~, the higher γ over the lower one: its mean and its largest size.
+    mean, low, high, largest : float
+        Relative difference of W~, the higher γ over the lower one: its mean with the 95 % interval
+        (NaN of a single pair) and its largest size.
     error : float
         Largest sum of both estimated relative errors.
     """
@@ -188,6 +189,8 @@ class Comparison:
     pairs: int
     slope: float
     mean: float
+    low: float
+    high: float
     largest: float
     error: float
 
@@ -226,10 +229,12 @@ def _compare(study: Study, gamma: float, turn: float, here: Rows) -> Comparison 
         errors.append(sum(r["loss_error"] / r["loss"] for r in (one, other)))
     if not differences:
         return None
-    largest = float(np.abs(differences).max())
+    values = np.array(differences)
+    ends = interval(values) if values.size > 1 else (np.nan, np.nan)
     return Comparison(
-        *(height, gamma, turn, len(differences), float(max(slopes))),
-        *(float(np.mean(differences)), largest, float(max(errors))),
+        *(height, gamma, turn, values.size, float(max(slopes))),
+        *(float(values.mean()), float(ends[0]), float(ends[1])),
+        *(float(np.abs(values).max()), float(max(errors))),
     )
 
 

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, axis_datasets
 from adhesis.solver.model.jump import BRANCHES, JUMP_KINDS
+from tools.study.data import Array
 
 AXES = ("max_penetration", "max_stress", "ratio", "stiffness")
 NUMBERS = (
@@ -22,11 +24,16 @@ NUMBERS = (
 COLUMNS = (
     *("campaign", "hurst", "work_of_adhesion", "realisation", *AXES, "status", *NUMBERS),
     *("jump_count", "stress_at_turn", "contact_at_turn", "loss_curve", "loss_curve_above"),
-    "patches_at_turn",
+    *("patches_at_turn", "loss_in_contact"),
 )
 JUMP_COLUMNS = ("hurst", "realisation", "branch", "kind", "energy_drop", "area")
 # Of the jumps only those of one campaign, γ and turning point are kept.
 JUMPS_OF = ("turns", 0.04, 0.9)
+# Campaigns whose loops are compared one by one. Of all others, realisations that some cells lack
+# are left out: the loops that take long would be missing.
+ONE_BY_ONE = ("amplitude_same",)
+# The campaigns whose stored curves reach detachment.
+WHOLE_CURVES = ("curves", "curves001")
 
 
 def collect_all(folder: Path, study: Path) -> None:
@@ -76,7 +83,8 @@ def _loops(name: str, results: Results) -> list[list[str]]:
         for key in (f"{branch}_mean_stress", f"{branch}_contact_fraction", f"{branch}_patches")
     }
     rows = []
-    for row in np.flatnonzero((status == DONE) | (status == FAILED)).tolist():
+    chosen = _chosen(results, name)
+    for row in chosen:
         here = results.campaign.at(tasks[row])
         asked = {
             "max_penetration": here.cycle.max_penetration,
@@ -95,7 +103,81 @@ def _loops(name: str, results: Results) -> list[list[str]]:
                 results, tasks[row], {k: v[row] for k, v in curves.items()}, column, row
             )
         rows.append([_text(value) for value in values])
+    if name in WHOLE_CURVES:
+        found = _losses_in_contact(results, column, curves, chosen)
+        for line, row in zip(rows, chosen, strict=True):
+            line[COLUMNS.index("loss_in_contact")] = _text(found.get(row))
     return rows
+
+
+def _chosen(results: Results, name: str) -> list[int]:
+    """Rows that are kept: done or failed, of realisations that no cell lacks."""
+    status = results.status()
+    ended = (status == DONE) | (status == FAILED)
+    if name not in ONE_BY_ONE:
+        realisation = results.column("realisation")
+        ended &= ~np.isin(realisation, realisation[~ended])
+    return np.flatnonzero(ended).tolist()
+
+
+def _losses_in_contact(
+    results: Results, column: dict[str, Any], curves: dict[str, Any], chosen: list[int]
+) -> dict[int, float]:
+    """W~ without detached realisations, by row, of the chosen loops that are done."""
+    status, tasks = results.status(), results.tasks()
+    cells: dict[tuple[float, ...], list[int]] = {}
+    for row in chosen:
+        if status[row] == DONE:
+            cells.setdefault(tasks[row].cell, []).append(row)
+    found: dict[int, float] = {}
+    for rows in cells.values():
+        here = results.campaign.at(tasks[rows[0]])
+        unit = results.campaign.penetration_unit(tasks[rows[0]])
+        modulus = here.material.young / (1 - here.material.poisson**2)
+        scale = 0.5 * modulus * (2 * np.pi / here.profile.period) * column["h_max"][rows]
+        values = without_detached(
+            unit * results.campaign.loading_penetration,
+            curves["loading_mean_stress"][rows] / scale[:, None],
+            unit * results.campaign.unloading_penetration,
+            curves["unloading_mean_stress"][rows] / scale[:, None],
+            curves["unloading_contact_fraction"][rows] > 0,
+        )
+        found.update(zip(rows, values.tolist(), strict=True))
+    return found
+
+
+def without_detached(
+    down: Array, load: Array, up: Array, unload: Array, in_contact: NDArray[np.bool_]
+) -> Array:
+    """W~ of curves averaged over the realisations in contact, with its spread by the jackknife.
+
+    Parameters
+    ----------
+    down, up : array, shape (places,)
+        Δ~ of the loading branch, ascending, and of the unloading branch, descending.
+    load, unload : array, shape (realisations, places)
+        σ~.
+    in_contact : bool array, shape (realisations, places)
+        Of the unloading branch.
+
+    Returns
+    -------
+    array, shape (realisations,)
+        Their mean is W~ of the averaged curves; their covariance over realisations is that of the
+        jackknife, times the number of realisations.
+    """
+    if in_contact[:, -1].any():
+        raise ValueError("a stored curve ends before its realisation has detached")
+
+    def averaged(kept: NDArray[np.bool_]) -> float:
+        there = in_contact & kept[:, None]
+        mean = (unload * there).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+        return float(np.trapezoid(load[kept].mean(axis=0), down) + np.trapezoid(mean, up))
+
+    count = len(load)
+    whole = averaged(np.ones(count, bool))
+    left = np.array([averaged(np.arange(count) != k) for k in range(count)])
+    return np.asarray(whole + (count - 1) * (left.mean() - left))
 
 
 def _turn(
@@ -103,11 +185,12 @@ def _turn(
 ) -> list[Any]:
     """State at the turning point, and W~ by the stored curves: of the loop, and where Δ ≥ 0.
 
-    The last value is the number of patches at the turning point.
+    Then the number of patches at the turning point, and a place for the loss without detached
+    realisations.
     """
     campaign = results.campaign
     if campaign.at(task).cycle.under_load:
-        return [campaign.at(task).cycle.max_stress, None, None, None, None]
+        return [campaign.at(task).cycle.max_stress, None, None, None, None, None]
     unit = campaign.penetration_unit(task)
     down = unit * campaign.unloading_penetration
     load, unload = curve["loading_mean_stress"], curve["unloading_mean_stress"]
@@ -123,7 +206,7 @@ def _turn(
     y = np.append(np.interp(0.0, down[::-1], unload[::-1]), unload[:last][::-1])
     above = gained - np.trapezoid(y, x) / scale
     contact, patches = curve["loading_contact_fraction"][-1], curve["loading_patches"][-1]
-    return [load[-1], contact, whole, above, patches]
+    return [load[-1], contact, whole, above, patches, None]
 
 
 def _jumps(results: Results) -> list[list[str]]:

@@ -67,18 +67,24 @@ class Study:
         Done ones.
     failed : Rows
     jumps : Rows
+    coarse : Rows
+        Loops in coarse steps (tools/study/coarse.py).
     """
 
     loops: Rows
     failed: Rows
     jumps: Rows
+    coarse: Rows
 
     @classmethod
     def at(cls, folder: Path) -> Study:
         """Read them from the study's folder."""
         loops = read(folder / "loops.csv")
         return cls(
-            loops.where(status="done"), loops.where(status="failed"), read(folder / "jumps.csv")
+            loops.where(status="done"),
+            loops.where(status="failed"),
+            read(folder / "jumps.csv"),
+            read(folder / "coarse.csv"),
         )
 
     def joined(self, name: str, campaigns: Sequence[str], **values: Any) -> dict[int, float]:
@@ -90,12 +96,14 @@ class Study:
 
     def by_realisation(self, name: str, **values: Any) -> dict[int, float]:
         """One column of the loops with these values, by realisation."""
-        rows = self.loops.where(**values)
-        found = dict(
-            zip(rows["realisation"].astype(int).tolist(), rows[name].tolist(), strict=True)
-        )
-        assert len(found) == len(rows), f"{values} name more than one cell"
-        return found
+        return by_realisation(self.loops.where(**values), name)
+
+
+def by_realisation(rows: Rows, name: str) -> dict[int, float]:
+    """One column of the rows of one cell, by realisation."""
+    found = dict(zip(rows["realisation"].astype(int).tolist(), rows[name].tolist(), strict=True))
+    assert len(found) == len(rows), "the rows are of more than one cell"
+    return found
 
 
 def aligned(*series: dict[int, float]) -> Array:

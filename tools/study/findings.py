@@ -301,7 +301,7 @@ def answer_text(study: Study) -> str:
     return (
         "**Through the amplitude it is not: at fixed γ and H the loss in J/m² rises and then "
         f"falls in {len(sure)} of {len(rows)} cases (three H at three turning points; p ≤ "
-        f"{worst:.1g}){others}, with its maximum at h_rms of {'; '.join(spans)} (γ = 0.04 "
-        "J/m²).**\n**Through H at h_rms = 1 µm, at the paper's three γ, no fall after a rise is "
-        f"certain: {reported}.**"
+        f"{p_text(worst, 1e-99)}){others}, with its maximum at h_rms of {'; '.join(spans)} "
+        "(γ = 0.04 J/m², intervals of the three H together).**\n**Through H at h_rms = 1 µm, at "
+        f"the paper's three γ, no fall after a rise is certain: {reported}.**"
     )

@@ -9,7 +9,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from adhesis.ensemble.report.paper import M2, TABLE_1
-from tools.study.data import Array, Study
+from tools.study.data import Array, Study, by_realisation
 
 TURNS = (0.6, 0.7, 0.8, 0.9)
 C0 = 1e-13
@@ -22,6 +22,11 @@ COMPATIBLE, EXCLUDED = 0.05, 0.001
 AT_100 = {0.01: ("weak", "cells001"), 0.025: ("between",)}
 AT_200 = ("waves", "waves001")
 RAYLEIGH = ("rayleigh", "rayleigh001")
+CURVES = ("curves", "curves001")
+STIFF = ("stiff", "stiff001")
+STIFFNESSES, FAR_SIDES = (1e9, 3e9, 1e10), (0.4, 0.5, 0.6, 0.7, 0.8)
+FAR_SIDES_COMPUTED = (0.4, 0.6, 0.8)
+NANOMETRES = 0.993  # Δ~ of a separation of 20 nm
 Cell = tuple[float, float]
 Series = dict[int, float]
 
@@ -371,3 +376,71 @@ def _others(study: Study) -> Iterator[Reading]:
     reading = _reading("unloading from the deepest state, Δ~ = 0.95", deepest)
     if reading is not None:
         yield reading
+    yield from _of_curves(study)
+    yield from _of_machines(study)
+    yield from _coarse(study)
+
+
+def _of_curves(study: Study) -> Iterator[Reading]:
+    columns = (("detached ones left out", "loss_in_contact", TURNS),
+               ("20 nm", "loss_dimensionless", (NANOMETRES,)))  # fmt: skip
+    for name, column, turns in columns:
+        for turn in turns:
+
+            def of_cell(
+                hurst: float, gamma: float, column: str = column, turn: float = turn
+            ) -> Series:
+                return study.joined(
+                    *(column, CURVES), hurst=hurst, work_of_adhesion=gamma, max_penetration=turn
+                )
+
+            reading = _reading(f"{name}, Δ~max = {turn:g}", of_cell)
+            if reading is not None:
+                yield reading
+
+
+def _of_machines(study: Study) -> Iterator[Reading]:
+    for stiffness in STIFFNESSES:
+        for far in FAR_SIDES:
+
+            def of_cell(
+                hurst: float, gamma: float, stiffness: float = stiffness, far: float = far
+            ) -> Series:
+                along = along_far_side(study, hurst, gamma, stiffness)
+                if far in FAR_SIDES_COMPUTED:
+                    return along.get(far, {})
+                near = {u: one for u, one in along.items() if abs(u - far) < 0.15}
+                return _between(near, far)
+
+            reading = _reading(f"machine of {stiffness:.0e} Pa/m, u_tot = {far:g}", of_cell)
+            if reading is not None:
+                yield reading
+
+
+def along_far_side(
+    study: Study, hurst: float, gamma: float, stiffness: float, name: str = "loss_dimensionless"
+) -> dict[float, Series]:
+    """A column by the turning point of the far side, u_tot/h_max."""
+    place = {"hurst": hurst, "work_of_adhesion": gamma, "stiffness": stiffness}
+    found = {
+        turn: study.joined(name, STIFF, max_penetration=turn, **place)
+        for turn in FAR_SIDES_COMPUTED
+    }
+    return {turn: one for turn, one in found.items() if one}
+
+
+def _coarse(study: Study) -> Iterator[Reading]:
+    for step in study.coarse.values("unloading_step"):
+        for turn in TURNS:
+
+            def of_cell(
+                hurst: float, gamma: float, step: float = step, turn: float = turn
+            ) -> Series:
+                rows = study.coarse.where(
+                    hurst=hurst, work_of_adhesion=gamma, max_penetration=turn, unloading_step=step
+                )
+                return by_realisation(rows, "loss_dimensionless")
+
+            reading = _reading(f"coarse, unloading in steps of {step:g}, Δ~max = {turn:g}", of_cell)
+            if reading is not None:
+                yield reading

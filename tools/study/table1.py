@@ -11,7 +11,16 @@ import numpy as np
 
 from adhesis.ensemble.report.paper import M2, TABLE_1
 from tools.study.data import Array, Study, aligned
-from tools.study.readings import OF_PAPER, TRANSPOSED, Losses, Reading, readings
+from tools.study.readings import (
+    FAR_SIDES_COMPUTED,
+    OF_PAPER,
+    STIFFNESSES,
+    TRANSPOSED,
+    Losses,
+    Reading,
+    along_far_side,
+    readings,
+)
 from tools.study.text import Table, mean_text, p_text
 
 READING_HEADER = [
@@ -249,6 +258,31 @@ def stress(study: Study) -> Table:
         )
     header = ["γ (J/m²)", "H", *(f"p̄ at {turn} (kPa)" for turn in (0.6, 0.8, 0.9))]
     return [*header, "lower at 0.9 than at 0.6"], rows
+
+
+def machines(study: Study) -> Table:
+    """Loops on machines of finite stiffness, in every cell of the paper."""
+    rows = []
+    for stiffness in STIFFNESSES:
+        for (hurst, gamma), paper in TABLE_1.items():
+            columns = {
+                name: along_far_side(study, hurst, gamma, stiffness, name)
+                for name in ("loss_dimensionless", "stress_at_turn", "h_max")
+            }
+            reported = []
+            for far in FAR_SIDES_COMPUTED:
+                losses = columns["loss_dimensionless"].get(far, {})
+                if not losses:
+                    reported.append("none")
+                    continue
+                stress, h_max = (columns[name][far] for name in ("stress_at_turn", "h_max"))
+                reached = np.mean([far - stress[r] / (stiffness * h_max[r]) for r in losses])
+                mean = mean_text(np.array(list(losses.values())))
+                reported.append(f"{mean}, Δ~ {reached:.2f}, n = {len(losses)}")
+            place = f"{stiffness:.0e}", f"{gamma:g}", f"{hurst:g}", f"{paper:g}"
+            rows.append([*place, *reported])
+    header = ["k (Pa/m)", "γ (J/m²)", "H", "paper"]
+    return [*header, *(f"W~ at u_tot = {far:g} h_max" for far in FAR_SIDES_COMPUTED)], rows
 
 
 def under_load(study: Study) -> Table:

@@ -18,6 +18,7 @@ from tools.study.table1 import (
     caption_bounds,
     cells,
     factors_of_rows,
+    machines,
     main_readings,
     reach,
     stress,
@@ -228,7 +229,8 @@ def scaling(study: Study) -> Table:
     rows = []
     for one in amplitude.scaling(study):
         place = f"{one.height:.3g}", f"{one.gamma:g}", f"{one.turn:g}", f"{one.pairs}"
-        differences = f"{100 * one.mean:+.2f} %", f"{100 * one.largest:.2f} %"
+        ends = f" ({100 * one.low:+.2f} … {100 * one.high:+.2f})" if one.pairs > 1 else ""
+        differences = f"{100 * one.mean:+.2f} %{ends}", f"{100 * one.largest:.2f} %"
         rows.append([*place, *differences, f"{100 * one.slope:.2f} %", f"{100 * one.error:.2f} %"])
     header = ["h_rms at γ = 0.04 J/m² (µm)", "compared with 1 µm at γ =", "Δ~max", "pairs of loops"]
     header += ["mean difference of W~", "largest", "half the difference of m2 (largest)"]
@@ -554,6 +556,7 @@ TABLES: dict[str, Callable[[Study], Table]] = {
     "tens": tens,
     "stress": stress,
     "load": under_load,
+    "machines": machines,
     "monotony": monotony,
     "around": around,
     "mechanisms": mechanisms,
