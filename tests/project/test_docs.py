@@ -172,8 +172,9 @@ LESSONS = sorted({block.page for block in BLOCKS if is_transcript(block)})
 
 
 def commands(block: Block) -> list[str]:
-    """The lines of a block of commands, without their comments."""
-    return [re.sub(r"\s+# .*", "", line) for line in block.text.splitlines()]
+    """The lines of a block of commands, without their comments; a backslash joins two lines."""
+    joined = re.sub(r" \\\n\s*", " ", block.text)
+    return [re.sub(r"\s+# .*", "", line) for line in joined.splitlines()]
 
 
 COMMAND_BLOCKS = [
