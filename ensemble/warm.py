@@ -8,7 +8,14 @@ from collections.abc import Callable, Collection
 from contextlib import ExitStack
 
 from adhesis.ensemble.reporter import bar, log
-from adhesis.solver.precompile import Compilation, compiled_in, functions_of, processor, warm
+from adhesis.solver.precompile import (
+    COMPILED_METHODS,
+    Compilation,
+    compiled_in,
+    functions_of,
+    processor,
+    warm,
+)
 
 _MOMENT = 1.0  # s of compilation before the first report
 _BETWEEN_LINES = 10.0  # s
@@ -79,7 +86,8 @@ def warm_up(
 
 def warm_missing(methods: Collection[str], *, quiet: bool = False, many_gaps: bool = True) -> None:
     """Compile those methods whose code is not kept for this processor, reported on stderr."""
-    missing = [name for name in methods if compiled_in(name, many_gaps=many_gaps) is None]
+    compiled = [name for name in methods if name in COMPILED_METHODS]
+    missing = [name for name in compiled if compiled_in(name, many_gaps=many_gaps) is None]
     if missing:
         write = _nowhere if quiet else log
         warm_up(missing, write, many_gaps=many_gaps, show_bar=not quiet)
