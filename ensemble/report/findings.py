@@ -144,7 +144,7 @@ def missing(data: Aggregate) -> list[str]:
 
 
 def agreement(data: Aggregate) -> list[str]:
-    """Sentences on what the averages say; beside the paper's if the campaign is the paper's."""
+    """Sentences on what the averages show; beside the paper's if the campaign is the paper's."""
     shown = data.shown
     of_paper = paper.are_its_cells(shown.cells)
     return [
@@ -329,7 +329,7 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
     sure = [pair for pair in up if pair.loss.low > 0]
     if len(sure) == len(data.paired):
         return [
-            f"The loss grows with γ at every {'H and further axis' if data.further else 'H'}, "
+            f"The loss in J/m² grows with γ at every {'H and further axis' if data.further else 'H'}, "
             "profile by profile, beyond the 95 % interval"
             f"{'; the paper says the same' if of_paper else ''}."
         ]
@@ -347,7 +347,7 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
         if pair not in sure
     ]
     return [
-        f"The mean loss grows with γ in {len(up)} of {len(data.paired)} steps of γ; not beyond the "
+        f"The mean loss in J/m² grows with γ in {len(up)} of {len(data.paired)} steps of γ; not beyond the "
         f"95 % interval in: {_listed(down)}."
     ]
 
