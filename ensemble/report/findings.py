@@ -328,9 +328,10 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
     up = [pair for pair in data.paired if pair.loss.mean > 0]
     sure = [pair for pair in up if pair.loss.low > 0]
     if len(sure) == len(data.paired):
+        everywhere = "H and further axis" if data.further else "H"
         return [
-            f"The loss in J/m² grows with γ at every {'H and further axis' if data.further else 'H'}, "
-            "profile by profile, beyond the 95 % interval"
+            f"The loss in J/m² grows with γ at every {everywhere}, profile by profile, beyond "
+            "the 95 % interval"
             f"{'; the paper says the same' if of_paper else ''}."
         ]
     down = [
@@ -347,8 +348,8 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
         if pair not in sure
     ]
     return [
-        f"The mean loss in J/m² grows with γ in {len(up)} of {len(data.paired)} steps of γ; not beyond the "
-        f"95 % interval in: {_listed(down)}."
+        f"The mean loss in J/m² grows with γ in {len(up)} of {len(data.paired)} steps of γ; not "
+        f"beyond the 95 % interval in: {_listed(down)}."
     ]
 
 
