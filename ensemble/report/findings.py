@@ -69,7 +69,7 @@ def _statistical(data: Aggregate) -> str:
     plural = "realisations" if counts[-1] > 1 else "realisation"
     point = "cell" if data.further else "(H, γ)"
     if not errors:
-        return f"With {many} {plural} of each {point}, how well the mean is known cannot be said."
+        return f"With {many} {plural} of each {point}, the error of the mean is unknown."
     reach = (
         f"{_percent(min(errors))} to {_percent(max(errors))} %"
         if len(errors) > 1
