@@ -44,7 +44,7 @@ def warm_up(
     show_bar : bool
         Show a bar instead of the lines between the first and the last, if stderr is a terminal.
     """
-    total = functions_of(methods, many_gaps=many_gaps)
+    total = max(1, functions_of(methods, many_gaps=many_gaps))
     show_bar = show_bar and sys.stderr.isatty()
     next_report = _MOMENT
 

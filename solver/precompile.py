@@ -105,9 +105,10 @@ def compiled_in(method: str, *, many_gaps: bool = True) -> Path | None:
 
 
 def functions_of(methods: Iterable[str], *, many_gaps: bool = True) -> int:
-    """Return about how many functions are compiled for these methods, if none is cached."""
-    parts = list(methods)
-    if many_gaps and "sharp" in parts:
+    """Return about how many functions are still to be compiled for these methods."""
+    names = list(methods)
+    parts = [name for name in names if compiled_in(name, many_gaps=False) is None]
+    if many_gaps and "sharp" in names and compiled_in("sharp") is None:
         parts.append("many")
     return sum(_FUNCTIONS[part] for part in parts)
 

@@ -69,7 +69,7 @@ def _statistical(data: Aggregate) -> str:
     plural = "realisations" if counts[-1] > 1 else "realisation"
     point = "cell" if data.further else "(H, γ)"
     if not errors:
-        return f"With {many} {plural} of each {point}, how well the mean is known cannot be said."
+        return f"With {many} {plural} of each {point}, the error of the mean is unknown."
     reach = (
         f"{_percent(min(errors))} to {_percent(max(errors))} %"
         if len(errors) > 1
@@ -144,7 +144,7 @@ def missing(data: Aggregate) -> list[str]:
 
 
 def agreement(data: Aggregate) -> list[str]:
-    """Sentences on what the averages say; beside the paper's if the campaign is the paper's."""
+    """Sentences on what the averages show; beside the paper's if the campaign is the paper's."""
     shown = data.shown
     of_paper = paper.are_its_cells(shown.cells)
     return [
@@ -328,9 +328,10 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
     up = [pair for pair in data.paired if pair.loss.mean > 0]
     sure = [pair for pair in up if pair.loss.low > 0]
     if len(sure) == len(data.paired):
+        everywhere = "H and further axis" if data.further else "H"
         return [
-            f"The loss grows with γ at every {'H and further axis' if data.further else 'H'}, "
-            "profile by profile, beyond the 95 % interval"
+            f"The loss in J/m² grows with γ at every {everywhere}, profile by profile, beyond "
+            "the 95 % interval"
             f"{'; the paper says the same' if of_paper else ''}."
         ]
     down = [
@@ -347,8 +348,8 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
         if pair not in sure
     ]
     return [
-        f"The mean loss grows with γ in {len(up)} of {len(data.paired)} steps of γ; not beyond the "
-        f"95 % interval in: {_listed(down)}."
+        f"The mean loss in J/m² grows with γ in {len(up)} of {len(data.paired)} steps of γ; not "
+        f"beyond the 95 % interval in: {_listed(down)}."
     ]
 
 

@@ -53,7 +53,7 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     if beside.rows:
         out += ["## What agrees with the paper, and what does not", beside.markdown()]
     else:
-        out += ["## What the averages say"]
+        out += ["## What the averages show"]
     out += _bullets(findings.agreement(data))
     growth = loss_tables.paired(data)
     if growth.rows:

@@ -444,7 +444,7 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
         found.append(
             f"the short-wave end is not converged: the last halving of the shortest wave changes "
             f"the loss by {-100 * last / (1 + last):+.0f} %; a finer step or a sharper tip would "
-            "tell more"
+            "resolve shorter waves"
         )
     if loss.relative > 0.5:
         found.append(

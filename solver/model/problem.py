@@ -194,10 +194,12 @@ class Problem(ByValue):
     def full_contact(self, prescribed: float) -> str:
         """Return the message for a contact that runs into full contact before x = prescribed."""
         first = self.control.prescribed(self.profile.h_max, 0.0)
-        where = f"before {self.place(prescribed)}" if prescribed < first else "at first touch"
+        at_touch = prescribed >= first
+        where = "at first touch" if at_touch else f"before {self.place(prescribed)}"
+        turn = "" if at_touch else "the turning point or "
         return (
             f"the contact runs into full contact {where}: there is no state with a gap; prescribe "
-            "the separation or a larger stiffness, or reduce the turning point or work_of_adhesion"
+            f"the separation or a larger stiffness, or reduce {turn}work_of_adhesion"
         )
 
     def place(self, prescribed: float) -> str:
