@@ -243,7 +243,7 @@ def amplitude_findings(study: Study) -> Table:
         [
             "2. W~ falls with the amplitude",
             f"{_counted(row.verdict for row in scaled)}; largest p "
-            f"{max(row.p_monotone for row in scaled):.1g}",
+            f"{p_text(max(row.p_monotone for row in scaled), 1e-99)}",
             "holds" if all(row.verdict == "falls" for row in scaled) else "open",
         ],
         [
