@@ -233,7 +233,7 @@ def amplitude_findings(study: Study) -> Table:
     rows = [
         [
             "1. through the amplitude, the loss in J/m² rises and then falls, p < 1e-3",
-            f"{_counted(row.verdict for row in losses)}; largest p {worst:.1g}",
+            f"{_counted(row.verdict for row in losses)}; largest p {p_text(worst, 1e-99)}",
             "holds"
             if len(sure) == len(losses)
             else "wrong"
@@ -243,7 +243,7 @@ def amplitude_findings(study: Study) -> Table:
         [
             "2. W~ falls with the amplitude",
             f"{_counted(row.verdict for row in scaled)}; largest p "
-            f"{max(row.p_monotone for row in scaled):.1g}",
+            f"{p_text(max(row.p_monotone for row in scaled), 1e-99)}",
             "holds" if all(row.verdict == "falls" for row in scaled) else "open",
         ],
         [
@@ -264,7 +264,9 @@ def amplitude_findings(study: Study) -> Table:
             f"means of {low:+.2f} to {high:+.2f} % apart, single loops up to "
             f"{100 * max(one.largest for one in scaling):.1f} %, with estimated errors up to "
             f"{100 * max(one.error for one in scaling):.2f} %",
-            "wrong: to the order of m2 only" if apart else "holds",
+            "wrong: means agree to the order of m2, single loops may jump elsewhere"
+            if apart
+            else "holds",
         ],
         [
             "7. the numerical error of every mean is below a tenth of half its interval",
