@@ -156,7 +156,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path, drawn):
         assert paper.is_the_papers(load_campaign(ROOT / "jobs" / f"{name}.toml")), name
     text = (ROOT / "jobs" / "paper.toml").read_text()
     for old, new in (
-        ("max_penetration = 0.9 ", "max_penetration = 0.6 "),
+        ("max_penetration = 0.9 ", "max_penetration = 0.98 "),
         ("ratio = 100", "ratio = 10"),
         ("young = 1e6", "young = 2e6"),
         ("poisson = 0.5", "poisson = 0.3"),
