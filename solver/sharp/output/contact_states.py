@@ -11,7 +11,7 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
@@ -29,15 +29,16 @@ class Memory:
         The ends of its gaps.
     clearance : float
         Of them (``Point.clearance``).
-    course : tuple of float, array, float, optional
-        Where a path stopped at it: d, dn/dd of every edge and dY/dd, as in ``Point``.
+    course : tuple of float, array, float, PreviousPoint or None, optional
+        Where a path stopped at it: d, dn/dd of every edge, dY/dd and the point before it, as in
+        ``Point``.
     seen : Seen
         The gaps as they were when they were last looked at.
     """
 
     gaps: Array
     clearance: float
-    course: tuple[float, Array, float] | None = None
+    course: tuple[float, Array, float, PreviousPoint | None] | None = None
     seen: Seen = NOT_SEEN
 
 
