@@ -131,23 +131,17 @@ class States:
             separation = at / self.q0
         mean_stress = gap_field.pressure * half
         gaps = gap_field.gaps
-        left, right = np.empty(len(gaps)), gaps[:, 0]  # of the patch before each gap
-        left[0], left[1:] = gaps[-1, 1] - 2 * np.pi, gaps[:-1, 1]
-        measure = self.source.measure_between(left, right)
-        turn = np.floor(left / (2 * np.pi)) * 2 * np.pi
-        patches = np.empty(gaps.shape)
-        patches[:, 0], patches[:, 1] = left - turn, right - turn
-        patches /= self.q0
+        patches, measure = self.source.contact_between(gaps)
         elastic = (
             self._full_energy + 0.5 * work_of_gaps(gap_field) - np.pi * at * gap_field.pressure
         )
         return ContactState(
             separation=separation,
-            edges=patches[patches[:, 0].argsort()],
+            edges=patches / self.q0,
             mean_stress=mean_stress,
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
-            contact_fraction=float((right - left).sum() / (2 * np.pi)),
+            contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             stiffness=slope * self._per_prescribed,
             hold_energy=self._hold_energy(separation, mean_stress),
             internal=Memory(gaps, clearance),
