@@ -181,7 +181,8 @@ def _overlapping(patches: Array, others: Array, period: float) -> tuple[Indices,
     right = np.add.outer(turns, others[order, 1]).ravel()
     first = np.searchsorted(right, patches[:, 0], side="right")
     stop = np.searchsorted(left, patches[:, 1], side="left")
-    return np.clip(stop - first, 0, len(others)), order[first % len(others)]
+    hits = np.minimum(np.maximum(stop - first, 0), len(others))  # clip() takes ten times as long
+    return hits, order[first % len(others)]
 
 
 def _same(one: Array, two: Array, period: float) -> NDArray[np.bool_]:

@@ -26,6 +26,7 @@ from adhesis.solver.sharp.tolerances import (
     LAST_GAP,
     RESTS,
     SAME_REST,
+    SHORTENED_STEPS,
 )
 
 _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
@@ -132,15 +133,14 @@ class EdgeMechanics(EdgeProblem):
         reach: float,
         *,
         equal_speeds: bool = False,
-        shortened: float = 1.0,
         track: Track | None = None,
         start: KnownState | None = None,
     ) -> Point | Array:
         """Descend in energy at a prescribed value to the next minimum.
 
         By linear kinetics, which extends the ``track``; or, to be compared with that, with
-        ``equal_speeds`` or steps that are ``shortened``, until the track is met. From a ``start``
-        in a window.
+        ``equal_speeds`` or from where the track has been left, until the track is met. From a
+        ``start`` in a window.
 
         Returns
         -------
@@ -169,7 +169,7 @@ class EdgeMechanics(EdgeProblem):
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
-        return self._relax(gaps, prescribed, reach, equal_speeds, shortened, track)
+        return self._relax(gaps, prescribed, reach, equal_speeds, track)
 
     def _relax_in_window(
         self, start: KnownState, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
@@ -195,21 +195,23 @@ class EdgeMechanics(EdgeProblem):
         return rest.gaps
 
     def _relax(
-        self, gaps: Array, prescribed: float, reach: float, equal_speeds: bool, shortened: float,
-        track: Track,
-    ) -> Point | Array:  # fmt: skip
+        self, gaps: Array, prescribed: float, reach: float, equal_speeds: bool, track: Track
+    ) -> Point | Array:
         """Descend with all gaps."""
-        system = self.system(gaps)
-        law = self.law._replace(longest_step=shortened * self.law.longest_step)
-        compare = equal_speeds or shortened < 1
+        system, law = self.system(gaps), self.law
+        compare = equal_speeds or track.has_left
         left, orders, rests = DESCENT_LIMIT, _ANY, 0
         while left > 0 and rests <= 2 * RESTS:
+            most, longest = left, law.longest_step
+            if track.short_fields > 0:
+                most, longest = track.short_fields, SHORTENED_STEPS * longest
             end = system.descend(
-                gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds,
-                compare=compare,
+                gaps, prescribed, most, orders, law._replace(longest_step=longest), track,
+                equal_speeds=equal_speeds, compare=compare,
             )  # fmt: skip
             gaps, orders = end.gaps, end.orders
             left -= end.fields
+            track.short_fields -= end.fields
             if end.event == REJOINED:
                 track.rejoined = True
                 return np.empty((0, 2))

@@ -149,6 +149,12 @@ SADDLE_FORCE = 0.1
 """C_c². Smaller forces are those of the fold at which a jump begins."""
 SHORTENED_STEPS = 0.25
 """Factor on the steps of a descent that is repeated beyond a saddle; a half did not do."""
+SADDLE_APPROACH = 24.0
+"""λ_min. A descent that is repeated begins at most so far before the saddle. One of the loop with
+γ = 0.04 of benchmarks/few_gaps.py ended elsewhere from further away and from 16, and not from 8."""
+SHORT_WAY = 2.0
+"""Times the fields that short steps need until forces have grown so much. Behind them steps are as
+usual: where the descent ends is decided."""
 HELD_BACK = 0.03
 """C_c². Runners that take less force than this from each other do not race."""
 OTHER_MINIMUM = 0.01
@@ -160,7 +166,8 @@ UNCHECKED_ALONE = 2.0
 """Longest steps (0.1 λ_min); up to here a step of one edge that runs alone is not checked for a
 minimum, up to 1 that of several. The check is a cubic of the force."""
 LONGEST_STRIDE = 3.0
-"""Longest steps (0.15 λ_min); checked steps of several edges."""
+"""Longest steps (0.15 λ_min); checked steps of several edges. With 0.3 λ_min a loop of
+benchmarks/descent_steps.py changed by 4e-3 without a race."""
 LONGEST_STRIDE_ALONE = 6.0
 """Longest steps (0.3 λ_min); checked steps of one edge. 0.45 λ_min leapt over a minimum in 3 of 12
 loops of benchmarks/few_gaps.py; 0.3 missed less than unchecked 0.1."""

@@ -81,13 +81,20 @@ def resolution(jump: float = 1e-6, bend: float = 1e-3) -> Resolution:
 
 
 def branch(
-    curve: Curve, start: float, target: float, towards: BranchName = "loading", **options: float
+    curve: Curve,
+    start: float,
+    target: float,
+    towards: BranchName = "loading",
+    before: float | None = None,
+    **options: float,
 ) -> Branch:
     closing = SimpleNamespace(over=lambda point, reached, name: abs(reached.at - point.at))
     aim = Target(target, target, towards)
-    return Branch(
-        cast(Any, curve), cast(Any, closing), resolution(**options), curve.point(start), aim
-    )
+    point = curve.point(start)
+    if before is not None:
+        earlier = curve.point(before)
+        point = point.with_previous(PreviousPoint(before, earlier.rate, earlier.gaps))
+    return Branch(cast(Any, curve), cast(Any, closing), resolution(**options), point, aim)
 
 
 # ---------------------------------------------------------------------- predictor
@@ -190,6 +197,18 @@ def test_a_branch_without_a_fold_reaches_the_target_exactly():
     assert isinstance(last, Accepted)
     assert last.point.at == 0.123
     assert last.is_output
+
+
+def test_a_load_step_begins_with_the_point_before_unless_the_path_turns_back():
+    """Beyond one point alone the first step is short."""
+
+    def first_step(target: float, towards: BranchName, before: float | None) -> float:
+        of = branch(Curve(), 2.0, target, towards, before, bend=1e9)
+        of.advance()
+        return abs(of.point.at - 2.0)
+
+    assert first_step(0.5, "loading", 2.05) > 2 * first_step(0.5, "loading", None)
+    assert first_step(4.0, "unloading", 2.05) == first_step(4.0, "unloading", None)
 
 
 def test_states_are_handed_out_as_densely_as_the_trapezoidal_rule_needs():

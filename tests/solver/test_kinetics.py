@@ -10,6 +10,7 @@ import pytest
 from adhesis import HalfSpace, Problem, Profile, run_loop, self_affine_profile
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.continuation.races import RaceCheck
+from adhesis.solver.sharp.descent.gradient_flow import REJOINED, STEP_LIMIT
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
 from adhesis.solver.sharp.descent.saddle import leaving_step
 from adhesis.solver.sharp.descent.track import Stage, Track
@@ -19,6 +20,12 @@ from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.sharp.tolerances import (
+    DESCENT_LIMIT,
+    SADDLE_APPROACH,
+    SHORT_WAY,
+    SHORTENED_STEPS,
+)
 
 SOLID = HalfSpace(1e6, 0.5)
 PHASES = [
@@ -203,6 +210,40 @@ def test_a_saddle_counts_where_forces_grow_soon_after_it(step, close):
         # from where the gaps became two; compared from where the force is eight times that of 0.1
         assert np.array_equal(begin, way[0].reshape(2, 2))
         assert np.array_equal(beyond.of(4)[0], way[6])
+
+
+@pytest.mark.parametrize(("ran", "begin"), [(0.0, 0), (2 * SADDLE_APPROACH, 1)])
+def test_a_descent_is_repeated_from_not_far_before_the_saddle(ran, begin):
+    """Short steps lead from there to where the forces have grown, and a margin further."""
+    forces = np.array([1.0, 0.5, 0.05, 0.1, 0.2, 0.45, 1.0])
+    way = np.outer(0.1 * np.arange(8.0), [1.0, 1.0, 0.0, 0.0])
+    way[:2] -= ran
+    taken = np.zeros((4, 4))
+    taken[0, 1] = 1.0
+    track = Track(ways=[way], forces=[forces], stages=[Stage(np.ones(4), taken)])
+    check = RaceCheck(SimpleNamespace(wave=1.0, critical=1.0))
+    gaps, beyond = check.beyond_saddle(np.zeros((3, 2)), None, track)
+    assert np.array_equal(gaps, way[begin].reshape(-1, 2))
+    assert beyond.short_fields == (6 - begin) * SHORT_WAY / SHORTENED_STEPS
+
+
+def test_steps_are_short_for_the_fields_that_a_track_asks_for(monkeypatch):
+    """Beyond them they are as usual, and what was left of the descent is not begun anew."""
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=4, seed=1, h_rms=1e-6)
+    edges = SharpMethod(Problem(profile, SOLID, 0.03)).edges
+    longest, asked = edges.law.longest_step, []
+
+    def descend(gaps, prescribed, most, orders, law, track, *, equal_speeds, compare):
+        asked.append((law.longest_step / longest, most, compare))
+        event = STEP_LIMIT if len(asked) == 1 else REJOINED
+        return SimpleNamespace(gaps=gaps, orders=orders, fields=min(most, 100), event=event)
+
+    monkeypatch.setattr(edges, "system", lambda gaps: SimpleNamespace(descend=descend))
+    track = Track(has_left=True, short_fields=30)
+    monkeypatch.setattr(edges, "uses_windows", lambda gaps: False)
+    edges.relax(np.array([[1.0, 2.0]]), 0.1, 0.01, track=track)
+    assert asked == [(SHORTENED_STEPS, 30, True), (1.0, DESCENT_LIMIT - 30, True)]
+    assert track.rejoined
 
 
 def test_nothing_races_where_the_rules_agree():

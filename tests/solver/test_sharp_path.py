@@ -195,6 +195,23 @@ def test_skipped_load_steps_are_interpolated_on_the_axis():
     assert axis[-1] == pytest.approx(result.penetration[-1])
 
 
+def test_load_steps_along_a_branch_cost_no_fields_but_those_of_their_states():
+    """Each begins with the point before its own: it once began straight, with a short step."""
+    profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=16, h_rms=1e-6, seed=1)
+
+    def newton_steps(load_steps: int) -> int:
+        method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.03))
+        state = method.follow(method.detached(profile.h_max), 0.5 * profile.h_max).states[-1]
+        before = method.report().newton_steps
+        for share in np.linspace(0.5, 0.6, load_steps + 1)[1:]:
+            path = method.follow(state, share * profile.h_max)
+            assert not path.jumps
+            state = path.states[-1]
+        return method.report().newton_steps - before
+
+    assert newton_steps(4) <= newton_steps(1) + 3
+
+
 def test_a_steep_profile_is_measured_exactly():
     """Rms slope 0.96: edges once ran to and fro for ever between two panels of sqrt(1 + h'²)."""
     profile = profile_of(0.227, 6, 5, 684946, "rayleigh", h_rms=2e-5)
@@ -206,7 +223,10 @@ def test_a_steep_profile_is_measured_exactly():
     x = np.linspace(left, right, 20_001, axis=1) / profile.q0
     measure = np.sqrt(1 + profile.at(x, 1) ** 2)
     exact = np.trapezoid(measure, x * profile.q0, axis=1).sum()
-    assert method.states.source.measure_between(left, right) == pytest.approx(exact, rel=1e-8)
+    gaps = np.array([[1.1, 2.0], [5.9, 0.3 + 2 * np.pi]])
+    patches, measured = method.states.source.contact_between(gaps)
+    assert patches == pytest.approx(np.stack([left, right], axis=1), rel=1e-14)
+    assert measured == pytest.approx(exact, rel=1e-8)
 
 
 def test_a_slope_of_37_ends_in_a_loss_and_a_warning():

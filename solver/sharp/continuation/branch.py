@@ -72,10 +72,13 @@ class Branch:
     ) -> None:
         self._edges, self._closing, self._resolution = edges, closing, resolution
         self._target = target
+        before = point.previous
+        if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
+            point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
         self.trail = Trail(point)
         self.steps = StepSize(resolution.jump)
-        # straight at first: short steps there keep the integral exact
+        # straight after a jump or turn: short steps there keep the integral exact
         self._predictor = Predictor(point)
         self.in_windows = edges.uses_windows(point.gaps)
         self._window: LocalBranch | None = None  # of the point that is predicted from

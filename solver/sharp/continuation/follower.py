@@ -69,8 +69,9 @@ class Follower:
             return None
         if self._last is not None and self._last[0] is memory:
             return self._last[1]
-        at, rate, slope = memory.course
-        return Point(at, self.edges.field(memory.gaps, at), rate, slope, memory.clearance)
+        at, rate, slope, previous = memory.course
+        field = self.edges.field(memory.gaps, at)
+        return Point(at, field, rate, slope, memory.clearance, previous)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
         """Follow a stable branch to the target or through its next jump.
@@ -105,14 +106,14 @@ class Follower:
         memory = Memory(
             point.field.gaps,
             point.clearance,
-            (point.at, point.rate, point.slope),
+            (point.at, point.rate, point.slope, point.previous),
             self.nucleation.clearances.seen,
         )
         # A dense field does not depend on the way to it; a hierarchical one does.
         if self.edges.uses_windows(point.field.gaps):
             self._last = None
         else:
-            self._last = memory, point.with_previous(None)
+            self._last = memory, point
         history.states[-1] = replace(history.states[-1], internal=memory)
 
     def _at_point(

@@ -23,7 +23,6 @@ from adhesis.solver.sharp.tolerances import (
     CORRECTED,
     MOST_NUCLEATIONS,
     OTHER_MINIMUM,
-    SHORTENED_STEPS,
 )
 
 Rival = Point | None | FullContact
@@ -173,7 +172,7 @@ class Jumps:
                 passed = self.races.beyond_saddle(gaps, point, track)
                 if passed is not None:
                     begin, beyond = passed
-                    rival = self._relax(begin, at, shortened=SHORTENED_STEPS, track=beyond)
+                    rival = self._relax(begin, at, track=beyond)
                     if not beyond.rejoined and not self._alike(rival, point):
                         rivals.append(rival)
             except FullContact as full:
@@ -188,16 +187,14 @@ class Jumps:
         at: float,
         *,
         equal_speeds: bool = False,
-        shortened: float = 1.0,
         track: Track | None = None,
         start: KnownState | None = None,
     ) -> Point | None:
         reach = CORRECTED * self.edges.wave
         while len(gaps):
             found = self.edges.relax(
-                gaps, at, reach, equal_speeds=equal_speeds, shortened=shortened, track=track,
-                start=start,
-            )  # fmt: skip
+                gaps, at, reach, equal_speeds=equal_speeds, track=track, start=start
+            )
             if isinstance(found, Point):
                 return found
             gaps, start = found, None

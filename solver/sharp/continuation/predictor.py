@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.tolerances import (
     BEYOND_FOLD,
     CUBIC_OF_OTHERS_TRUSTED,
@@ -107,24 +109,16 @@ class Predictor:
         """Gaps that are expected at d = ``at``."""
         point = self.point
         on = at - point.at
-        rate = point.rate
-        sign = outward(point.gaps)
-        motion = rate * on
-        if on * self.way > 0 and abs(on) < PREDICTION_TRUSTED * abs(self.way):
-            earlier = self._earlier
-            if self._way_by_lead is not None:
-                led = self._led(on / self.way, self._way_by_lead)
-                here = rate * (self._gone / rate[self._lead])
-                before = earlier.rate * (self._gone / earlier.rate[self._lead])
-                if led < CUBIC_OF_OTHERS_TRUSTED:
-                    gone = sign * (point.gaps - earlier.gaps).ravel()
-                    square, cube = 2 * here + before - 3 * gone, here + before - 2 * gone
-                    motion = led * (here + led * (square + led * cube))
-                else:
-                    motion = led * (here + led * (here - before) / 2)
-            else:
-                motion += (rate - earlier.rate) * on * on / (2 * self.way)
-        gaps: Array = point.gaps + (sign * motion).reshape(-1, 2)
+        if not (on * self.way > 0 and abs(on) < PREDICTION_TRUSTED * abs(self.way)):
+            return point.extrapolate(at)
+        led = math.nan
+        if self._way_by_lead is not None:
+            led = self._led(on / self.way, self._way_by_lead)
+        earlier = self._earlier
+        gaps: Array = predict_gaps(
+            point.gaps, point.rate, earlier.gaps, earlier.rate, on, self.way, self._lead,
+            self._gone, led,
+        )  # fmt: skip
         return gaps
 
     def reach(self, most: float, finest: float) -> float:
@@ -149,3 +143,32 @@ class Predictor:
     def across(self, finest: float) -> float:
         """Step across the fold that is seen."""
         return (1 + LEFT_BEFORE_FOLD) * self.fold_distance + BEYOND_FOLD * finest
+
+
+@compiled
+def predict_gaps(
+    gaps: Array, rate: Array, gaps_before: Array, rate_before: Array, on: float, way: float,
+    lead: int, gone: float, led: float,
+) -> Array:  # fmt: skip
+    """Predict gaps at a distance ``on`` in d, from two points that are ``way`` apart.
+
+    The edge ``lead`` has ``gone`` so far between them, and goes ``led`` times as far; NaN if no
+    edge leads.
+    """
+    here_by, before_by = gone / rate[lead], gone / rate_before[lead]
+    out = np.empty_like(gaps)
+    for e in range(rate.shape[0]):
+        k, side = e // 2, e % 2
+        sign = 1.0 - 2 * side
+        if np.isnan(led):
+            motion = rate[e] * on + (rate[e] - rate_before[e]) * on * on / (2 * way)
+        else:
+            here, before = rate[e] * here_by, rate_before[e] * before_by
+            moved = sign * (gaps[k, side] - gaps_before[k, side])
+            if led < CUBIC_OF_OTHERS_TRUSTED:
+                square, cube = 2 * here + before - 3 * moved, here + before - 2 * moved
+                motion = led * (here + led * (square + led * cube))
+            else:
+                motion = led * (here + led * (here - before) / 2)
+        out[k, side] = gaps[k, side] + sign * motion
+    return out

@@ -13,9 +13,11 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
     HELD_BACK,
     RAN,
+    SADDLE_APPROACH,
     SADDLE_FORCE,
     SADDLE_PASSED,
     SADDLE_REACH,
+    SHORT_WAY,
     SHORTENED_STEPS,
 )
 
@@ -60,7 +62,7 @@ class RaceCheck:
         Next to a saddle the forces are small, and little decides to which side edges run on. That
         counts where runners hold each other back, gaps or patches went, and the forces grow soon
         after the saddle: the further edges run until then, the further away they passed it. Also
-        returns where the descent began with the gaps that it had at the saddle.
+        returns gaps before the saddle, at most as far away as counts.
         """
         same_gaps = end is not None and end.gaps.shape == start.shape
         if same_gaps or not track.is_complete:
@@ -81,8 +83,13 @@ class RaceCheck:
                 points = way[left:]
                 places = np.arange(0, len(points) - 1 + 1e-9, SHORTENED_STEPS)
                 fine = [np.interp(places, np.arange(len(points)), edge) for edge in points.T]
-                beyond = Track(ways=[np.ascontiguousarray(np.transpose(fine))], has_left=True)
-                return way[0].reshape(-1, 2), beyond
+                ways = [np.ascontiguousarray(np.transpose(fine))]
+                apart = np.abs(way[:saddle] - way[saddle]).max(axis=1, initial=0.0)
+                far = np.flatnonzero(apart > SADDLE_APPROACH * self._edges.wave)
+                begin = int(far[-1]) if far.size else 0
+                fields = int(SHORT_WAY * (left - begin) / SHORTENED_STEPS)
+                beyond = Track(ways, has_left=True, short_fields=fields)
+                return way[begin].reshape(-1, 2), beyond
         return None
 
     def _runners(self, way: Array) -> NDArray[np.int64]:

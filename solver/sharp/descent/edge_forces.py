@@ -85,8 +85,9 @@ def forces_at(
     if not np.isfinite(solution.pressure):
         return Forces(solution, slope, slope, slope)
     residual, drift = imbalance(solution, law, panels)
+    openings = solution.opening
     for e in range(edges):
-        opening = solution.opening[e]
+        opening = openings[e]
         critical = opening - residual[e]
         slope[e] = opening * abs(opening) - critical * critical
     return Forces(solution, residual, drift, slope)
@@ -126,16 +127,16 @@ def force_rates(now: Forces, way: Array, edges: Integers, rows: Array) -> Array:
 
     ``rows`` are those of ``force_along_step.force_derivatives``.
     """
-    of = now.solution
+    opening, residual, drift = now.solution.opening, now.residual, now.drift
     rates = np.empty(edges.shape[0])
     for i in range(edges.shape[0]):
         e = edges[i]
         total = 0.0
         for f in range(way.shape[0]):
             total += rows[e, f] * way[f]
-        critical = of.opening[e] - now.residual[e]
-        rate = critical * now.drift[e] * (1 - 2 * (e % 2)) * way[e]
-        rate -= np.sign(of.opening[e]) * total
+        critical = opening[e] - residual[e]
+        rate = critical * drift[e] * (1 - 2 * (e % 2)) * way[e]
+        rate -= np.sign(opening[e]) * total
         rates[i] = 2 * rate * np.sign(way[e])
     return rates
 

@@ -95,18 +95,17 @@ def initial_state(gaps: Array) -> State:
 @compiled
 def share_to_minimum(state: State, now: Forces, rows: ForceRows, rules: GaussRules) -> float:
     """Find the share of a long step after which the force on a running edge vanishes, or 1."""
-    edges = state.long.edges
+    edges, before = state.long.edges, state.long.rates
     if edges.shape[0] == 0:
         return 1.0
     force_derivatives(now.solution, edges, rules, rows.values, rows.known)
-    rates = force_rates(now, state.step, edges, rows.values)
+    step, slope, slope_now = state.step, state.slope, now.slope
+    rates = force_rates(now, step, edges, rows.values)
     share = 1.0
     for i in range(edges.shape[0]):
         e = edges[i]
-        onwards = -np.sign(state.step[e])
-        fallen = first_zero(
-            onwards * state.slope[e], state.long.rates[i], onwards * now.slope[e], rates[i]
-        )
+        onwards = -np.sign(step[e])
+        fallen = first_zero(onwards * slope[e], before[i], onwards * slope_now[e], rates[i])
         share = min(share, fallen)
     return share
 

@@ -214,19 +214,19 @@ def linearise(
     now: Forces, rows: ForceRows, equal_speeds: bool, system: FlowProblem
 ) -> tuple[Array, Array]:
     """Linearise the forces about the present edges: values and matrix of the quadratic model."""
-    law, of = system.law, now.solution
-    tangent, _ = edge_tangent(of, now.drift, system.model.rules)
+    of, opening, drift, derivatives = now.solution, now.solution.opening, now.drift, rows.values
+    tangent, _ = edge_tangent(of, drift, system.model.rules)
     edges = tangent.shape[0]
     for e in range(edges):
         for f in range(edges):
-            rows.values[e, f] = of.opening[e] * tangent[e, f]
-        rows.values[e, e] += of.opening[e] * now.drift[e] * (1 - 2 * (e % 2))
+            derivatives[e, f] = opening[e] * tangent[e, f]
+        derivatives[e, e] += opening[e] * drift[e] * (1 - 2 * (e % 2))
     rows.known[:] = 1
     if equal_speeds:
-        values, matrix = symmetrise(of, tangent, law.overlap_limit)
+        values, matrix = symmetrise(of, tangent, system.law.overlap_limit)
     else:
-        opening = np.maximum(of.opening, 0.0)
-        values, matrix = np.linalg.eigh(hessian(opening, now.residual, now.drift, tangent))
+        positive = np.maximum(opening, 0.0)
+        values, matrix = np.linalg.eigh(hessian(positive, now.residual, drift, tangent))
     return values, matrix
 
 

@@ -35,6 +35,8 @@ class Track:
         One for every set of gaps on the way.
     has_left, rejoined : bool
         Whether the other descent has left the track, and come back to it.
+    short_fields : int
+        Fields of the other descent that are left with short steps.
     rest : array, optional
         Gaps of a window in which the descent first came to rest.
     stages : list of Stage
@@ -48,6 +50,7 @@ class Track:
     ways: list[Array] = field(default_factory=list)
     has_left: bool = False
     rejoined: bool = False
+    short_fields: int = 0
     rest: Array | None = None
     stages: list[Stage] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)

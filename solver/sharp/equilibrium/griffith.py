@@ -73,12 +73,13 @@ def critical_opening(theta: float, law: EdgeLaw, panels: Panels) -> tuple[float,
 @compiled
 def imbalance(state: Solution, law: EdgeLaw, panels: Panels) -> tuple[Array, Array]:
     """Compute C_e - C_c at every edge, positive where contact recedes, and dC_c/dθ."""
-    edges = state.opening.shape[0]
+    opening, table = state.opening, state.nodes.table  # each access counts a reference
+    edges = opening.shape[0]
     residual = np.empty(edges)
     drift = np.empty(edges)
     for e in range(edges):
-        critical, drift[e] = critical_opening(state.nodes.table[e // 2, LEFT + e % 2], law, panels)
-        residual[e] = state.opening[e] - critical
+        critical, drift[e] = critical_opening(table[e // 2, LEFT + e % 2], law, panels)
+        residual[e] = opening[e] - critical
     return residual, drift
 
 

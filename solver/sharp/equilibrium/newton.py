@@ -140,10 +140,10 @@ def _branch_rates(
     state: Solution, tangent: Array, by_edge: Array, rules: GaussRules
 ) -> tuple[Any, float]:
     """Compute dn/dd of every edge and dY/dd along the branch, from ∂Y/∂θ of every edge."""
-    by_prescribed = -2 * np.pi / state.mean.resistance
-    unit = np.empty((state.solved.shape[0], 1))
-    for i in range(state.solved.shape[0]):
-        unit[i, 0] = -by_prescribed * state.solved[i, 1]
+    by_prescribed, solved = -2 * np.pi / state.mean.resistance, state.solved
+    unit = np.empty((solved.shape[0], 1))
+    for i in range(solved.shape[0]):
+        unit[i, 0] = -by_prescribed * solved[i, 1]
     opening = edge_openings(unit, state.nodes, rules)
     rate = np.linalg.solve(tangent, -opening[:, 0])
     slope = by_prescribed

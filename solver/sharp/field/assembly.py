@@ -62,9 +62,12 @@ def assemble_changed(
         table, old.orders, offset, old.theta.copy(), old.weight.copy(), old.slope.copy()
     )
     equations = Equations(known.matrix.copy(), known.load.copy(), known.end_terms.copy())
+    known_table = old.table
     differs = np.zeros(table.shape[0], dtype=np.bool_)
     for k in range(table.shape[0]):
-        differs[k] = not np.array_equal(table[k], old.table[k])
+        for column in range(table.shape[1]):
+            if table[k, column] != known_table[k, column]:
+                differs[k] = True
     changed: Integers = np.flatnonzero(differs)
     _fill_gaps(changed, nodes, equations, offset, model)
     sine, cosine = np.sin(0.5 * nodes.theta), np.cos(0.5 * nodes.theta)
@@ -120,17 +123,19 @@ def _fill_gaps(
     gaps: Integers, nodes: Nodes, equations: Equations, column: Integers, model: FieldModel
 ) -> None:
     """Fill in the own parts of some gaps; their blocks begin in these columns of the matrix."""
-    rules = model.rules
-    fields = equations.end_terms.shape[2]
+    rules, panels = model.rules, model.panels
+    counts, orders, offset, table = rules.counts, nodes.orders, nodes.offset, nodes.table
+    matrix, load, end_terms = equations.matrix, equations.load, equations.end_terms
+    fields = end_terms.shape[2]
     for k in gaps:
-        m = rules.counts[nodes.orders[k]]
+        m = counts[orders[k]]
         s = np.empty((m, fields))
         ends = np.empty((2, fields))
-        gap_moments(nodes.table[k], model.panels, s, ends)
-        _fill_end_terms(s, ends, equations.end_terms[k])
-        own = slice(nodes.offset[k], nodes.offset[k + 1])
-        _fill_nodes(k, s, nodes, equations.load[own], rules)
-        block = equations.matrix[own, column[k] : column[k] + m]
+        gap_moments(table[k], panels, s, ends)
+        _fill_end_terms(s, ends, end_terms[k])
+        own = slice(offset[k], offset[k + 1])
+        _fill_nodes(k, s, nodes, load[own], rules)
+        block = matrix[own, column[k] : column[k] + m]
         _fill_block(k, nodes, block, rules)
 
 
@@ -155,18 +160,20 @@ def _fill_nodes(k: int, s: Array, nodes: Nodes, load: Array, rules: GaussRules) 
     gap, order, m = nodes.table[k], nodes.orders[k], s.shape[0]
     start, square = rules.vector_start[order], rules.matrix_start[order]
     modes = rules.modes[square : square + m * m].reshape(m, m)
-    nodes.slope[k, 0] = 1 / theta_at(gap, -1.0)[1]
-    nodes.slope[k, 1] = 1 / theta_at(gap, 1.0)[1]
+    slope, theta, weight, base = nodes.slope, nodes.theta, nodes.weight, nodes.offset[k]
+    eta, weights = rules.eta, rules.weights
+    slope[k, 0] = 1 / theta_at(gap, -1.0)[1]
+    slope[k, 1] = 1 / theta_at(gap, 1.0)[1]
     for i in range(m):
-        place = nodes.offset[k] + i
-        nodes.theta[place], stretch = theta_at(gap, rules.eta[start + i])
-        nodes.weight[place] = rules.weights[start + i] * stretch
-        load[i, 1] = nodes.weight[place]
+        place = base + i
+        theta[place], stretch = theta_at(gap, eta[start + i])
+        weight[place] = weights[start + i] * stretch
+        load[i, 1] = weight[place]
         for field in range(s.shape[1]):
             total = 0.0
             for j in range(m):
                 total += modes[i, j] * s[j, field]
-            load[i, 2 * field] = rules.weights[start + i] * total
+            load[i, 2 * field] = weights[start + i] * total
 
 
 @compiled
@@ -233,9 +240,9 @@ def mapped_kernel(alpha: float, x: float) -> float:
 @compiled
 def _fill_rows(k: int, nodes: Nodes, sine: Array, cosine: Array, matrix: Array) -> None:
     """Fill in the rows of gap k outside its diagonal block."""
-    first, behind = nodes.offset[k], nodes.offset[k + 1]
+    first, behind, weight = nodes.offset[k], nodes.offset[k + 1], nodes.weight
     for i in range(first, behind):
-        _row_of_others(i, first, behind, sine, cosine, nodes.weight, matrix[i])
+        _row_of_others(i, first, behind, sine, cosine, weight, matrix[i])
 
 
 @compiled_sums

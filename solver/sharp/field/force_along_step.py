@@ -52,7 +52,8 @@ def force_derivatives(
     There is a row for each edge e. Those that are ``known``, which is not zero, are left. The
     solution must be one with S and S'.
     """
-    edges = state.opening.shape[0]
+    opening, factor = state.opening, state.factor
+    edges = opening.shape[0]
     missing = 0
     for e in wanted:
         missing += 1 if known[e] == 0 else 0
@@ -62,7 +63,7 @@ def force_derivatives(
         tangent, _ = derivatives(state, rules)
         for e in range(edges):
             for f in range(edges):
-                rows[e, f] = state.opening[e] * tangent[e, f] * (1 - 2 * (f % 2))
+                rows[e, f] = opening[e] * tangent[e, f] * (1 - 2 * (f % 2))
         known[:] = 1
         return
     together = openings_by_translation(state, rules)
@@ -73,13 +74,13 @@ def force_derivatives(
         outwards = 1 - 2 * (e % 2)
         edge[0] = e
         load, area = singular_loads(state, edge, 1, rules)
-        solve_factored(state.factor, load)
+        solve_factored(factor, load)
         by_edge, _ = openings_by_edges(state, edge, load, area, rules)
-        diagonal = state.opening[e] * together[e] * outwards
+        diagonal = opening[e] * together[e] * outwards
         for f in range(edges):
             if f != e:
                 # C_e ∂C_e/∂n_f = C_f ∂C_f/∂n_e, both n outwards
-                by = state.opening[f] * by_edge[f, 0] * outwards
+                by = opening[f] * by_edge[f, 0] * outwards
                 rows[e, f] = by
                 diagonal -= by * outwards * (1 - 2 * (f % 2))
         rows[e, e] = diagonal

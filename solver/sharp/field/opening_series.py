@@ -27,7 +27,7 @@ from adhesis.solver.sharp.gap.conformal_map import (
     theta_at,
 )
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, interpolate
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules, Integers
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules
 from adhesis.solver.sharp.gap.sine_transform import Circle, sine_sums, tabulate_circle
 from adhesis.solver.sharp.tolerances import ENERGY_NODES, FEWEST_SINE_NODES, SHAPE_NODES
 
@@ -117,8 +117,11 @@ def _fine_moments(
 
 
 @compiled
-def _work_of_high_modes(table: Array, modes_below: Integers, top: int, panels: Panels) -> float:
-    """Sum π/2 s_n²/(n+1) over the modes of all gaps above those of f, which has so many a gap."""
+def _work_of_gaps(
+    nodes: Nodes, load: Array, f: Array, rules: GaussRules, top: int, panels: Panels
+) -> float:
+    """Integrate S_full T dθ: by f, less π/2 s_n²/(n+1) of all modes above those of f."""
+    table, orders, counts = nodes.table, nodes.orders, rules.counts
     total = 0.0
     last = 0
     circle = tabulate_circle(4)
@@ -129,19 +132,20 @@ def _work_of_high_modes(table: Array, modes_below: Integers, top: int, panels: P
             last = count
         theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
         _fine_moments(table[k], panels, circle, theta, span, modes)
-        for n in range(modes_below[k], count):
+        for n in range(counts[orders[k]], count):
             total += modes[n] * modes[n] / (n + 1)
-    return np.pi / 2 * total
+    work = -np.pi / 2 * total
+    for i in range(f.shape[0]):
+        work += load[i, 0] * f[i]
+    return work
 
 
 def work_of_gaps(field: GapField) -> float:
     """Integrate S_full T dθ over the gaps."""
-    state, source = field.solution, field.source
-    nodes = state.nodes
-    high = _work_of_high_modes(
-        nodes.table, GAUSS_RULES.counts[nodes.orders], source.top, source.panels
+    of, source = field.solution, field.source
+    return _work_of_gaps(
+        of.nodes, of.equations.load, of.scaled_opening, GAUSS_RULES, source.top, source.panels
     )
-    return float(state.equations.load[:, 0] @ state.scaled_opening) - high
 
 
 @compiled

@@ -187,14 +187,15 @@ def no_solution(table: Array, orders: Integers, device: LoadingDevice) -> Soluti
 @compiled
 def edge_openings(f: Array, nodes: Nodes, rules: GaussRules) -> Array:
     """Evaluate sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
-    slope, offset = nodes.slope, nodes.offset
+    slope, offset, orders = nodes.slope, nodes.offset, nodes.orders
+    starts, end_values = rules.vector_start, rules.end_values
     out = np.zeros((2 * slope.shape[0], f.shape[1]))
     for k in range(slope.shape[0]):
-        start = rules.vector_start[nodes.orders[k]]
+        start = starts[orders[k]]
         for side in range(2):
             scale = np.sqrt(2 * slope[k, side])
             for i in range(offset[k + 1] - offset[k]):
-                factor = scale * rules.end_values[side, start + i]
+                factor = scale * end_values[side, start + i]
                 for j in range(f.shape[1]):
                     out[2 * k + side, j] += factor * f[offset[k] + i, j]
     return out

@@ -29,15 +29,16 @@ from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 def end_singularity(nodes: Nodes, e: int, rules: GaussRules) -> tuple[Array, float, float]:
     """Compute the singular opening of edge e: density at its nodes, weight at the edge, area."""
     k, side = e // 2, e % 2
-    base, m = nodes.offset[k], nodes.offset[k + 1] - nodes.offset[k]
+    offset, weight, eta = nodes.offset, nodes.weight, rules.eta
+    base, m = offset[k], offset[k + 1] - offset[k]
     start = rules.vector_start[nodes.orders[k]]
     strength = np.pi / (m + 1) / nodes.slope[k, side]
     area = strength
     density = np.empty(m)
     for j in range(m):
-        x = rules.eta[start + j]
+        x = eta[start + j]
         density[j] = 1 / (1 + x) if side == 0 else 1 / (1 - x)
-        area += nodes.weight[base + j] * density[j]
+        area += weight[base + j] * density[j]
     return density, strength, area
 
 
@@ -52,16 +53,18 @@ def own_singular_load(
     square = rules.matrix_start[order]
     crack = rules.crack[square : square + m * m].reshape(m, m)
     point = np.pi / (m + 1)
+    alpha, edge = nodes.table[k, ALPHA], nodes.table[k, LEFT + side]
+    theta, weight, eta, weights = nodes.theta, nodes.weight, rules.eta, rules.weights
+    start = rules.vector_start[order]
     out = np.empty(m)
     for i in range(m):
         total = 0.0
         for j in range(m):
             total -= (block[i, j] - crack[i, j]) * density[j]
-        place = rules.vector_start[order] + i
-        mapped = mapped_kernel(nodes.table[k, ALPHA], rules.eta[place] - (2 * side - 1))
-        images = periodic_images(nodes.theta[base + i] - nodes.table[k, LEFT + side])
-        near = rules.weights[place] * point * mapped
-        far = nodes.weight[base + i] * strength * images
+        mapped = mapped_kernel(alpha, eta[start + i] - (2 * side - 1))
+        images = periodic_images(theta[base + i] - edge)
+        near = weights[start + i] * point * mapped
+        far = weight[base + i] * strength * images
         out[i] = total + (near + far) / (4 * np.pi)
     return out
 
@@ -76,6 +79,7 @@ def singular_loads(
     exterior of a window, a gap without nodes.
     """
     nodes, matrix = state.nodes, state.equations.matrix
+    offset, table, weight = nodes.offset, nodes.table, nodes.weight
     n = nodes.theta.shape[0]
     load = np.zeros((n, columns))
     area = np.zeros(edges.shape[0])
@@ -85,13 +89,13 @@ def singular_loads(
     for c in range(edges.shape[0]):
         e = edges[c]
         k = e // 2
-        first, behind = nodes.offset[k], nodes.offset[k + 1]
+        first, behind = offset[k], offset[k + 1]
         if first == behind:
             continue
         density, strength, area[c] = end_singularity(nodes, e, rules)
         rows = matrix[first:behind]
-        edge = nodes.table[k, LEFT + e % 2]
-        _load_by_edge(rows, density, strength, edge, sine, cosine, nodes.weight, column)
+        edge = table[k, LEFT + e % 2]
+        _load_by_edge(rows, density, strength, edge, sine, cosine, weight, column)
         column[first:behind] = own_singular_load(
             nodes, e, rows[:, first:behind], density, strength, rules
         )
@@ -135,6 +139,7 @@ def openings_by_edges(
     """
     count = edges.shape[0]
     load, slope = state.equations.load, state.nodes.slope
+    solved, opening = state.solved, state.opening
     conjugate = area.copy()
     for i in range(regular.shape[0]):
         for c in range(count):
@@ -145,13 +150,13 @@ def openings_by_edges(
         conjugate /= state.mean.resistance
         for i in range(regular.shape[0]):
             for c in range(count):
-                regular[i, c] -= state.solved[i, 1] * conjugate[c]
+                regular[i, c] -= solved[i, 1] * conjugate[c]
     by_edge = edge_openings(regular, state.nodes, rules)[:, :count].copy()
     for c in range(count):
         f = edges[c]
         k, side = f // 2, f % 2
         by_edge[f ^ 1, c] += 0.5 * np.sqrt(2 * slope[k, 1 - side])  # the singular opening's far end
-        strength = (2 * side - 1) * state.opening[f] * np.sqrt(slope[k, side] / 8)
+        strength = (2 * side - 1) * opening[f] * np.sqrt(slope[k, side] / 8)
         conjugate[c] *= strength
         for e in range(by_edge.shape[0]):
             by_edge[e, c] *= strength
@@ -161,15 +166,16 @@ def openings_by_edges(
 @compiled
 def openings_by_translation(state: Solution, rules: GaussRules) -> Array:
     """Compute the derivatives of all openings when all edges move together against the profile."""
-    n = state.solved.shape[0]
+    load, solved = state.equations.load, state.solved
+    n = solved.shape[0]
     drift = 0.0
     for i in range(n):
-        drift -= state.equations.load[i, 1] * state.solved[i, 2]
+        drift -= load[i, 1] * solved[i, 2]
     drift += state.exterior.shift
     drift = state.mean.separation_weight * drift / state.mean.resistance
     moving = np.empty((n, 1))
     for i in range(n):
-        moving[i, 0] = -state.solved[i, 2] - drift * state.solved[i, 1]
+        moving[i, 0] = -solved[i, 2] - drift * solved[i, 1]
     opening = edge_openings(moving, state.nodes, rules)[:, 0].copy()
     subtract_end_terms(opening, state.nodes.slope, state.equations.end_terms, 1)
     return opening

@@ -84,25 +84,27 @@ def _end_piece(
     scale = 1 / gap[ALPHA]
     nearer = nodes[_PLUS - side]
     farther = nodes[_MINUS + side]
+    stress = nodes[_STRESS]
+    x, w, end_x, end_w = panels.x, panels.w, panels.end_x, panels.end_w
     begin = 0.0
     stop = min(length, near)
     while begin < length:
         first = begin == 0.0
-        rule = panels.end_x.shape[0] if first else panels.x.shape[0]
+        rule = end_x.shape[0] if first else x.shape[0]
         # distances from the end, and from where the logarithm of the map is known
         if first:
             # the square root at the end becomes smooth in y
             known, known_distance = 0.0, 0.0
             for i in range(rule):
-                y = panels.end_x[i]
+                y = end_x[i]
                 farther[count + i] = y * y * stop
-                nodes[_STRESS, count + i] = 2 * y * panels.end_w[i] * stop
+                stress[count + i] = 2 * y * end_w[i] * stop
         else:
             known, half = 0.5 * (begin + stop), 0.5 * (stop - begin)
             known_distance = 0.5 * scale * log_ratio(known, near, far)
             for i in range(rule):
-                farther[count + i] = known + half * panels.x[i]
-                nodes[_STRESS, count + i] = half * panels.w[i]
+                farther[count + i] = known + half * x[i]
+                stress[count + i] = half * w[i]
         a = near + known
         b = far - known
         d = stop - known
@@ -137,6 +139,7 @@ def _weigh_by_source(
     origin = (gap[LEFT] if side == 0 else gap[RIGHT]) / panels.width
     per = (1 if side == 0 else -1) / panels.width
     last = panels.finest - 1
+    stress, slope = panels.stress, panels.slope
     both = nodes.shape[0] > _SLOPE
     for i in range(first, behind, 2):
         place = origin + per * distance[i]
@@ -145,27 +148,25 @@ def _weigh_by_source(
         other_k = int(np.floor(other_place))
         x = 2 * (place - k) - 1
         y = 2 * (other_place - other_k) - 1
-        c = panels.stress[k & last]
-        e = panels.stress[other_k & last]
+        k &= last
+        other_k &= last
         b1 = b2 = e1 = e2 = 0.0
         if both:
-            f = panels.slope[k & last]
-            g = panels.slope[other_k & last]
             f1 = f2 = g1 = g2 = 0.0
-            for j in range(c.shape[0] - 1, 0, -1):
-                b1, b2 = 2 * x * b1 - b2 + c[j], b1
-                e1, e2 = 2 * y * e1 - e2 + e[j], e1
-                f1, f2 = 2 * x * f1 - f2 + f[j], f1
-                g1, g2 = 2 * y * g1 - g2 + g[j], g1
+            for j in range(stress.shape[1] - 1, 0, -1):
+                b1, b2 = 2 * x * b1 - b2 + stress[k, j], b1
+                e1, e2 = 2 * y * e1 - e2 + stress[other_k, j], e1
+                f1, f2 = 2 * x * f1 - f2 + slope[k, j], f1
+                g1, g2 = 2 * y * g1 - g2 + slope[other_k, j], g1
             weight, other_weight = nodes[_STRESS, i], nodes[_STRESS, i + 1]
-            nodes[_SLOPE, i] = weight * (x * f1 - f2 + f[0])
-            nodes[_SLOPE, i + 1] = other_weight * (y * g1 - g2 + g[0])
+            nodes[_SLOPE, i] = weight * (x * f1 - f2 + slope[k, 0])
+            nodes[_SLOPE, i + 1] = other_weight * (y * g1 - g2 + slope[other_k, 0])
         else:
-            for j in range(c.shape[0] - 1, 0, -1):
-                b1, b2 = 2 * x * b1 - b2 + c[j], b1
-                e1, e2 = 2 * y * e1 - e2 + e[j], e1
-        nodes[_STRESS, i] *= x * b1 - b2 + c[0]
-        nodes[_STRESS, i + 1] *= y * e1 - e2 + e[0]
+            for j in range(stress.shape[1] - 1, 0, -1):
+                b1, b2 = 2 * x * b1 - b2 + stress[k, j], b1
+                e1, e2 = 2 * y * e1 - e2 + stress[other_k, j], e1
+        nodes[_STRESS, i] *= x * b1 - b2 + stress[k, 0]
+        nodes[_STRESS, i + 1] *= y * e1 - e2 + stress[other_k, 0]
 
 
 @compiled_sums
@@ -182,8 +183,8 @@ def _panel_nodes(
     A panel is no longer than its distance from either end, so the logarithm of the map differs at
     its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
     """
-    p = panels.x.shape[0]
-    width = panels.width
+    x, weights, width = panels.x, panels.weights, panels.width
+    p = x.shape[0]
     length = gap[RIGHT] - gap[LEFT]
     scale = 1 / (2 * gap[ALPHA])
     above = np.empty(tiled * p)
@@ -198,7 +199,7 @@ def _panel_nodes(
         a = near + centre
         b = far - centre
         for i in range(p):
-            d = half * panels.x[i]
+            d = half * x[i]
             above[tile * p + i] = d * (a + b)
             below[tile * p + i] = 2 * a * b + d * (b - a)
     # the costly part over all panels at once: the processor's vectors are wider than a panel's loop
@@ -219,10 +220,10 @@ def _panel_nodes(
             value = distance + above[tile * p + i]
             nearer[count + i] = value
             farther[count + i] = 2 - value
-            nodes[_STRESS, count + i] = panels.weights[0, row, i]
+            nodes[_STRESS, count + i] = weights[0, row, i]
         if nodes.shape[0] > _SLOPE:
             for i in range(p):
-                nodes[_SLOPE, count + i] = panels.weights[1, row, i]
+                nodes[_SLOPE, count + i] = weights[1, row, i]
         count += p
     return count
 

@@ -146,11 +146,15 @@ class StressSource:
         width, stress, slope = self.panels.width, self.panels.stress, self.panels.slope
         return np.stack([interpolate(at, width, stress), interpolate(at, width, slope)], axis=1)
 
-    def measure_between(self, left: Array, right: Array) -> float:
-        """Sum ∫ sqrt(1 + h'²) dθ from ``left`` to ``right`` over the intervals."""
-        return _measure_between(
-            left, right, self._measure_before, self.panels.tilt, self._piece_x, self._piece_w
+    def contact_between(self, gaps: Array) -> tuple[Array, float]:
+        """Return the patches between gaps, and the sum of ∫ sqrt(1 + h'²) dθ over them.
+
+        Patches have shape (L, 2), by their left edges, which lie in [0, 2π).
+        """
+        patches, measure = _contact_between(
+            gaps, self._measure_before, self.panels.tilt, self._piece_x, self._piece_w
         )
+        return patches, measure
 
 
 def _to_chebyshev(nodes: Array) -> Array:
@@ -256,18 +260,22 @@ def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, 
 
 
 @compiled
-def _measure_between(
-    left: Array, right: Array, before: Array, tilt: Array, nodes: Array, w: Array
-) -> float:
-    """Sum as :meth:`StressSource.measure_between`; ``before`` is the measure before each panel."""
+def _contact_between(
+    gaps: Array, before: Array, tilt: Array, nodes: Array, w: Array
+) -> tuple[Array, float]:
+    """Measure as :meth:`StressSource.contact_between`; ``before`` is the measure before a panel."""
     count = tilt.shape[0]
     width = 2 * np.pi / count
     panel = np.empty(2, dtype=np.int64)
     share = np.empty(2)
+    patches = np.empty_like(gaps)
     total = 0.0
-    for i in range(left.shape[0]):
+    first = 0
+    for i in range(gaps.shape[0]):
+        patches[i, 0] = gaps[i - 1, 1] if i > 0 else gaps[-1, 1] - 2 * np.pi
+        patches[i, 1] = gaps[i, 0]
         for end in range(2):
-            theta = left[i] if end == 0 else right[i]
+            theta = patches[i, end]
             turns = np.floor(theta / (2 * np.pi))
             place = (theta - turns * 2 * np.pi) / width
             panel[end] = min(max(int(place), 0), count - 1)
@@ -275,4 +283,7 @@ def _measure_between(
             total += (2 * end - 1) * (turns * before[count] + before[panel[end]])
         part = _lengths(panel, share, tilt, nodes, w)
         total += (part[1] - part[0]) * width
-    return total
+        patches[i] -= np.floor(patches[i, 0] / (2 * np.pi)) * 2 * np.pi
+        if patches[i, 0] < patches[first, 0]:
+            first = i
+    return np.concatenate((patches[first:], patches[:first])), total

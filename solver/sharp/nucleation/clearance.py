@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
@@ -50,6 +49,27 @@ class Seen(NamedTuple):
     clearance: Array
 
 
+class Left(NamedTuple):
+    """Clearance that is left of gaps that were seen.
+
+    Attributes
+    ----------
+    clearance : array, shape (L,)
+        Negative where a gap has to be looked at.
+    place : int array, shape (L,)
+        Place of each gap among those seen; negative where it has to be looked at.
+    fresh : int array
+        The gaps that have to be looked at.
+    is_same : bool
+        Whether there are none, and no gap has gone.
+    """
+
+    clearance: Array
+    place: Integers
+    fresh: Integers
+    is_same: bool
+
+
 NOT_SEEN = Seen(
     np.empty((0, 2)), np.empty(0, dtype=np.int64), np.zeros(1, dtype=np.int64), np.empty(0),
     np.empty(0), np.empty(0),
@@ -76,22 +96,17 @@ class Clearances:
         self._near, self._beside = COMPARABLE * wave, critical / np.sqrt(wave)
         self.seen = NOT_SEEN
 
-    def left(self, field: GapField) -> tuple[Array, NDArray[np.int64]]:
-        """Clearance that is surely left in each gap, negative if it has to be looked at.
-
-        And the place of each gap among those seen, for :meth:`note`.
-        """
+    def left(self, field: GapField) -> Left:
+        """Return the clearance that is surely left in each gap."""
         of = field.solution
-        left, place = clearance_left(
+        left: Left = clearance_left(
             field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, self._near,
             self._beside,
         )  # fmt: skip
-        return left, place
+        return left
 
-    def note(self, field: GapField, place: NDArray[np.int64], clearance: Array) -> None:
+    def note(self, field: GapField, place: Integers, clearance: Array) -> None:
         """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
-        if len(place) == len(self.seen.gaps) and (place == np.arange(len(place))).all():
-            return  # nothing was looked at, and no gap has gone
         of = field.solution
         self.seen = noted(
             field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, place, clearance
@@ -130,7 +145,7 @@ def clearance_left(
     seen: Seen,
     near: float,
     beside: float,
-) -> tuple[Array, Integers]:
+) -> Left:
     """As :meth:`Clearances.left`; ``beside`` is the closing beside an edge for its motion."""
     orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
     left = np.full(gaps.shape[0], -1.0)
@@ -174,7 +189,9 @@ def clearance_left(
         if rest > CLEARANCE_LEFT * clearance:
             left[k] = rest if seen.clearance[j] < np.inf else np.inf
             place[k] = j
-    return left, place
+    fresh: Integers = np.flatnonzero(place < 0)
+    is_same = gaps.shape[0] == seen.gaps.shape[0] and fresh.shape[0] == 0
+    return Left(left, place, fresh, is_same)
 
 
 @compiled

@@ -139,14 +139,14 @@ class Nucleation:
 
         Only those are looked at; see ``clearance``.
         """
-        left, place = self.clearances.left(field)
-        fresh = np.flatnonzero(place < 0)
+        left, place, fresh, is_same = self.clearances.left(field)
         minima = NO_MINIMA
         if fresh.size > 0:
             minima, where = self.minima(field, fresh)
             left[fresh] = np.inf
             np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
-        self.clearances.note(field, place, left)
+        if not is_same:
+            self.clearances.note(field, place, left)
         return float(left.min()), minima
 
     @property
@@ -172,8 +172,7 @@ class Nucleation:
 
     def tracked(self, clear: Point, hit: Point) -> TrackedGaps | None:
         """Track the gaps that are open at one point and overlap at another."""
-        left, _ = self.clearances.left(hit.field)
-        closed = np.flatnonzero(left <= 0)
+        closed = np.flatnonzero(self.clearances.left(hit.field).clearance <= 0)
         after = self._clearance_of(hit.field, closed)
         closed, after = closed[after < 0], after[after < 0]
         if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:

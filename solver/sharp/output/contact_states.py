@@ -11,7 +11,7 @@ from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
-from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
@@ -29,15 +29,16 @@ class Memory:
         The ends of its gaps.
     clearance : float
         Of them (``Point.clearance``).
-    course : tuple of float, array, float, optional
-        Where a path stopped at it: d, dn/dd of every edge and dY/dd, as in ``Point``.
+    course : tuple of float, array, float, PreviousPoint or None, optional
+        Where a path stopped at it: d, dn/dd of every edge, dY/dd and the point before it, as in
+        ``Point``.
     seen : Seen
         The gaps as they were when they were last looked at.
     """
 
     gaps: Array
     clearance: float
-    course: tuple[float, Array, float] | None = None
+    course: tuple[float, Array, float, PreviousPoint | None] | None = None
     seen: Seen = NOT_SEEN
 
 
@@ -130,23 +131,17 @@ class States:
             separation = at / self.q0
         mean_stress = gap_field.pressure * half
         gaps = gap_field.gaps
-        left, right = np.empty(len(gaps)), gaps[:, 0]  # of the patch before each gap
-        left[0], left[1:] = gaps[-1, 1] - 2 * np.pi, gaps[:-1, 1]
-        measure = self.source.measure_between(left, right)
-        turn = np.floor(left / (2 * np.pi)) * 2 * np.pi
-        patches = np.empty(gaps.shape)
-        patches[:, 0], patches[:, 1] = left - turn, right - turn
-        patches /= self.q0
+        patches, measure = self.source.contact_between(gaps)
         elastic = (
             self._full_energy + 0.5 * work_of_gaps(gap_field) - np.pi * at * gap_field.pressure
         )
         return ContactState(
             separation=separation,
-            edges=patches[patches[:, 0].argsort()],
+            edges=patches / self.q0,
             mean_stress=mean_stress,
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
-            contact_fraction=float((right - left).sum() / (2 * np.pi)),
+            contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
             stiffness=slope * self._per_prescribed,
             hold_energy=self._hold_energy(separation, mean_stress),
             internal=Memory(gaps, clearance),
