@@ -60,7 +60,7 @@ class RefinedTension:
     def maximum(self, theta: float, step: float) -> tuple[float, float] | None:
         """Place and value of a local maximum within some steps of ``theta``; None without one."""
         for _ in range(_MOVES + 1):
-            if not (self.inside(theta - step) and self.inside(theta + step)):
+            if not self.inside(theta) or self.edge_distance(theta) <= step:
                 return None
             places = theta + step * np.linspace(-1, 1, _POINTS)
             values = self.at(places)

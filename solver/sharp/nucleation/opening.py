@@ -131,7 +131,17 @@ class Openings:
             self.strength,
             balanced=0.5 * critical**2 * measure,  # γ = π E* C_c²/(16 q0), σ = E* S/2
             toughness=measure,
-            tension_at=refined.at,
+            release=lambda half: self._release(field, theta, half),
             shortest=0.5 * SHORTEST_CRACK * wave,
             longest=min(LONGEST * wave, IN_PATCH * refined.edge_distance(theta)),
         )
+
+    def _release(self, field: GapField, theta: float, half: float) -> float:
+        """Compute G/γ of a crack that is put into the patches of a field."""
+        gaps = with_gaps(field.gaps, np.array([theta]), np.array([2 * half]))
+        middle = (gaps.mean(axis=1) - theta + np.pi) % (2 * np.pi) - np.pi
+        crack = int(np.argmin(np.abs(middle)))
+        opening = self.edges.field(gaps, field.prescribed).opening[crack]
+        panels = field.source.panels
+        critical = [self.edges.critical**2 * measure_at(end, panels)[0] for end in gaps[crack]]
+        return float((np.maximum(opening, 0.0) ** 2 / critical).min())
