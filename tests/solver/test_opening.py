@@ -168,10 +168,12 @@ def test_grid_and_sharp_agree():
 
 
 def judged(tension, strength=1.0, balanced=0.01, shortest=1e-3, longest=1.0, bend=0.0):
-    return judge_maximum(
-        0.0, tension, strength, balanced, 1.0, lambda x: tension * (1 - bend * x**2), shortest,
-        longest,
-    )  # fmt: skip
+    """A crack in the tension σ(1 - bend x²), the mean of which over its angle is σ(1 - bend a²/2)."""
+
+    def release(half):
+        return half * (tension * max(0.0, 1 - bend * half**2 / 2)) ** 2 / balanced
+
+    return judge_maximum(0.0, tension, strength, balanced, 1.0, release, shortest, longest)
 
 
 def test_a_crack_in_a_uniform_tension_is_griffiths_and_its_barrier_the_closed_form():

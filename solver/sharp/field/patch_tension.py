@@ -1,7 +1,7 @@
 """Tension inside patches, of one field: at equally spaced nodes, and refined at single places.
 
-S = S_full + p + |D| T is first taken on equally spaced nodes, eight to a shortest wave, by Fourier
-transforms: the square roots of T at its edges leave an error there that falls as the distance to
+S = S_full + p + |D| T is first taken on equally spaced nodes, eight or more to a shortest wave, by
+Fourier transforms: the square roots of T at its edges leave an error there that falls as the distance to
 the power -2, below a hundredth of the singular stress one wave away. It finds the local maxima of
 tension; the largest of them are then verified and refined by the quadrature of
 ``grid_fields``, which is exact to rounding.
@@ -17,7 +17,6 @@ from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.opening_series import GapOpening, fine_opening
 
-_PER_WAVE = 8  # nodes per shortest wave, at least
 _COARSE = 4.0  # sine nodes per shortest wave of the openings at nodes; the verification has more
 _POINTS = 17  # places between the neighbours of a node at which its maximum is refined
 _MOVES = 2  # steps of a node by which the maximum may lie beside the candidate
@@ -83,6 +82,8 @@ class NodalTension:
     Parameters
     ----------
     profile : Profile
+    per_wave : int
+        Nodes per shortest wave, at least.
 
     Attributes
     ----------
@@ -90,8 +91,8 @@ class NodalTension:
         Distance of the nodes in θ; the first lies at θ = 0.
     """
 
-    def __init__(self, profile: Profile) -> None:
-        self._n = n = 1 << int(np.ceil(np.log2(_PER_WAVE * profile.highest_harmonic)))
+    def __init__(self, profile: Profile, per_wave: int = 8) -> None:
+        self._n = n = 1 << int(np.ceil(np.log2(per_wave * profile.highest_harmonic)))
         self.step = 2 * np.pi / n
         self._harmonic = harmonic = np.arange(n // 2 + 1)
         self._full = np.zeros(n // 2 + 1, dtype=np.complex128)  # S_full
