@@ -79,8 +79,9 @@ def draw(seed: int, number: int, strength: bool = False) -> Scene:
         return scene
     rng = np.random.default_rng([seed, number, 1])
     g = 10 ** rng.uniform(-4.5, -0.5)
-    ratio = max(1, min(scene.ratio, (12 if g < _WEAK else 40) // scene.n0))
-    depth = max(scene.max_penetration, float(rng.uniform(0.3, 0.99)))
+    most = 12 if g < _WEAK else 40
+    ratio = max(2, min(scene.ratio, most // scene.n0))  # a single wave has no tension inside
+    depth = max(scene.max_penetration, float(rng.uniform(0.6, 0.99)))
     weakness = float(rng.uniform(-0.1, 1))
     return replace(scene, g=float(g), ratio=ratio, max_penetration=depth, weakness=weakness)
 

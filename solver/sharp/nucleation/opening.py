@@ -24,7 +24,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.patch_tension import NodalTension, RefinedTension
+from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 from adhesis.solver.sharp.gap.ends import with_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import measure_at
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -63,9 +63,7 @@ class Openings:
         self.strength = problem.strength / (problem.half_space.modulus / 2)
         self.healed: list[Crack] = []
         self.heals = 0
-        # A strength may be a small part of the stress that flattens the profile: its parabolas miss
-        # a maximum by 1e-2 of that stress with eight nodes to a wave, by 4e-5 with so many.
-        self._nodal = NodalTension(problem.profile, 32) if self.is_possible else None
+        self._nodal = nodal_tension(problem) if self.is_possible else None
 
     @property
     def is_possible(self) -> bool:
