@@ -153,7 +153,7 @@ class SharpMethod(Method):
         self.resolution = Resolution(
             jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
             bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**1.25),
-            work=0.02 * WORK_OF_STEP * accuracy * problem.work_of_adhesion if opens else math.inf,
+            work=WORK_OF_STEP * accuracy * problem.work_of_adhesion if opens else math.inf,
             h_max=h_max,
             finest=finest * h_max,
             late=LATE_DROP * accuracy,

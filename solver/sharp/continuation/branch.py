@@ -211,8 +211,8 @@ class Branch:
     def _work_error(self, output: Point, point: Point) -> float:
         """Difference of work and energy since the last output, in units of what is allowed.
 
-        Not known where the field is not that of all edges; not asked for in steps as short as the
-        resolution of jumps, where it is the error of the fields.
+        Not known where the field is not that of all edges. Not asked for in steps much shorter than
+        the resolution of jumps, where it is the error of the fields.
         """
         short = abs(point.at - output.at) < 0.1 * self._resolution.jump
         if self._imbalance is None or short or isinstance(point, LocalPoint):
