@@ -6,14 +6,14 @@ uniform tension σ that is the length of Griffith's crack,
     l = 4 E*γ/(πσ²),
 
 from which on G = K²/(2E*) exceeds γ, K² = πσ²l/2. Up to there the energy rises by γl/2: a barrier,
-which an interface of finite range does not have. Where tension falls away from its maximum, K of a
-crack of the half-length a is that of the mean of σ over its angle φ, x = a cos φ from its middle
-(:func:`release_rate`).
+which an interface of finite range does not have.
 
-Put into a patch is the shortest crack whose G exceeds γ by a tenth, so that it surely grows. Both
-conditions have to hold, strength and growth, as in finite fracture mechanics (D. Leguillon, Eur. J.
-Mech. A 21, 61, 2002). Where no crack that fits grows, tension is so peaked that an interface would
-only yield there, and nothing opens.
+Put into a patch is the shortest crack whose G exceeds γ by a tenth at both tips, so that it grows.
+G is that of the field with the crack, all other edges being held: other gaps and the control change
+it, and so does a tension that falls away from its maximum. Both conditions have to hold, strength
+and growth, as in finite fracture mechanics (D. Leguillon, Eur. J. Mech. A 21, 61, 2002). Where no
+crack that fits grows, tension is so peaked that an interface would only yield there, and nothing
+opens.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from adhesis.solver.model.profile import Array
 
 GROWTH = 1.1
 """G/γ of the crack that is put into a patch."""
@@ -40,8 +38,6 @@ HEALED_TENSION = 1.01
 """A crack that closed again is tried again from this multiple of its tension on."""
 
 _RATIO = 1.1  # of the lengths of cracks that are tried one after the other
-_NODES = 12  # places of a crack at which the tension of the unbroken patch is taken
-_COSINES = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
 
 
 @dataclass(frozen=True)
@@ -76,30 +72,13 @@ def griffith_length(tension: float, modulus: float, work_of_adhesion: float) -> 
     return 4 * modulus * work_of_adhesion / (math.pi * tension**2)
 
 
-def release_rate(half: Array, tension_at: Callable[[Array], Array], position: float) -> Array:
-    """Compute a σ̄(a)² of cracks in the tension of an unbroken patch: G over π/(2E*).
-
-    Parameters
-    ----------
-    half : array
-        Half-lengths a.
-    tension_at : callable
-        Tension at some places.
-    position : float
-        Middle of the cracks.
-    """
-    places = position + np.multiply.outer(half, _COSINES)
-    mean = tension_at(places.ravel()).reshape(places.shape).mean(axis=1)
-    return np.asarray(half * np.maximum(mean, 0.0) ** 2)
-
-
 def judge_maximum(
     position: float,
     tension: float,
     strength: float,
     balanced: float,
     toughness: float,
-    tension_at: Callable[[Array], Array],
+    release: Callable[[float], float],
     shortest: float,
     longest: float,
 ) -> Crack:
@@ -112,39 +91,39 @@ def judge_maximum(
     strength : float
         In the same units.
     balanced : float
-        a σ² at which G = γ there.
+        a σ² at which G = γ there, under a uniform tension.
     toughness : float
         sqrt(1 + h'²) there: γ of a unit of length.
-    tension_at : callable
-        Tension at other places of the patch.
+    release : callable
+        Returns G/γ of the crack of a half-length, the smaller of those at its two tips.
     shortest, longest : float
         Half-lengths between which a crack is looked for.
     """
     share = tension / strength
-    griffith = balanced / tension**2
-    first = max(shortest, GROWTH * griffith)
+    first = max(shortest, GROWTH * balanced / tension**2)
     if share < 1:
         return Crack(position, share, 1 - share)
     if first > longest:
         return Crack(position, share, first / longest - 1)
+    half, rate = [0.0], [0.0]
+    while first <= longest and max(rate) < GROWTH * share**2:
+        half.append(first)
+        rate.append(release(first))
+        first *= _RATIO
+    value = max(1 - share, 1 - math.sqrt(max(rate) / GROWTH))
+    if value > 0:
+        return Crack(position, share, value)
+    grows = int(np.argmax(np.array(rate) >= GROWTH))
+    barrier = toughness * _barrier(half[: grows + 1], rate[: grows + 1])
+    return Crack(position, share, value, 2 * half[grows], barrier)
 
-    def release(half: Array) -> Array:
-        return release_rate(half, tension_at, position) / balanced
 
-    steps = int(np.log(longest / first) / np.log(_RATIO))
-    half = np.asarray(first * _RATIO ** np.arange(steps + 1), dtype=np.float64)
-    found = release(half)
-    grows = np.flatnonzero(found >= GROWTH)
-    if not grows.size:
-        return Crack(position, share, 1 - math.sqrt(found.max() / GROWTH))
-    end = float(half[grows[0]])
-    # up to the half-length at which G = γ
-    steps = max(int(np.log(end / griffith) / np.log(_RATIO)), 0)
-    half = np.append(griffith * _RATIO ** np.arange(steps + 1), end)
-    balance = float(half[np.argmax(release(half) >= 1)])
-    way: Array = balance * np.linspace(0, 1, _NODES + 1)
-    barrier = 2 * toughness * float(np.trapezoid(1 - release(way), way))
-    return Crack(position, share, 1 - share, 2 * end, barrier)
+def _barrier(half: list[float], rate: list[float]) -> float:
+    """Integrate 2(1 - G/γ) over the half-length of a crack, up to that at which G = γ."""
+    last = int(np.argmax(np.array(rate) >= 1))
+    share = (1 - rate[last - 1]) / (rate[last] - rate[last - 1])
+    way = [*half[:last], half[last - 1] + share * (half[last] - half[last - 1])]
+    return 2 * float(np.trapezoid([1 - g for g in rate[:last]] + [0.0], way))
 
 
 def largest_excess(cracks: list[Crack]) -> list[Crack]:

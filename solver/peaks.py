@@ -13,7 +13,8 @@ LEAST_PROMINENCE = 0.01
 def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
     """Return the places of the highest maxima above ``least``, the highest first.
 
-    The prominence of a maximum is its height above the higher one of the two minima between which
+    The height of a maximum is that of the parabola through it and its neighbours: where values have
+    large and steep minima a maximum can lie well above all values. The prominence of a maximum is its height above the higher one of the two minima between which
     it is the largest value; it is no maximum unless its neighbours have values.
 
     Parameters
@@ -29,12 +30,16 @@ def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
     start = int(nothing[0]) if nothing.size else 0
     row = np.concatenate([values[start:], values[:start], values[start : start + 1]])
     here, before, after = row[1:-1], row[:-2], row[2:]
-    tops = 1 + np.flatnonzero((here > before) & (here >= after) & (here > least))
+    tops = 1 + np.flatnonzero((here > before) & (here >= after))
+    left, right = row[tops] - row[tops - 1], row[tops] - row[tops + 1]
+    height = row[tops] + (left - right) ** 2 / (8 * (left + right))
+    tops, height = tops[height > least], height[height > least]
     found: list[int] = []
-    for top in tops[np.argsort(-row[tops], kind="stable")].tolist():
+    order = np.argsort(-height, kind="stable")
+    for top, high in zip(tops[order].tolist(), height[order].tolist(), strict=True):
         sides = row[:top][::-1], row[top + 1 :]
         base = max(_least_before_higher(side, row[top]) for side in sides)
-        if row[top] - base >= LEAST_PROMINENCE * row[top]:
+        if high - base >= LEAST_PROMINENCE * high:
             found.append((start + top) % len(values))
             if len(found) == most:
                 break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,6 +19,7 @@ from adhesis import (
     self_affine_profile,
 )
 from adhesis.solver.method import ContactState, PathError
+from adhesis.solver.model.problem import LONGEST_CRACK
 from adhesis.solver.model.profile import Amplitudes
 from adhesis.solver.registry import MethodName
 from adhesis.solver.sharp.method import SharpMethod
@@ -30,13 +32,16 @@ _LOOKED_AT = 6  # states, and those at jumps
 _MOST_NODES = 3000  # of the independent openings
 _OVERLAP = 1e-6
 _TENSION = 1e-3  # of the strength
+_DECADES = 1e-4  # least strength that is drawn, of the largest tension without openings
 
 
 @dataclass(frozen=True)
 class Scene:
     """One hostile loop; γ is ``g`` times E* h_rms² q0 n0.
 
-    The strength is that of a Griffith crack ``crack`` shortest waves long; infinite for 0.
+    ``strength`` in Pa. ``weakness`` places it between the largest tension inside patches of the
+    loop without openings (0) and the least strength that is allowed (1); :func:`weakened` makes it
+    of that. Patches stay closed at -1.
     """
 
     hurst: float
@@ -49,7 +54,8 @@ class Scene:
     max_penetration: float
     load_steps: int
     accuracy: float
-    crack: float = 0.0
+    weakness: float = -1.0
+    strength: float = math.inf
 
     def problem(self) -> Problem:
         """Period 2 mm, E = 1 MPa, ν = 0.5."""
@@ -59,24 +65,46 @@ class Scene:
         )  # fmt: skip
         half_space = HalfSpace(1e6, 0.5)
         gamma = self.g * half_space.modulus * self.h_rms**2 * profile.q0 * self.n0
-        if self.crack == 0:
-            return Problem(profile, half_space, gamma)
-        length = self.crack * profile.shortest_wavelength
-        strength = np.sqrt(4 * half_space.modulus * gamma / (np.pi * length))
-        return Problem(profile, half_space, gamma, strength=float(strength))
+        return Problem(profile, half_space, gamma, strength=self.strength)
 
 
 def draw(seed: int, number: int, strength: bool = False) -> Scene:
     """Draw the scene of a number: mostly few waves, one in fifty up to 250.
 
     Where adhesion is weak, thousands of fields go into each jump: few crests there. With
-    ``strength`` the range of adhesion is drawn over four decades, up to the largest allowed.
+    ``strength`` adhesion is mostly weak, as patches open from inside only there.
     """
     scene = _draw(np.random.default_rng([seed, number]))
     if not strength:
         return scene
-    ranges = 10 ** np.random.default_rng([seed, number, 1]).uniform(-4, 0)
-    return replace(scene, crack=0.249 * float(ranges) ** 2)
+    rng = np.random.default_rng([seed, number, 1])
+    g = 10 ** rng.uniform(-4.5, -0.5)
+    most = 12 if g < _WEAK else 40
+    ratio = max(2, min(scene.ratio, most // scene.n0))  # a single wave has no tension inside
+    depth = max(scene.max_penetration, float(rng.uniform(0.6, 0.99)))
+    weakness = float(rng.uniform(-0.1, 1))
+    return replace(scene, g=float(g), ratio=ratio, max_penetration=depth, weakness=weakness)
+
+
+def weakened(scene: Scene) -> Scene:
+    """Return a scene with the strength of its ``weakness``, at which patches open from inside.
+
+    The range of adhesion is at most four decades above that which keeps all patches closed.
+    """
+    if scene.weakness == -1:
+        return scene
+    problem = scene.problem()
+    inside = run_loop(
+        SharpMethod(problem, accuracy=1e-2),
+        max_penetration=scene.max_penetration,
+        load_steps=scene.load_steps,
+    ).largest_interior_tension
+    longest = LONGEST_CRACK * problem.profile.shortest_wavelength * (1 - 1e-9)
+    modulus, gamma = problem.half_space.modulus, problem.work_of_adhesion
+    least = max(float(np.sqrt(4 * modulus * gamma / (np.pi * longest))), _DECADES * inside)
+    if inside <= least:
+        return replace(scene, strength=least)
+    return replace(scene, strength=inside * (least / inside) ** scene.weakness)
 
 
 def _draw(rng: np.random.Generator) -> Scene:
@@ -107,8 +135,8 @@ def _draw(rng: np.random.Generator) -> Scene:
 
 def follow(
     scene: Scene, accuracy: float, name: MethodName = "sharp"
-) -> tuple[LoopResult, list[str]]:
-    """Loop of a scene, and what is wrong with it."""
+) -> tuple[LoopResult, list[str], dict[str, float]]:
+    """Follow a loop; return it, what is wrong with it, and what is known of the tension inside."""
     problem = scene.problem()
     method = make_method(name, problem, accuracy=accuracy)
     states: list[ContactState] = []
@@ -118,33 +146,41 @@ def follow(
         load_steps=scene.load_steps,
         on_state=lambda _, state: states.append(state),
     )
-    wrong = _of_loop(loop)
+    wrong, found = _of_loop(loop), {}
     if isinstance(method, SharpMethod):
-        wrong += [*_of_states(method, states), *_of_tension(method, loop, states)]
-    return loop, wrong
+        wrong += _of_states(method, states)
+        if math.isfinite(problem.strength):
+            excess, late = tension_of(method, loop, states)
+            found |= {"excess": excess, "late": late, "healed": method.follower.openings.heals}
+            if late > _TENSION:
+                wrong.append(f"a patch is late to open by {late:.1e} of the strength")
+    return loop, wrong, found
 
 
-def _excess(loop: LoopResult) -> float:
-    """Largest tension inside patches over the strength."""
-    return loop.largest_interior_tension / loop.problem.strength
+def tension_of(
+    method: SharpMethod, loop: LoopResult, states: list[ContactState]
+) -> tuple[float, float]:
+    """Return the largest tension inside patches, and by how much states are late to open.
 
-
-def _of_tension(method: SharpMethod, loop: LoopResult, states: list[ContactState]) -> list[str]:
-    """What is wrong with the tension inside patches: it exceeds the strength and nothing opens.
-
-    Not judged are states from which patches open, maxima so peaked that no crack grows, and loops
-    in which a crack closed again.
+    Both in units of the strength. A state is late where a crack grows: by the lesser of the excesses
+    of the tension and of the root of G. Two jumps at one place have a state between them, which is left out where
+    the second is an opening: at the first nothing opened there yet.
     """
-    if method.follower.openings.heals:
-        return []
-    opened = {jump.separation for jump in loop.jumps if jump.kind == "opening"}
-    worst = 0.0
+    openings = method.follower.openings
+    openings.healed = []
+    opened = {(j.separation, j.contact_before) for j in loop.jumps if j.kind == "opening"}
+    largest = late = 0.0
+    before = None
     for state in states:
-        if state.patches and state.separation not in opened:
-            field = method.edges.field(state.internal.gaps, method.states.place(state))
-            worst = min(worst, method.follower.openings.least(field)[0])
-    exceeded = f"tension inside a patch exceeds the strength by {-worst:.1e} of it"
-    return [exceeded] if worst < -_TENSION else []
+        passed = before is not None and before.separation == state.separation
+        before = state
+        if not state.patches or (passed and (state.separation, state.contact_fraction) in opened):
+            continue
+        field = method.edges.field(state.internal.gaps, method.states.place(state))
+        least, found = openings.least(field)
+        largest = max([largest, *(crack.tension for crack in found)])
+        late = max(late, -least)
+    return largest, late
 
 
 def _of_loop(loop: LoopResult) -> list[str]:
@@ -220,10 +256,12 @@ def judge(scene: Scene, number: int) -> dict[str, Any]:
     started = time.process_time()
     found: dict[str, Any] = {"wrong": [], "kind": "loop"}
     try:
-        loop, found["wrong"] = follow(scene, scene.accuracy)
+        scene = weakened(scene)
+        found |= {"strength": scene.strength, "range": scene.problem().work_of_adhesion / scene.strength}
+        loop, found["wrong"], inside = follow(scene, scene.accuracy)
         found |= {"loss": loop.loss, "loss_error": loop.loss_error, "races": loop.races}
         found |= {"audit": loop.audit_residual, "drops": loop.loss_from_drops}
-        found |= {"openings": loop.openings, "barrier": loop.barrier, "excess": _excess(loop)}
+        found |= {"openings": loop.openings, "barrier": loop.barrier, **inside}
         if compared_tightly(scene, number):
             found["kind"] = "tight"
             _compare(found, loop, follow(scene, min(1e-5, 1e-2 * scene.accuracy))[0])

@@ -16,7 +16,8 @@ from adhesis.solver.crack import (
     largest_excess,
 )
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.lattice import Lattice
+from adhesis.solver.grid.edges import Indices
+from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import EDGE_OFFSET
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
@@ -32,7 +33,7 @@ class Openings:
     Parameters
     ----------
     problem : Problem
-    lattice : Lattice
+    relaxation : Relaxation
 
     Attributes
     ----------
@@ -40,8 +41,9 @@ class Openings:
         Cracks that closed again: nothing opens there unless the tension is larger.
     """
 
-    def __init__(self, problem: Problem, lattice: Lattice) -> None:
-        self._lattice, self._strength = lattice, problem.strength
+    def __init__(self, problem: Problem, relaxation: Relaxation) -> None:
+        self._relaxation, self._lattice = relaxation, relaxation.lattice
+        self._strength = problem.strength
         self._wave = problem.profile.shortest_wavelength
         self._modulus, self._gamma = problem.half_space.modulus, problem.work_of_adhesion
         self.healed: list[Crack] = []
@@ -65,13 +67,9 @@ class Openings:
 
     def seeded(self, contact: Contact, cracks: list[Crack]) -> Contact:
         """Return an unsolved copy without the nodes of the cracks that open first."""
-        dx, n = self._lattice.dx, self._lattice.n
         opened = contact.copy()
         for crack in largest_excess(cracks):
-            width = max(1, math.ceil(crack.length / dx - 2 * EDGE_OFFSET))
-            first = round(crack.position / dx - 0.5 * (width - 1))
-            nodes = np.arange(first, first + width) % n
-            opened.mask[nodes] = False
+            opened.mask[self._nodes(crack.position, crack.length)] = False
         return opened
 
     def barrier(self, cracks: list[Crack]) -> float:
@@ -89,14 +87,32 @@ class Openings:
         free = np.flatnonzero(~turned)
         edge = min(int(free[0]), n - int(free[-1])) if free.size else n
         toughness = float(self._lattice.adhesion[node]) / self._gamma
-        places, thrice = np.arange(-n, 2 * n) * dx, np.tile(-contact.stress, 3)
+        position = (node + shift) * dx
         return judge_maximum(
-            (node + shift) * dx,
+            position,
             float(here - 0.25 * (before - after) * shift),
             self._strength,
             balanced=2 * self._modulus * self._gamma * toughness / math.pi,
             toughness=toughness,
-            tension_at=lambda x: np.interp(x, places, thrice),
+            release=lambda half: self._release(contact, position, half),
             shortest=(0.5 + EDGE_OFFSET) * dx,
             longest=min(LONGEST * self._wave, IN_PATCH * edge * dx),
         )
+
+    def _nodes(self, position: float, length: float) -> Indices:
+        """Return the nodes of a crack."""
+        dx, n = self._lattice.dx, self._lattice.n
+        width = max(1, math.ceil(length / dx - 2 * EDGE_OFFSET))
+        first = round(position / dx - 0.5 * (width - 1))
+        return np.arange(first, first + width) % n
+
+    def _release(self, contact: Contact, position: float, half: float) -> float:
+        """Compute G/γ of a crack that is put into the patches of a contact."""
+        nodes = self._nodes(position, 2 * half)
+        opened = contact.copy()
+        opened.mask[nodes] = False
+        self._relaxation.solver.solve(opened, self._relaxation.tight)
+        edges = self._relaxation.edges(opened)
+        tips = np.isin(edges.outer, nodes[[0, -1]])
+        cost = edges.recession[tips] / (self._lattice.dx * self._lattice.adhesion[edges.inner[tips]])
+        return max(0.0, 1 - float(cost.max()))

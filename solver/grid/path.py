@@ -85,7 +85,7 @@ class Steps:
             self.scale = h_max + problem.stress_scale / control.stiffness
         self.adhesion_scale = problem.work_of_adhesion * self.period
         # Relative error of a drop.
-        self.openings = Openings(problem, self.lattice)
+        self.openings = Openings(problem, relaxation)
         self.coarse = (
             min(1.0, _COARSE * self.lattice.dx / first_width(problem))
             if self.adhesion_scale

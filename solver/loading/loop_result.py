@@ -281,7 +281,7 @@ def estimated_error(record: Record, audited: float, problem: Problem) -> float:
 
     It is the sum of the method's own estimate (if there is none, a hundredth of the drops), the
     difference found by the audit, and the sizes of negative drops, which are errors: energy falls
-    in every jump.
+    in every jump, after the barrier of an opening.
 
     Parameters
     ----------
@@ -295,5 +295,5 @@ def estimated_error(record: Record, audited: float, problem: Problem) -> float:
     own = record.error
     if not np.isfinite(own):
         own = 0.01 * abs(sum(jump.energy_drop for jump in record.jumps))
-    negative = sum(max(0.0, -jump.energy_drop) for jump in counted)
+    negative = sum(max(0.0, -jump.energy_drop - jump.barrier) for jump in counted)
     return float(own + abs(audited) + negative)

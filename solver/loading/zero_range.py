@@ -81,13 +81,13 @@ class InteriorTension:
 def interior_tension(method: Method, record: Record) -> InteriorTension | None:
     """Find the largest tension inside patches on a path; None if there is none.
 
-    Looked at are the states before the sixteen jumps of unloading with the largest drops, and six
-    states evenly spaced on the path. Without adhesion nothing is in tension.
+    Looked at are the states before the sixteen jumps of unloading with the largest drops, openings
+    first, and six states evenly spaced on the path. Without adhesion nothing is in tension.
     """
     if method.problem.work_of_adhesion == 0:
         return None
     starts = [
-        (jump.energy_drop, place)
+        (math.inf if jump.kind == "opening" else jump.energy_drop, place)
         for jump, place in zip(record.jumps, jump_places(record), strict=True)
         if jump.branch == "unloading"
     ]

@@ -25,8 +25,8 @@ from adhesis.solver.values import ByValue
 
 Value = TypeVar("Value", float, Array)
 
-# Of the shortest wave: a crack that opens a patch may be this long at most (docs/zero-range.md).
-_LONGEST_CRACK = 0.25
+LONGEST_CRACK = 0.25
+"""Length of the longest Griffith crack that may open a patch, in shortest waves."""
 
 # Rounding of a separation over h_max: smaller penetrations count as 0.
 _ROUNDING = 8 * float(np.finfo(float).eps)
@@ -131,7 +131,7 @@ class Problem(ByValue):
 
     def _check_strength(self, adhesion_range: float | None) -> None:
         """Refuse a strength at which a crack as long as the waves would have to be put."""
-        most = _LONGEST_CRACK * self.profile.shortest_wavelength
+        most = LONGEST_CRACK * self.profile.shortest_wavelength
         if math.isinf(self.strength) or self.critical_crack <= most:
             return
         least = math.sqrt(4 * self.half_space.modulus * self.work_of_adhesion / (math.pi * most))

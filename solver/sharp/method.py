@@ -9,6 +9,7 @@ energy at fixed separation (``jump``).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
@@ -59,6 +60,7 @@ from adhesis.solver.sharp.tolerances import (
     LEAST_JUMP_RESOLUTION,
     PLACED_BY_PROFILE,
     TRAPEZOID,
+    WORK_OF_STEP,
 )
 
 
@@ -147,9 +149,11 @@ class SharpMethod(Method):
         self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
         self.states = States(problem, source, self.edges.count)
         finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)
+        opens = math.isfinite(problem.strength)
         self.resolution = Resolution(
             jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
             bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**1.25),
+            work=WORK_OF_STEP * accuracy * problem.work_of_adhesion if opens else math.inf,
             h_max=h_max,
             finest=finest * h_max,
             late=LATE_DROP * accuracy,

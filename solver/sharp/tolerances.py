@@ -377,5 +377,9 @@ LEAST_REFINEMENT = 1e-3
 """Largest factor by which a fold's location is refined at once."""
 FINER_FIELD = 1e-2
 """Tolerance, over that of the path, of the field that shows the error of the path's."""
+WORK_OF_STEP = 2e-5
+"""Accuracy of the loss times γ: largest difference of the work and the change of energy over one
+step where patches open from inside. The loss is then a smaller part of the work than the rule of
+``TRAPEZOID`` supposes, and between two folds the slopes at both ends hide the error."""
 TRAPEZOID = 1.5e-4
 """Largest relative error of the trapezoidal rule over one step at accuracy 1e-3."""

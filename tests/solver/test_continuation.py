@@ -77,7 +77,7 @@ class Curve:
 
 
 def resolution(jump: float = 1e-6, bend: float = 1e-3) -> Resolution:
-    return Resolution(jump, bend, 1.0, 1e-9, 0.5, 0.0, 0.05)
+    return Resolution(jump, bend, np.inf, 1.0, 1e-9, 0.5, 0.0, 0.05)
 
 
 def branch(

@@ -13,7 +13,8 @@ refused (PathError) is counted.
 
 With ``--tight`` only the scenes are followed that are compared with a far more accurate run, with
 ``--waves`` only those of at most so many waves: they are cheap. With ``--strength`` patches open
-from inside, at ranges of adhesion over four decades; then no state may exceed the strength inside.
+from inside, at ranges of adhesion up to four decades above that which keeps them closed; then no
+state may have a place at the strength where a crack grows.
 """
 
 from __future__ import annotations
@@ -99,6 +100,20 @@ def calibration(found: list[dict[str, Any]]) -> str:
     )
 
 
+def opening_summary(found: list[dict[str, Any]]) -> str:
+    """Count openings, and state by how much the tension inside patches exceeds the strength."""
+    opened = [f for f in found if f.get("openings")]
+    ranges = [f["range"] for f in opened]
+    excess = np.array([f.get("excess", 0.0) for f in found])
+    return (
+        f"{sum(f['openings'] for f in opened)} openings in {len(opened)} loops, at ranges of "
+        f"{min(ranges, default=0):.1e} to {max(ranges, default=0):.1e} m; "
+        f"{sum(f.get('healed', 0) for f in found)} cracks closed again; the tension inside patches "
+        f"exceeds the strength by 0.1 % where no crack grows in {np.sum(excess > 1.001)} loops, by a "
+        f"tenth in {np.sum(excess > 1.1)}, at most {excess.max():.2f} times"
+    )
+
+
 def main() -> int:
     """Return 1 if a scene came out wrong."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -150,7 +165,7 @@ def main() -> int:
             count = len(everything)
             print(f"fuzz: {count} loops, {failures} wrong, {races} with races", flush=True)
     if args.strength:
-        print(f"fuzz: {sum(found.get('openings', 0) for found in everything)} openings")
+        print(f"fuzz: {opening_summary(everything)}")
     seconds = sum(found.get("seconds", 0.0) for found in everything)
     print(
         f"fuzz: {len(everything)} loops in {seconds:.0f} s of CPU time, {failures} wrong, "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from adhesis.solver.model.jump import Branch as BranchName
@@ -40,6 +41,9 @@ class Target:
     branch: BranchName
 
 
+Imbalance = Callable[[Point, Point], float]
+
+
 class Branch:
     """A stable branch that is followed from a point towards a target.
 
@@ -50,6 +54,8 @@ class Branch:
     resolution : Resolution
     point : Point
     target : Target
+    imbalance : callable, optional
+        Computes the difference of work and energy between two points, in J/m².
 
     Attributes
     ----------
@@ -69,7 +75,9 @@ class Branch:
         resolution: Resolution,
         point: Point,
         target: Target,
+        imbalance: Imbalance | None = None,
     ) -> None:
+        self._imbalance = imbalance
         self._edges, self._closing, self._resolution = edges, closing, resolution
         self._target = target
         before = point.previous
@@ -151,7 +159,9 @@ class Branch:
         LostTrack
             If its state is needed, and it is no equilibrium of all edges.
         """
-        error = self._trapezoid_error(self._output, reached)
+        error = max(
+            self._trapezoid_error(self._output, reached), self._work_error(self._output, reached)
+        )
         gaps, smallest = reached.gaps, self._edges.smallest
         remaining = without_small(gaps, smallest) if shortest_length(gaps) < smallest else None
         closed = self._closing.over(self.point, reached, self._target.branch)
@@ -200,3 +210,15 @@ class Branch:
         scale = max(abs(conjugate), QUIET_STRESS * h_max)
         change = abs(point.slope - output.slope)
         return float(span * change / 12 / (self._resolution.bend * scale))
+
+    def _work_error(self, output: Point, point: Point) -> float:
+        """Difference of work and energy since the last output, in units of what is allowed.
+
+        Not known where the field is not that of all edges. Not asked for in steps much shorter than
+        the resolution of jumps, where it is the error of the fields.
+        """
+        short = abs(point.at - output.at) < 0.1 * self._resolution.jump
+        if self._imbalance is None or short or isinstance(point, LocalPoint):
+            return 0.0
+        error = abs(self._imbalance(output, point)) / self._resolution.work
+        return 0.0 if math.isnan(error) else error

@@ -60,6 +60,7 @@ class Follower:
         self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
         self._last: tuple[Memory, Point] | None = None
+        self._output: tuple[Point, ContactState] | None = None
 
     def remembered(self, memory: Memory | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
@@ -85,7 +86,8 @@ class Follower:
         if jump is not None:
             history.commit(jump)
             return jump.at, jump.point
-        branch = Branch(self.edges, self.closing, self.resolution, point, target)
+        imbalance = self._imbalance if self.openings.is_possible else None
+        branch = Branch(self.edges, self.closing, self.resolution, point, target, imbalance)
         while branch.point.at != target.at:
             event = branch.advance()
             if isinstance(event, Fold):
@@ -97,6 +99,12 @@ class Follower:
                 return jump.at, jump.point
         self._remember(history, branch)
         return target.at, branch.point
+
+    def _imbalance(self, output: Point, point: Point) -> float:
+        """Compute the change of energy between two points of a branch, less the work, in J/m²."""
+        if self._output is None or self._output[0] is not output:
+            self._output = output, self.states.of_point(output)
+        return self.states.imbalance(self._output[1], self.states.of_point(point))
 
     def _remember(self, history: History, branch: Branch) -> None:
         """Let the last state remember its point."""

@@ -15,6 +15,9 @@ class Resolution:
         Separation to which a jump is located.
     bend : float
         Largest relative error of the trapezoidal rule over one step.
+    work : float
+        Largest difference in J/m² of the work and the change of energy over one step, where patches
+        open from inside; infinite where they do not.
     h_max : float
         q0 h_max.
     finest : float
@@ -29,6 +32,7 @@ class Resolution:
 
     jump: float
     bend: float
+    work: float
     h_max: float
     finest: float
     late: float

@@ -24,7 +24,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.patch_tension import NodalTension, RefinedTension
+from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 from adhesis.solver.sharp.gap.ends import with_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import measure_at
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -63,7 +63,7 @@ class Openings:
         self.strength = problem.strength / (problem.half_space.modulus / 2)
         self.healed: list[Crack] = []
         self.heals = 0
-        self._nodal = NodalTension(problem.profile) if self.is_possible else None
+        self._nodal = nodal_tension(problem) if self.is_possible else None
 
     @property
     def is_possible(self) -> bool:
@@ -131,7 +131,17 @@ class Openings:
             self.strength,
             balanced=0.5 * critical**2 * measure,  # γ = π E* C_c²/(16 q0), σ = E* S/2
             toughness=measure,
-            tension_at=refined.at,
+            release=lambda half: self._release(field, theta, half),
             shortest=0.5 * SHORTEST_CRACK * wave,
             longest=min(LONGEST * wave, IN_PATCH * refined.edge_distance(theta)),
         )
+
+    def _release(self, field: GapField, theta: float, half: float) -> float:
+        """Compute G/γ of a crack that is put into the patches of a field."""
+        gaps = with_gaps(field.gaps, np.array([theta]), np.array([2 * half]))
+        middle = (gaps.mean(axis=1) - theta + np.pi) % (2 * np.pi) - np.pi
+        crack = int(np.argmin(np.abs(middle)))
+        opening = self.edges.field(gaps, field.prescribed).opening[crack]
+        panels = field.source.panels
+        critical = [self.edges.critical**2 * measure_at(end, panels)[0] for end in gaps[crack]]
+        return float((np.maximum(opening, 0.0) ** 2 / critical).min())

@@ -173,6 +173,16 @@ class States:
         unit = self._half if control.is_load else 1 / self.q0
         return abs(conjugate[0] - conjugate[1]) * way * unit
 
+    def imbalance(self, before: ContactState, after: ContactState) -> float:
+        """Compute the change of energy between two states of a branch, less the work, in J/m²."""
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        both = before, after
+        x = [control.prescribed(state.separation, state.mean_stress) for state in both]
+        y = [control.conjugate(state.separation, state.mean_stress, h_max) for state in both]
+        way, change = x[1] - x[0], after.stiffness - before.stiffness
+        work = 0.5 * way * (y[0] + y[1]) - way**2 * change / 12
+        return (after.potential - before.potential) / self.period + work
+
     def jump(
         self,
         before: ContactState,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache
 
@@ -9,9 +10,11 @@ from adhesis.solver.method import PatchTension
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.patch_tension import NodalTension, RefinedTension
+from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tension
 
-_CANDIDATES = 4  # local maxima of each state that are kept
+# Local maxima of each state that are kept: with zero range, and where a strength may be so small
+# beside the stress that flattens the profile that many seem to be higher.
+_CANDIDATES, _CANDIDATES_OPENING = 4, 32
 
 
 def largest_tension(
@@ -28,8 +31,9 @@ def largest_tension(
         Number of states.
     """
     profile = problem.profile
-    nodal = NodalTension(profile)
+    nodal = nodal_tension(problem)
     step = nodal.step
+    most = _CANDIDATES if math.isinf(problem.strength) else _CANDIDATES_OPENING
 
     @lru_cache(maxsize=1)
     def refined(state: int) -> RefinedTension:
@@ -38,7 +42,7 @@ def largest_tension(
     candidates: list[tuple[float, int, int]] = []  # tension, state, node
     for state in range(count):
         tension = nodal.of(field_of(state))
-        nodes = highest_peaks(tension, _CANDIDATES)
+        nodes = highest_peaks(tension, most)
         candidates += [(float(tension[node]), state, node) for node in nodes]
     candidates.sort(key=lambda entry: -entry[0])
     best: PatchTension | None = None
@@ -47,7 +51,7 @@ def largest_tension(
         if best is not None and value * unit <= best.tension:
             break
         found = refined(state).maximum(node * step, step)
-        if found is not None and (best is None or found[1] * unit > best.tension):
+        if found is not None and found[1] * unit > (best.tension if best else 0.0):
             position = found[0] / profile.q0 % profile.period
             best = PatchTension(state, position, found[1] * unit)
     return best
