@@ -217,7 +217,7 @@ def test_grid_and_sharp_agree():
 
 
 def judged(tension, strength=1.0, balanced=0.01, shortest=1e-3, longest=1.0, bend=0.0):
-    """A crack in the tension σ(1 - bend x²), the mean of which over its angle is σ(1 - bend a²/2)."""
+    """A crack in the tension σ(1 - bend x²): its mean over the angle is σ(1 - bend a²/2)."""
 
     def release(half):
         return half * (tension * max(0.0, 1 - bend * half**2 / 2)) ** 2 / balanced
