@@ -12,7 +12,15 @@ import argparse
 import math
 from typing import NamedTuple
 
-from adhesis import HalfSpace, LoopResult, Method, Problem, make_method, run_loop, self_affine_profile
+from adhesis import (
+    HalfSpace,
+    LoopResult,
+    Method,
+    Problem,
+    make_method,
+    run_loop,
+    self_affine_profile,
+)
 from adhesis.solver.grid.method import GridMethod
 
 CRACK = 0.03  # Griffith's length, of the shortest wave
