@@ -14,8 +14,9 @@ def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
     """Return the places of the highest maxima above ``least``, the highest first.
 
     The height of a maximum is that of the parabola through it and its neighbours: where values have
-    large and steep minima a maximum can lie well above all values. The prominence of a maximum is its height above the higher one of the two minima between which
-    it is the largest value; it is no maximum unless its neighbours have values.
+    large and steep minima a maximum can lie well above all values. The prominence of a maximum is
+    its height above the higher one of the two minima between which it is the largest value; it is
+    no maximum unless its neighbours have values.
 
     Parameters
     ----------

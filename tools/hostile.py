@@ -162,9 +162,9 @@ def tension_of(
 ) -> tuple[float, float]:
     """Return the largest tension inside patches, and by how much states are late to open.
 
-    Both in units of the strength. A state is late where a crack grows: by the lesser of the excesses
-    of the tension and of the root of G. Two jumps at one place have a state between them, which is left out where
-    the second is an opening: at the first nothing opened there yet.
+    Both in units of the strength. A state is late where a crack grows: by the lesser of the
+    excesses of the tension and of the root of G. Two jumps at one place have a state between them.
+    It is left out where the second is an opening: at the first nothing opened there yet.
     """
     openings = method.follower.openings
     openings.healed = []
@@ -257,7 +257,8 @@ def judge(scene: Scene, number: int) -> dict[str, Any]:
     found: dict[str, Any] = {"wrong": [], "kind": "loop"}
     try:
         scene = weakened(scene)
-        found |= {"strength": scene.strength, "range": scene.problem().work_of_adhesion / scene.strength}
+        found |= {"strength": scene.strength}
+        found |= {"range": scene.problem().work_of_adhesion / scene.strength}
         loop, found["wrong"], inside = follow(scene, scene.accuracy)
         found |= {"loss": loop.loss, "loss_error": loop.loss_error, "races": loop.races}
         found |= {"audit": loop.audit_residual, "drops": loop.loss_from_drops}

@@ -114,5 +114,6 @@ class Openings:
         self._relaxation.solver.solve(opened, self._relaxation.tight)
         edges = self._relaxation.edges(opened)
         tips = np.isin(edges.outer, nodes[[0, -1]])
-        cost = edges.recession[tips] / (self._lattice.dx * self._lattice.adhesion[edges.inner[tips]])
+        adhesion = self._lattice.dx * self._lattice.adhesion[edges.inner[tips]]
+        cost = edges.recession[tips] / adhesion
         return max(0.0, 1 - float(cost.max()))

@@ -22,7 +22,12 @@ from adhesis import (
 )
 from adhesis.solver.crack import Crack, griffith_length, judge_maximum, largest_excess
 from adhesis.solver.loading.loop_result import estimated_error
-from adhesis.solver.loading.zero_range import beyond_limit, opening_warnings, range_warnings
+from adhesis.solver.loading.zero_range import (
+    beyond_limit,
+    interior_tension,
+    opening_warnings,
+    range_warnings,
+)
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.references.last_gap import LastGap
@@ -217,7 +222,7 @@ def test_grid_and_sharp_agree():
 
 
 def judged(tension, strength=1.0, balanced=0.01, shortest=1e-3, longest=1.0, bend=0.0):
-    """A crack in the tension σ(1 - bend x²), the mean of which over its angle is σ(1 - bend a²/2)."""
+    """A crack in the tension σ(1 - bend x²): its mean over the angle is σ(1 - bend a²/2)."""
 
     def release(half):
         return half * (tension * max(0.0, 1 - bend * half**2 / 2)) ** 2 / balanced
@@ -294,6 +299,31 @@ def test_a_crack_grows_by_the_field_with_the_crack():
     release = method.follower.openings._release
     assert release(field, np.pi, 0.1 * griffith) == pytest.approx(0.1, rel=1e-2)
     assert release(field, np.pi, 20 * griffith) < 20 / 2
+
+
+def test_the_tension_before_an_opening_counts_whatever_its_drop():
+    """An opening may lose less than nothing, up to its barrier."""
+    count, opening = 30, 13
+    states = [
+        SimpleNamespace(separation=float(i // 2), contact_fraction=float(i), patches=1)
+        for i in range(2 * count)
+    ]
+    jumps = [
+        SimpleNamespace(
+            kind="opening" if k == opening else "receding",
+            energy_drop=-1.0 if k == opening else 1.0,
+            branch="unloading",
+            separation=float(k),
+            contact_before=2.0 * k,
+            contact_after=2.0 * k + 1,
+        )
+        for k in range(count)
+    ]
+    seen = []
+    method = SimpleNamespace(problem=troughs_problem(), largest_tension=seen.extend)
+    record = SimpleNamespace(states=states, jumps=jumps, branches=["unloading"] * len(states))
+    assert interior_tension(method, record) is None
+    assert states[2 * opening] in seen
 
 
 def test_an_energy_that_rises_by_a_barrier_is_no_error():

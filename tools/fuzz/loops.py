@@ -109,8 +109,8 @@ def opening_summary(found: list[dict[str, Any]]) -> str:
         f"{sum(f['openings'] for f in opened)} openings in {len(opened)} loops, at ranges of "
         f"{min(ranges, default=0):.1e} to {max(ranges, default=0):.1e} m; "
         f"{sum(f.get('healed', 0) for f in found)} cracks closed again; the tension inside patches "
-        f"exceeds the strength by 0.1 % where no crack grows in {np.sum(excess > 1.001)} loops, by a "
-        f"tenth in {np.sum(excess > 1.1)}, at most {excess.max():.2f} times"
+        f"exceeds the strength by 0.1 % where no crack grows in {np.sum(excess > 1.001)} loops, "
+        f"by a tenth in {np.sum(excess > 1.1)}, at most {excess.max():.2f} times"
     )
 
 

@@ -1,9 +1,9 @@
 """Tension inside patches, of one field: at equally spaced nodes, and refined at single places.
 
 S = S_full + p + |D| T is first taken on equally spaced nodes, eight or more to a shortest wave, by
-Fourier transforms: the square roots of T at its edges leave an error there that falls as the distance to
-the power -2, below a hundredth of the singular stress one wave away. It finds the local maxima of
-tension; the largest of them are then verified and refined by the quadrature of
+Fourier transforms: the square roots of T at its edges leave an error there that falls as the
+distance to the power -2, below a hundredth of the singular stress one wave away. It finds the local
+maxima of tension; the largest of them are then verified and refined by the quadrature of
 ``grid_fields``, which is exact to rounding.
 
 ``theta`` in the units of the field, tension in units of E*/2.
