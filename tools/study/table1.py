@@ -265,8 +265,8 @@ def machines(study: Study) -> Table | str:
     """Loops on machines of finite stiffness, in every cell of the paper."""
     if not any(len(study.loops.where(campaign=name)) for name in STIFF):
         return (
-            "Not computed: the time ended the campaigns `stiff` and `stiff001` before a realisation "
-            "of all cells was complete."
+            "Not computed: the time ended the campaigns `stiff` and `stiff001` before a "
+            "realisation of all cells was complete."
         )
     rows = []
     for stiffness in STIFFNESSES:
