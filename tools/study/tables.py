@@ -539,7 +539,7 @@ def errors(study: Study) -> Table:
     return ["", "of the mean", "of the worst loop"], rows
 
 
-TABLES: dict[str, Callable[[Study], Table]] = {
+TABLES: dict[str, Callable[[Study], Table | str]] = {
     "answer": answer,
     "amplitudes": amplitudes,
     "maxima": maxima,
