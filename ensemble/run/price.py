@@ -24,6 +24,7 @@ from adhesis.ensemble.run.plan import group_of, prior
 from adhesis.ensemble.run.progress import duration
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.row import Row
+from adhesis.solver.method import PathError
 
 # Loops are tried out for so long (s), one realisation of every cell after the other.
 PILOT_SECONDS = 60.0
@@ -202,7 +203,11 @@ def price(
             break
         together = 0.0
         for task in unit:
-            row = compute(campaign, task)
+            begun = time.process_time()
+            try:
+                row = compute(campaign, task)
+            except PathError:  # a run records the task as failed; it costs what it took
+                row = {"cpu_time": time.process_time() - begun}
             took = float(row["cpu_time"])
             known.add(task.cell, took, float(row.get(campaign.stop.quantity, math.nan)))
             pilots, together = pilots + 1, together + took

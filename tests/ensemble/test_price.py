@@ -12,6 +12,7 @@ from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.plan import prior
 from adhesis.ensemble.run.price import as_text, price
+from adhesis.solver.method import PathError
 from tests.support.campaign_support import adhesis, campaign_text, write_campaign
 from tests.support.fake_run import fake_result
 
@@ -35,6 +36,21 @@ def test_pilots_tell_what_the_campaign_costs():
     assert reported.makespan(1000) == reported.longest
     hurried = price(campaign, compute=compute, seconds=0.0)
     assert hurried.pilots == 0
+
+
+def test_a_pilot_loop_without_a_path_costs_what_it_took():
+    """As a loop that runs into full contact: the run records it as failed."""
+
+    def fails_once(campaign, task):
+        if task.hurst == 0.7 and task.work_of_adhesion == 0.01 and task.realisation == 0:
+            raise PathError("full contact is reached")
+        return compute(campaign, task)
+
+    campaign = parse_campaign(campaign_text(realisations="10"))
+    reported = price(campaign, compute=fails_once)
+    assert reported.pilots == 40
+    others = sum(cost(task) for task in campaign.tasks()[1:])
+    assert reported.seconds == pytest.approx(others, rel=1e-3)  # it took no time
 
 
 def test_cells_that_were_not_reached_are_scaled_from_others(monkeypatch):
