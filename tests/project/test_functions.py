@@ -25,8 +25,8 @@ MATHEMATICAL = {
     "descent/gradient_flow.py": {"AT_REST", "VANISHED", "STEP_LIMIT", "NO_FIELD", "REJOINED"},
     "output/grid_fields.py": {"_FIELD_NODES", "_FINER"},  # nodes of an output, not of a loop
     # nodes and numbers of trials of a diagnosis, which no loss depends on
-    "field/patch_tension.py": {"_PER_WAVE", "_COARSE", "_POINTS", "_MOVES"},
-    "output/interior_tension.py": {"_CANDIDATES"},
+    "field/patch_tension.py": {"_COARSE", "_POINTS", "_MOVES"},
+    "output/interior_tension.py": {"_CANDIDATES", "_CANDIDATES_OPENING"},
     "field/assembly.py": {"_PERIODIC_SERIES", "_MAPPED_SERIES"},  # ranges of series
     "field/cholesky.py": {"BLOCK"},
     "field/opening_series.py": {"_MANY_NODES", "_PER_UNIT"},  # sizes of tables
@@ -60,7 +60,10 @@ def test_functions_have_few_parameters() -> None:
         given = [*f.args.posonlyargs, *f.args.args, *f.args.kwonlyargs]
         return sum(argument.arg != "self" for argument in given)
 
-    assert [name for name, f in functions() if count(f) > MOST_PARAMETERS] == []
+    many = [(name, f) for name, f in functions() if count(f) > MOST_PARAMETERS]
+    kernels = [name for name, f in many if "compiled" in map(ast.unparse, f.decorator_list)]
+    assert [name for name, _ in many] == kernels
+    assert len(kernels) <= 5
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -14,7 +14,8 @@ from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tensi
 
 # Local maxima of each state that are kept: with zero range, and where a strength may be so small
 # beside the stress that flattens the profile that many seem to be higher.
-_CANDIDATES, _CANDIDATES_OPENING = 4, 32
+_CANDIDATES = 4
+_CANDIDATES_OPENING = 32
 
 
 def largest_tension(
