@@ -344,6 +344,16 @@ def test_a_page_with_old_outputs_is_renewed(
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_asterisk_of_the_modulus_does_not_make_italics(page: Path) -> None:
+    """Two of ``E*x`` in one paragraph do, unless they are code or escaped."""
+    text = re.sub(r"^```.*?^```$|`[^`]+`", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^    .*$", "", text, flags=re.MULTILINE)
+    for paragraph in text.split("\n\n"):
+        opening = re.search(r"(?<!\\)E\*(?=\w|\()", paragraph)
+        assert opening is None or "E*" not in paragraph[opening.end() :], paragraph
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_in_the_text_exist(page: Path) -> None:
     text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
     for snippet in re.findall(r"`([^`]+)`", text):
