@@ -109,9 +109,9 @@ is_cut_short() {
 # is_complete: whether the results file has no pending task
 is_complete() { "$ADHESIS" status "$file" --json | grep '^ "pending": 0,' >/dev/null; }
 
-# is_report_due: whether all that the job computes is done or failed. 0 says so; 1 also comes from
-# a launcher that was ended, and after --max-failures, so the file is asked. A part is reported on
-# with all others.
+# is_report_due: whether all that the job computes is done or failed. 0 says so, of which
+# run_campaign has made sure; 1 also comes from a launcher that was ended, and after --max-failures,
+# so the file is asked. A part is reported on with all others.
 is_report_due() { [ -z "$part" ] && { [ "$code" = 0 ] || { [ "$code" = 1 ] && is_complete; }; }; }
 
 # script_of COMMAND…: a job script that runs a command in this folder
@@ -164,4 +164,9 @@ run_campaign() {
     follow "${launcher[@]}" "$ADHESIS" run "$campaign" --out "$results" "$@" ${options[@]+"${options[@]}"}
     note "adhesis run ended with $code"
     stage_out
+    # srun ends with 0 although it could not start a single rank.
+    if [ "$code" = 0 ] && ! is_complete; then
+        note "tasks of $file are pending although the launcher (${launcher[0]}) ended with 0: did it start the ranks?"
+        code=1
+    fi
 }

@@ -94,7 +94,7 @@ def cluster() -> Iterator[Cluster]:
     # Not below pytest's folder: munge wants a path that everybody may pass through.
     folder = Path(tempfile.mkdtemp(prefix="adhesis-slurm-"))
     folder.chmod(0o755)
-    for name in ("state", "spool"):
+    for name in ("state", "spool", "tmp"):
         (folder / name).mkdir()
     key = folder / "munge.key"
     key.write_bytes(os.urandom(1024))
@@ -114,6 +114,10 @@ AuthType=auth/munge
 AuthInfo=socket={folder}/munge.socket,cred_expire=10
 StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
+TmpFS={folder}/tmp
+# PMIx and MPI name what ranks share by the numbers of user and job, which a second Slurm of this
+# machine must not meet: its ranks would crash.
+FirstJobId={100 * (os.getpid() % 500_000) + 1}
 SlurmctldPidFile={folder}/slurmctld.pid
 SlurmdPidFile={folder}/slurmd.pid
 SlurmctldLogFile={folder}/slurmctld.log
@@ -128,6 +132,8 @@ KillWait=5
 SlurmdParameters=config_overrides
 JobAcctGatherType=jobacct_gather/none
 SchedulerParameters=sched_interval=2
+# A finished job is looked at when its test comes, however late.
+MinJobAge=86400
 NodeName={node} NodeAddr=127.0.0.1 CPUs=32 State=UNKNOWN
 PartitionName=test Nodes={node} Default=YES MaxTime=INFINITE State=UP
 """
@@ -331,17 +337,17 @@ def test_a_job_at_its_time_limit_is_requeued_and_finishes(
     cluster: Cluster, jobs: dict[str, Job]
 ) -> None:
     job = jobs["limited"]
-    job.wait(lambda: job.values["Restarts"] == "1", "requeued")
-    assert "USR1 received" in job.log
+    job.wait(lambda: "USR1 received" in job.log, "signalled")
+    job.wait(lambda: job.values["Restarts"] != "0", "requeued")
     assert "adhesis run ended with 75" in job.log
     assert "stopped early: SIGUSR1 received; 38 tasks are left" in job.log
-    # Time enough for the rest, which would be signalled as soon otherwise.
-    cluster.call("scontrol", "update", f"JobId={job.number}", "TimeLimit=60")
-    job.wait(lambda: job.values["JobState"] == "COMPLETED", "finished", 180)
-    assert job.values["Restarts"] == "1"
-    assert "adhesis run ended with 0" in job.log
+    # A busy machine may take so long for the rest that it is signalled once more.
+    job.wait(lambda: job.values["JobState"] == "COMPLETED", "finished", 300)
+    starts = int(job.values["Restarts"]) + 1
+    assert job.log.count("adhesis run ended with 75") == starts - 1
+    assert job.log.count("adhesis run ended with 0") == 1
     assert job.done_tasks() == 40
-    # What was done was not computed again: only the task that the signal met was begun twice.
+    # What was done was not computed again: only a task that a signal met was begun twice.
     begun = (job.folder / "begun").read_text().split()
     assert len(set(begun)) == 40
-    assert len(begun) <= 41
+    assert len(begun) <= 40 + starts - 1

@@ -167,12 +167,19 @@ def test_slurm_job_is_requeued_reported_or_left(
     assert (done.returncode, seen) == (code, action), done.stdout + done.stderr
 
 
+def test_launcher_that_ends_with_0_but_starts_no_rank_is_a_failure(cluster: Cluster) -> None:
+    done, seen = slurm(cluster, "study.toml", LAUNCHER="true", PENDING="9")
+    assert (done.returncode, seen) == (1, "nothing")
+    assert "tasks of study.h5 are pending although the launcher (true) ended with 0" in done.stdout
+
+
 def test_signal_between_the_start_of_a_run_and_its_number_reaches_it(cluster: Cluster) -> None:
     """Bash handles a signal before the next command: here before it has noted the run's number."""
     script = f""". "{JOBS}/common.sh"
         set -T
-        trap '[ "$BASH_COMMAND" != "run=\\$!" ] || kill -s TERM $$' DEBUG
-        follow bash -c "trap 'exit 75' USR1; while :; do sleep 0.02; done"
+        late() {{ until [ -e listens ]; do sleep 0.02; done; kill -s TERM $$; }}
+        trap '[ "$BASH_COMMAND" != "run=\\$!" ] || late' DEBUG
+        follow bash -c "trap 'exit 75' USR1; touch listens; while :; do sleep 0.02; done"
         echo "$code $terminated"
     """
     assert cluster.run("bash", "-c", script).stdout.split()[-2:] == ["75", "yes"]
@@ -249,7 +256,7 @@ def test_report_is_a_job_of_its_own_on_one_core(cluster: Cluster) -> None:
     slurm(cluster, "s.toml", "my results.h5", SLURM_JOB_ACCOUNT="ab12")
     (words,) = cluster.calls("sbatch")
     assert {"--ntasks=1", "--nodes=1", "--partition=small", "--account=ab12"} <= set(words)
-    assert [call[0] for call in cluster.calls("adhesis")] == ["run"]
+    assert [call[0] for call in cluster.calls("adhesis")] == ["run", "status"]
     script = cluster.folder / "calls.submitted"
     done = cluster.run("bash", script, ADHESIS="")
     assert done.returncode == 0, done.stderr
