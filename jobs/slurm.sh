@@ -40,7 +40,7 @@
 
 set -u
 # Slurm runs a copy of this file; the others of its folder lie beside the original.
-if [ -z "${JOBS:-}" ]; then
+if [ ! -e "${JOBS:-}/common.sh" ]; then # a JOBS that means something else is common, too
     command=$(scontrol show job "$SLURM_JOB_ID" | sed -n 's/^ *Command=//p' | head -n 1)
     if [ $# -gt 0 ]; then command=${command%" $*"}; fi
     JOBS=$(cd "$SLURM_SUBMIT_DIR" && cd "$(dirname "$command")" && pwd)

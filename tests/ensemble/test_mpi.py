@@ -25,6 +25,7 @@ from tests.support.campaign_support import (
     MPIRUN,
     ROOT,
     adhesis,
+    adhesis_here,
     differences,
     done_rows,
     environment,
@@ -196,12 +197,9 @@ def test_tasks_of_a_rank_that_hangs_are_done_by_others_and_the_job_ends(tmp_path
 def test_a_run_that_is_told_to_stop_but_ends_complete_says_nothing_of_stopping(tmp_path):
     """One worker is asked to stop, while the last task, on the other, does not look up."""
     path = write_campaign(tmp_path, realisations="1", hurst="[0.7]")
-    fake = "asked=0.7:0.01:0 deaf=0.7:0.04:0"
-    for k in range(5):
-        out = tmp_path / f"{k}.h5"
-        process = adhesis("run", path, "--out", out, ranks=3, fake=fake)
-        if done_rows(out) == 2:  # else that task looked up after all, on a busy machine
-            break
+    log = tmp_path / "log"
+    fake = f"asked=0.7:0.01:0 deaf=0.7:0.04:0 log={log}"
+    process = adhesis("run", path, "--out", tmp_path / "r.h5", ranks=3, fake=fake)
     assert process.returncode == 0, process.stderr
     assert "2 of 2 tasks done" in process.stderr
     assert "stopped early" not in process.stderr
@@ -336,8 +334,8 @@ def test_the_rank_0_writer_writes_the_same_file(tmp_path, whole):
     process = adhesis("run", path, "--out", out, ranks=3, fake="serial=1")
     assert process.returncode == 0, process.stderr
     assert differences(out, whole) == []
-    process = start("run", path, "--out", tmp_path / "k.h5", ranks=3, fake="serial=1 step=0.05")
-    wait_until(lambda: done_rows(tmp_path / "k.h5") >= 3)
+    process = start("run", path, "--out", tmp_path / "k.h5", ranks=3, fake="serial=1 hold=2")
+    wait_until(lambda: done_rows(tmp_path / "k.h5") == 4)
     kill_all(process)
     process.communicate()
     resumed = adhesis("run", path, "--out", tmp_path / "k.h5", ranks=3, fake="serial=1")
@@ -385,12 +383,12 @@ def test_a_run_that_starts_its_ranks_ends_without_words_of_the_launcher(tmp_path
 
 
 def test_the_status_during_a_run_under_mpirun(tmp_path):
-    path, out = write_campaign(tmp_path), tmp_path / "r.h5"
-    process = start("run", path, "--out", out, ranks=3, fake="step=0.15")
-    wait_until(lambda: done_rows(out) >= 1)
-    status = json.loads(adhesis("status", out, "--json").stdout)
-    assert 1 <= status["done"] < 8
-    assert status["done"] + status["pending"] == 8
+    path, out, free = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "free"
+    process = start("run", path, "--out", out, ranks=3, fake=f"hold=1 free={free}")
+    wait_until(lambda: done_rows(out) == 2)
+    status = json.loads(adhesis_here("status", out, "--json").stdout)
+    assert (status["done"], status["pending"]) == (2, 6)
+    free.touch()
     process.communicate(timeout=150)
     assert process.returncode == 0
 

@@ -132,14 +132,14 @@ def test_a_campaign_runs_over_two_nodes_and_outlives_one(nodes: Nodes, tmp_path:
     """The job ends promptly with a dead node; the next one goes on with what is left."""
     path, out, whole = write_campaign(tmp_path), tmp_path / "r.h5", tmp_path / "whole.h5"
     assert adhesis("run", path, "--out", whole, fake="").returncode == 0
-    process = nodes.launch("run", path, "--out", out, fake="step=0.15")
+    process = nodes.launch("run", path, "--out", out, fake="hold=1")
     wait_until(lambda: done_rows(out) >= 2 or process.poll() is not None)
     assert process.poll() is None, process.communicate()[1]
     nodes.kill(1)
     process.communicate(timeout=150)
     assert process.returncode not in (0, 1, 2, 75)
     kept, log = done_rows(out), tmp_path / "log"
-    assert 2 <= kept < 8
+    assert 2 <= kept <= 3  # one of each worker
     process = nodes.launch("run", path, "--out", out, fake=f"step=0.05 log={log}")
     _, errors = process.communicate(timeout=150)
     assert process.returncode == 0, errors

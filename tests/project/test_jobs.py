@@ -167,6 +167,12 @@ def test_slurm_job_is_requeued_reported_or_left(
     assert (done.returncode, seen) == (code, action), done.stdout + done.stderr
 
 
+def test_number_of_jobs_in_the_environment_is_not_taken_for_a_folder(cluster: Cluster) -> None:
+    """``make JOBS=4`` and build systems leave such a variable."""
+    done, seen = slurm(cluster, "study.toml", JOBS="4")
+    assert (done.returncode, seen) == (0, "report"), done.stderr
+
+
 def test_launcher_that_ends_with_0_but_starts_no_rank_is_a_failure(cluster: Cluster) -> None:
     done, seen = slurm(cluster, "study.toml", LAUNCHER="true", PENDING="9")
     assert (done.returncode, seen) == (1, "nothing")

@@ -3,7 +3,7 @@
 BEHAVIOUR is a list of words, tasks given as H:γ:realisation with ``*`` for any:
 ``step=SECONDS`` time of a load step, ``fail=TASK`` raise, ``hang=TASK`` never reach the next load
 step, ``deaf=TASK`` take 0.3 s without looking up, ``asked=TASK`` be asked to stop, by a signal, at
-its end, ``doubt=TASK`` a loss whose audit is 19 % off,
+its end, once the ``log`` has another task, ``doubt=TASK`` a loss whose audit is 19 % off,
 ``hold=N`` after N tasks of a process stay in the next one, looking up, until stopped, or until
 there is the file of ``free=FILE``,
 ``log=FILE`` write a line for each task begun, ``crash=TASK`` an error that is not a task's,
@@ -85,6 +85,8 @@ def fake_engine(behaviour: str) -> Engine:
         if matches(settings.get("fail"), task):
             raise FloatingPointError("the sum of γ diverged")
         if matches(settings.get("asked"), task):
+            while len(Path(settings["log"]).read_text().splitlines()) < 2:
+                time.sleep(0.01)
             os.kill(os.getpid(), signal.SIGUSR1)
         row = fake_result(campaign, task)
         return row | {"audit_residual": 0.19} if matches(settings.get("doubt"), task) else row
