@@ -133,16 +133,17 @@ class Relaxation:
         between nodes. Minima of equal gap touch together.
         """
         gap = self.lattice.gap(contact)
-        left, right = np.roll(gap, 1), np.roll(gap, -1)
-        free = ~contact.mask
-        free &= np.roll(free, 1) & np.roll(free, -1)
-        bend = left + right - 2 * gap
-        crest = free & (gap <= left) & (gap <= right) & (bend > 0)
-        least = np.where(crest, gap - (right - left) ** 2 / np.where(crest, 8 * bend, 1.0), np.inf)
-        lowest = float(least.min())
+        steps = np.diff(gap, append=gap[:1])
+        crests = np.flatnonzero(~contact.mask & (steps >= 0) & (np.roll(steps, 1) <= 0))
+        left, right = crests - 1, (crests + 1) % gap.size
+        bend = gap[left] + gap[right] - 2 * gap[crests]
+        inside = ~(contact.mask[left] | contact.mask[right]) & (bend > 0)
+        crests, left, right, bend = crests[inside], left[inside], right[inside], bend[inside]
+        least = gap[crests] - (gap[right] - gap[left]) ** 2 / (8 * bend)
+        lowest = float(least.min(initial=np.inf))
         if lowest > 0:
             return np.empty(0, dtype=np.intp)
-        tied = np.flatnonzero(least <= lowest + self.tie_height)
+        tied = crests[least <= lowest + self.tie_height]
         # A crest halfway between two nodes must nucleate only once.
         return tied[np.diff(tied, prepend=tied[-1] - self.lattice.n) > 1]
 

@@ -91,7 +91,7 @@ class ExactWave(Method):
         a_from = state.internal or 0.0  # without adhesion contact grows from a point
         a_to = self._contact_width(prescribed)
         widths = np.linspace(a_from, a_to, self.states_per_step + 1)[1:]
-        states += [self._state(float(a)) for a in widths[:-1]]
+        states += self._states(widths[:-1])
         loop = self._loop
         end = control.prescribed(loop.fold_separation, loop.fold_mean_stress)
         if prescribed > end:
@@ -160,21 +160,32 @@ class ExactWave(Method):
             raise PathError(self.problem.full_contact(prescribed)) from None
 
     def _state(self, a: float, separation: float | None = None) -> ContactState:
-        s = float(self.wave.separation(a)) if separation is None else separation
+        (state,) = self._states(np.array([a]), separation)
+        return state
+
+    def _states(self, widths: Array, separation: float | None = None) -> list[ContactState]:
+        """Compute the states with the half-widths, by default on the equilibrium branch."""
+        wave = self.wave
+        s = wave.separation(widths) if separation is None else np.full(widths.size, separation)
+        adhesion, energy = wave.adhesion_energy(widths), wave.energy(widths)
+        columns = (widths, s, wave.mean_stress(widths), energy - adhesion, adhesion)
+        return [self._state_of(*values) for values in zip(*map(np.ndarray.tolist, columns))]
+
+    def _state_of(
+        self, a: float, s: float, stress: float, elastic: float, adhesion: float
+    ) -> ContactState:
         if a == 0:
             return self.detached(s)
-        left = (self.crest - a) % self.wave.period
-        edges: Array = np.array([[left, left + 2 * a]])
-        adhesion = float(self.wave.adhesion_energy(a))
-        stress, wave = float(self.wave.mean_stress(a)), self.wave
-        held = self.problem.control.potential(0.0, s, stress, wave.amplitude, wave.period)
+        period = self.wave.period
+        left = (self.crest - a) % period
+        control = self.problem.control
         return ContactState(
             separation=s,
-            edges=edges,
+            edges=np.array([[left, left + 2 * a]]),
             mean_stress=stress,
-            elastic_energy=float(self.wave.energy(a)) - adhesion,
+            elastic_energy=elastic,
             adhesion_energy=adhesion,
-            contact_fraction=2 * a / self.wave.period,
-            hold_energy=held,
+            contact_fraction=2 * a / period,
+            hold_energy=control.potential(0.0, s, stress, self.wave.amplitude, period),
             internal=a,
         )

@@ -54,8 +54,8 @@ def test_the_exact_method_keeps_every_bound_of_the_wave(judged):
 class _Shifted(ExactWave):
     """Edges 1e-4 λ too far out, everything else exact."""
 
-    def _state(self, a: float, separation: float | None = None) -> ContactState:
-        state = super()._state(a, separation)
+    def _state_of(self, *values: float) -> ContactState:
+        state = super()._state_of(*values)
         if not state.patches:
             return state
         fraction = state.contact_fraction + 2e-4
@@ -65,8 +65,8 @@ class _Shifted(ExactWave):
 class _Offset(ExactWave):
     """A constant energy is missing whenever there is contact: γ × 1e-3 λ."""
 
-    def _state(self, a: float, separation: float | None = None) -> ContactState:
-        state = super()._state(a, separation)
+    def _state_of(self, *values: float) -> ContactState:
+        state = super()._state_of(*values)
         missing = 1e-3 * self.wave.period * self.problem.work_of_adhesion
         return replace(state, elastic_energy=state.elastic_energy - missing)
 
@@ -74,8 +74,8 @@ class _Offset(ExactWave):
 class _Tense(ExactWave):
     """Mean stresses 0.1 % too high."""
 
-    def _state(self, a: float, separation: float | None = None) -> ContactState:
-        state = super()._state(a, separation)
+    def _state_of(self, *values: float) -> ContactState:
+        state = super()._state_of(*values)
         return replace(state, mean_stress=1.001 * state.mean_stress)
 
 
