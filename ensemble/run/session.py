@@ -279,14 +279,20 @@ def _origins(comm: Any) -> list[str]:
 
 
 def _warm_up(comm: Any, methods: Collection[str], say: Callable[[str], None]) -> None:
-    """Compile on one rank of each node, and load that on the others, before the first task."""
+    """Compile on one rank of each node, and load that on the workers, before the first task.
+
+    Code for many gaps that is there already is loaded by the first loop that has as many.
+    """
     if not methods:
         return
-    from adhesis.ensemble.warm import warm_up  # brings the compiler in
+    from adhesis.ensemble.warm import compiled_in, warm_up  # brings the compiler in
 
     def prepare_rank(first: bool) -> bool:
-        heard = first and (comm is None or comm.rank == 0)
-        warm_up(methods, say if heard else lambda text: None)
+        lacking = any(compiled_in(method) is None for method in methods)
+        hands_out = comm is not None and comm.rank == 0  # and computes no task
+        if lacking or not hands_out:
+            heard = first and (comm is None or hands_out)
+            warm_up(methods, say if heard else lambda text: None, many_gaps=lacking)
         return True
 
     one_a_node_first(comm, prepare_rank)
