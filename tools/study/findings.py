@@ -47,8 +47,10 @@ def _span(texts: list[str]) -> str:
 def _readings(study: Study) -> list[str]:
     every = every_reading(study)
     whole = complete(every)
-    verdicts = Counter(reading.verdict for reading in every)
+    verdicts = Counter(reading.verdict for reading in whole)
     best = best_of(whole)
+    others = [r for r in every if len(r.cells) < len(TABLE_1) and r.verdict == "compatible"]
+    partly = "".join(f"; with {len(r.cells)} values {r.name} is compatible" for r in others)
     largest = {
         cell: max(r.means[r.cells.index(cell)] for r in every if cell in r.cells)
         for cell in ((0.7, 0.07), (0.8, 0.07))
@@ -56,10 +58,9 @@ def _readings(study: Study) -> list[str]:
     means = " and ".join(f"{m:.3g} where the paper has {TABLE_1[c]:g}" for c, m in largest.items())
     return [
         "some readings are compatible with all values of Table 1",
-        f"of {len(every)} readings {verdicts['compatible']} are compatible, "
-        f"{verdicts['doubtful']} doubtful, {verdicts['excluded']} excluded; over all of them the "
-        f"largest means are {means}; of the {len(whole)} with all eight values the best, "
-        f"{best.name}, has p {p_text(best.p)}",
+        f"of {len(whole)} readings with all eight values {verdicts['compatible']} are compatible, "
+        f"{verdicts['doubtful']} doubtful, {verdicts['excluded']} excluded; the best, {best.name}, "
+        f"has p {p_text(best.p)}{partly}; over all {len(every)} the largest means are {means}",
         "holds" if verdicts["compatible"] else "wrong",
     ]
 

@@ -116,7 +116,9 @@ def scaling_note(study: Study) -> str:
 def readings_note(study: Study) -> str:
     """Whether any reading is compatible, and what reaches the two largest values."""
     every = every_reading(study)
-    compatible = sum(reading.verdict == "compatible" for reading in complete(every))
+    whole = complete(every)
+    compatible = sum(reading.verdict == "compatible" for reading in whole)
+    partly = [r for r in every if len(r.cells) < len(TABLE_1) and r.verdict == "compatible"]
     worst = Counter(reading.worst for reading in every)
     (first, n), (second, m) = worst.most_common(2)
     cells = ((0.7, 0.07), (0.8, 0.07))
@@ -137,8 +139,16 @@ def readings_note(study: Study) -> str:
     )
     means = " and ".join(f"{mean:.3g}" for mean in largest.get(True, ()))
     machines = f" Machines of finite stiffness give up to {means} there." if means else ""
+    others = (
+        f" Of the {len(every) - len(whole)} others, which lack a value or more, "
+        f"{', '.join(f'{r.name} ({len(r.cells)} values)' for r in partly)} is compatible with the "
+        "values that it has."
+        if partly
+        else ""
+    )
     return (
-        f"**{compatible or 'None'} of {len(every)} does.** Whatever the normalisation, spectrum, "
+        f"**{compatible or 'None'} of the {len(whole)} readings with all eight values does.**"
+        f"{others} Whatever the normalisation, spectrum, "
         "amplitude law and turning point, even one chosen cell by cell, the largest means at a "
         f"fixed separation are {fixed}.{machines} {TABLE_1[first]:g} lies furthest off in {n} of "
         f"the readings, {TABLE_1[second]:g} in {m}."
