@@ -83,7 +83,7 @@ def test_the_results_are_those_of_the_campaigns(study):
 
 
 def test_the_list_of_readings_is_what_the_results_make(study):
-    """Whether the paper used one set of profiles for all cells changes no verdict on eight values."""
+    """Whether the paper used one set of profiles for all cells changes no verdict on them."""
     with (STUDY / "readings.csv").open(encoding="utf-8") as stream:
         written = list(csv.reader(stream))[1:]
     assert written == all_readings(study)[1]
