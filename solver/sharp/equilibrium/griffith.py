@@ -10,7 +10,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT, RIGHT_PATCH, map_gaps
+from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, measure_at
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 from adhesis.solver.sharp.tolerances import CLOSING_SHARE
@@ -55,10 +55,11 @@ class EdgeLaw(NamedTuple):
 @compiled
 def shortest_length(gaps: Array) -> float:
     """Find the length of the shortest gap or patch."""
-    table = map_gaps(gaps)
+    count = gaps.shape[0]
     least = 2 * np.pi
-    for k in range(table.shape[0]):
-        least = min(least, table[k, RIGHT] - table[k, LEFT], table[k, RIGHT_PATCH])
+    for k in range(count):
+        after = gaps[k + 1, 0] if k + 1 < count else gaps[0, 0] + 2 * np.pi
+        least = min(least, gaps[k, 1] - gaps[k, 0], after - gaps[k, 1])
     return least
 
 
