@@ -64,6 +64,24 @@ def shortest_length(gaps: Array) -> float:
 
 
 @compiled
+def total_length(gaps: Array) -> float:
+    """Add up the lengths of all gaps."""
+    total = 0.0
+    for k in range(gaps.shape[0]):
+        total += gaps[k, 1] - gaps[k, 0]
+    return total
+
+
+@compiled
+def total_motion(before: Array, after: Array) -> float:
+    """Add up the motion of all edges between two states of the same gaps."""
+    total = 0.0
+    for k in range(before.shape[0]):
+        total += abs(after[k, 0] - before[k, 0]) + abs(after[k, 1] - before[k, 1])
+    return total
+
+
+@compiled
 def critical_opening(theta: float, law: EdgeLaw, panels: Panels) -> tuple[float, float]:
     """Compute C_c at θ, and its derivative."""
     measure, slope = measure_at(theta, panels)
