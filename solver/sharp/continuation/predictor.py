@@ -150,7 +150,7 @@ def leading_edge(
 
 @compiled
 def _led(on: float, way: float, leading: LeadingEdge) -> float:
-    """How far the leading edge has gone where d has gone ``on``, both in units of ways."""
+    """Solve for the way of the leading edge where d has gone ``on``, both in units of ways."""
     here, square, cube, fold = leading.here, leading.square, leading.cube, leading.fold
     if on * abs(way) >= leading.fold_distance:
         return fold

@@ -52,7 +52,7 @@ class Minima(NamedTuple):
 
 
 class Lengths(NamedTuple):
-    """What a search for touches knows of the problem.
+    """Constants of a problem that a search for touches takes.
 
     Attributes
     ----------
