@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import Field, fields
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from adhesis.solver.views import Shown
+
+T = TypeVar("T", bound="ByValue")
 
 _MANY = 4  # entries of a tuple that are shown
 
@@ -28,9 +30,8 @@ class ByValue(Shown):
 
     def __post_init__(self) -> None:
         """Make every array read-only; the owner of its memory may still write to it."""
-        arrays = [entry for entry in self.__dict__.items() if isinstance(entry[1], np.ndarray)]
-        for name, value in arrays:
-            if value.flags.writeable:
+        for name, value in self.__dict__.items():  # no name is added or removed
+            if isinstance(value, np.ndarray) and value.flags.writeable:
                 view = value.view()
                 view.setflags(write=False)
                 self.__dict__[name] = view
@@ -63,6 +64,13 @@ class ByValue(Shown):
             if entry.repr
         )
         return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def with_values(value: T, **changed: Any) -> T:
+    """Return a copy with other values of some fields, which need no check."""
+    copy = object.__new__(type(value))  # dataclasses.replace() takes ten times as long
+    copy.__dict__.update(value.__dict__, **changed)
+    return copy
 
 
 def _compared(value: ByValue) -> list[Field[Any]]:

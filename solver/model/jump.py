@@ -22,14 +22,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.profile import Array
 from adhesis.solver.views import Shown
 
-Indices = NDArray[np.int64]
+Patches = list[list[float]]
+Indices = list[int]
 
 Branch = Literal["loading", "unloading"]
 BRANCHES: tuple[Branch, ...] = get_args(Branch)
@@ -145,49 +143,63 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     period : float
         λ in m.
     """
-    if len(after) == 0:
-        longest = float((before[:, 1] - before[:, 0]).max()) if len(before) else 0.0
-        return "pull-off", longest
-    touches, one = _overlapping(before, after, period)
-    touched, other = _overlapping(after, before, period)
-    length = 0.0
-    for mine, others, hits, hit in ((before, after, touches, one), (after, before, touched, other)):
-        moved = hits != 1
-        single = np.flatnonzero(~moved)
-        moved[single] = ~_same(mine[single], others[hit[single]], period)
-        length = float((mine[moved, 1] - mine[moved, 0]).max(initial=length))
-    if (touched == 0).any():
+    touched_by, touching, length = _compare(before.tolist(), after.tolist(), period)
+    if not touching:
+        return "pull-off", length
+    if min(touching) == 0:
         return "snap-in", length
-    if (touched > 1).any():
+    if max(touching) > 1:
         return "merging", length
-    if (touches == 0).any():
+    if min(touched_by) == 0:
         return "vanishing", length
-    if (touches > 1).any():
+    if max(touched_by) > 1:
         return "splitting", length
     grown = (after[:, 1] - after[:, 0]).sum() - (before[:, 1] - before[:, 0]).sum()
     return ("spreading" if grown >= 0 else "receding"), length
 
 
-def _overlapping(patches: Array, others: Array, period: float) -> tuple[Indices, Indices]:
+def _compare(before: Patches, after: Patches, period: float) -> tuple[Indices, Indices, float]:
+    """Count the overlaps of each patch before with those after, and the reverse.
+
+    Also returns the length of the largest patch, before or after, that is not the same in both.
+    """
+    touched_by, one = _overlapping(before, after, period)
+    touching, other = _overlapping(after, before, period)
+    length = max(
+        _longest_changed(before, after, touched_by, one, period),
+        _longest_changed(after, before, touching, other, period),
+    )
+    return touched_by, touching, length
+
+
+def _overlapping(patches: Patches, others: Patches, period: float) -> tuple[Indices, Indices]:
     """Count, for each patch, the ``others`` that overlap it on the circle; returns the first too.
 
     Patches of one state do not overlap, so their left and right edges have the same order.
     """
-    if len(others) == 0:
-        return np.zeros(len(patches), dtype=np.int64), np.zeros(len(patches), dtype=np.int64)
-    order = np.argsort(others[:, 0])
-    turns = period * np.arange(-1, 2)
-    left = np.add.outer(turns, others[order, 0]).ravel()
-    right = np.add.outer(turns, others[order, 1]).ravel()
-    first = np.searchsorted(right, patches[:, 0], side="right")
-    stop = np.searchsorted(left, patches[:, 1], side="left")
-    hits = np.minimum(np.maximum(stop - first, 0), len(others))  # clip() takes ten times as long
-    return hits, order[first % len(others)]
+    turns = [[turn * period + edge for edge in other] for turn in (-1, 0, 1) for other in others]
+    hits, firsts = [], []
+    begin = behind = 0
+    for left, right in patches:
+        while begin < len(turns) and turns[begin][1] <= left:
+            begin += 1
+        while behind < len(turns) and turns[behind][0] < right:
+            behind += 1
+        hits.append(min(max(behind - begin, 0), len(others)))
+        firsts.append(begin % max(len(others), 1))
+    return hits, firsts
 
 
-def _same(one: Array, two: Array, period: float) -> NDArray[np.bool_]:
-    """Compare the edges of patches on the circle."""
-    offset = (one[:, 0] - two[:, 0] + period / 2) % period - period / 2
-    change = (one[:, 1] - one[:, 0]) - (two[:, 1] - two[:, 0])
-    same: NDArray[np.bool_] = np.maximum(np.abs(offset), np.abs(change)) < 1e-12 * period
-    return same
+def _longest_changed(
+    patches: Patches, others: Patches, hits: Indices, firsts: Indices, period: float
+) -> float:
+    """Measure the longest of the patches that are not one of the ``others``."""
+    longest = 0.0
+    for (left, right), count, first in zip(patches, hits, firsts, strict=True):
+        if count == 1:
+            offset = (left - others[first][0] + period / 2) % period - period / 2
+            change = (right - left) - (others[first][1] - others[first][0])
+            if max(abs(offset), abs(change)) < 1e-12 * period:
+                continue
+        longest = max(longest, right - left)
+    return longest

@@ -61,14 +61,17 @@ def on_one_thread(function: F) -> F:
     def limited(*args: Any, **kwargs: Any) -> Any:
         with _in_use:
             # ThreadpoolController.limit() also asks each library for its version: 20 times as long
-            libraries = _libraries().lib_controllers
-            before = [library.num_threads for library in libraries]
+            threaded = [
+                (library, threads)
+                for library in _libraries().lib_controllers
+                if (threads := library.num_threads) != 1
+            ]
             try:
-                for library in libraries:
+                for library, _ in threaded:
                     library.set_num_threads(1)
                 return function(*args, **kwargs)
             finally:
-                for library, threads in zip(libraries, before, strict=True):
+                for library, threads in threaded:
                     library.set_num_threads(threads)
 
     decorated: Any = limited

@@ -63,3 +63,39 @@ def test_only_running_edges_are_small_scale():
     }
     assert {kind for kind, small in kinds.items() if small} == {"spreading", "receding"}
     assert {"spreading", "receding"} == SMALL_SCALE
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_kinds_of_many_patches_follow_from_the_pairs_that_overlap(seed):
+    """Counted pair by pair on the circle, without the order of the patches."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 7))
+    before, after = (
+        np.sort(rng.random(2 * n)).reshape(-1, 2) for n in (count, int(rng.integers(1, 7)))
+    )
+    # a state of which only one edge has moved, every other time
+    if seed % 2:
+        after = before.copy()
+        after[-1, 1] += 1e-3
+    shift = rng.random()
+
+    def turned(edges: np.ndarray) -> np.ndarray:
+        new = edges + shift - (edges[:, :1] + shift >= 1)
+        return new[np.argsort(new[:, 0])]
+
+    over = np.array(
+        [[a < d and c < b for c, d in after.tolist()] for a, b in before.tolist()]
+    ).astype(int)
+    rules = (
+        (over.sum(axis=0).min() == 0, "snap-in"),
+        (over.sum(axis=0).max() > 1, "merging"),
+        (over.sum(axis=1).min() == 0, "vanishing"),
+        (over.sum(axis=1).max() > 1, "splitting"),
+        (np.diff(after).sum() >= np.diff(before).sum(), "spreading"),
+        (True, "receding"),
+    )
+    expected = next(kind for applies, kind in rules if applies)
+    found, length = classify(turned(before), turned(after), 1.0)
+    assert found == expected
+    if seed % 2:
+        assert length == pytest.approx(after[-1, 1] - after[-1, 0])

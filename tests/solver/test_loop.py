@@ -307,7 +307,7 @@ def test_exact_wave_fields_fulfil_the_contact_conditions():
         ([[1, 2], [4, 5]], [[1, 2], [4, 4.25]], "receding", 1.0),
         # Across the end of the period (λ = 10): the same patch, written from either side.
         ([[9.5, 10.5]], [[9.0, 10.5]], "spreading", 1.5),
-        ([[0.0, 0.5], [4, 5]], [[9.5, 10.5], [4, 5]], "spreading", 1.0),
+        ([[0.0, 0.5], [4, 5]], [[4, 5], [9.5, 10.5]], "spreading", 1.0),
         # Events in one jump: a new patch outweighs a merger, a merger outweighs a loss.
         ([[1, 2], [3, 4]], [[1, 4], [6, 7]], "snap-in", 3.0),
         ([[1, 2], [3, 4], [8, 9]], [[1, 4]], "merging", 3.0),

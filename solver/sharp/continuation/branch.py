@@ -183,6 +183,8 @@ class Branch:
         self.point, self._window = event.point, window
         if event.is_output:
             self._output = event.point
+        if event.point.at == self._target.at:
+            return  # no further step is taken
         self._predictor = Predictor(event.point)
         self.steps.accept(step, self._predictor)
         self.in_windows = self._edges.uses_windows(event.point.gaps)

@@ -30,6 +30,7 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     SAME_BRANCH,
 )
+from adhesis.solver.values import with_values
 
 
 class Follower:
@@ -64,7 +65,7 @@ class Follower:
 
     def remembered(self, memory: Memory | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
-        self.nucleation.clearances.seen = NOT_SEEN if memory is None else memory.seen
+        self.nucleation.seen = NOT_SEEN if memory is None else memory.seen
         self.openings.healed = []
         if memory is None or memory.course is None:
             return None
@@ -115,14 +116,14 @@ class Follower:
             point.field.gaps,
             point.clearance,
             (point.at, point.rate, point.slope, point.previous),
-            self.nucleation.clearances.seen,
+            self.nucleation.seen,
         )
         # A dense field does not depend on the way to it; a hierarchical one does.
         if self.edges.uses_windows(point.field.gaps):
             self._last = None
         else:
             self._last = memory, point
-        history.states[-1] = replace(history.states[-1], internal=memory)
+        history.states[-1] = with_values(history.states[-1], internal=memory)
 
     def _at_point(
         self, history: History, branch: Branch, event: Accepted, target: Target

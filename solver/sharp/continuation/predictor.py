@@ -10,6 +10,7 @@ edge leads, the rates give a parabola in d.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,64 +47,15 @@ class Predictor:
     def __init__(self, point: Point) -> None:
         self.point = point
         self.way, self.fold_distance = 0.0, math.inf
-        # d as a polynomial of how far the leading edge goes on; both in units of their ways
-        self._way_by_lead: tuple[float, float, float] | None = None
-        self._fold = math.inf  # where that has its extremum
-        rate = point.rate
-        self._lead = lead = int(abs(rate).argmax())
-        self.fastest = abs(float(rate[lead]))
-        earlier = point.previous
+        rate, earlier = point.rate, point.previous
         if earlier is None or earlier.rate.shape != rate.shape or earlier.at == point.at:
+            self.fastest = float(np.abs(rate).max())
             return
-        self.way = way = point.at - earlier.at
-        self._earlier = earlier
-        edge = divmod(lead, 2)
-        gone = float(point.gaps[edge] - earlier.gaps[edge]) * (1 - 2 * edge[1])
-        self._gone = gone
-        before, here = gone / (way * float(earlier.rate[lead])), gone / (way * float(rate[lead]))
-        if 0 < before < math.inf and 0 < here < math.inf:
-            self._look_ahead(before, here)
-
-    def _look_ahead(self, before: float, here: float) -> None:
-        """Find the fold from d's derivatives by the way of the leading edge at both points."""
-        square, cube = 2 * here + before - 3, here + before - 2
-        self._way_by_lead = here, square, cube
-        root = square * square - 3 * cube * here
-        if root >= 0 and math.sqrt(root) > square:
-            fold = here / (math.sqrt(root) - square)
-            if fold < CUBIC_TRUSTED:
-                self._fold = fold
-                self.fold_distance = abs(self.way) * fold * (here + fold * (square + fold * cube))
-                return
-        # by the derivatives alone
-        self._way_by_lead = here, (here - before) / 2, 0.0
-        if before > here and here * here < 2 * PREDICTION_TRUSTED * (before - here):
-            self._fold = here / (before - here)
-            self.fold_distance = abs(self.way) * here * self._fold / 2
-
-    def _led(self, on: float, by: tuple[float, float, float]) -> float:
-        """How far the leading edge has gone where d has gone ``on``, both in units of ways."""
-        if on * abs(self.way) >= self.fold_distance:
-            return self._fold
-        here, square, cube = by
-        low, high = 0.0, min(self._fold, 2 * on / here)
-        while high < self._fold and high * (here + high * (square + high * cube)) < on:
-            low, high = high, 2 * high
-            if high > PREDICTION_TRUSTED * 2 * on / here:
-                return low
-        lead = min(on / here, high)
-        for _ in range(PREDICTOR_ITERATIONS):
-            value = lead * (here + lead * (square + lead * cube)) - on
-            if value > 0:
-                high = lead
-            else:
-                low = lead
-            slope = here + lead * (2 * square + 3 * lead * cube)
-            newton = lead - value / slope if slope > 0 else math.inf
-            if abs(newton - lead) < 1e-9 * high:
-                break
-            lead = newton if low < newton < high else 0.5 * (low + high)
-        return lead
+        self.way, self._earlier = point.at - earlier.at, earlier
+        self._leading = leading = leading_edge(
+            point.gaps, rate, earlier.gaps, earlier.rate, self.way
+        )
+        self.fastest, self.fold_distance = leading.fastest, leading.fold_distance
 
     def gaps(self, at: float) -> Array:
         """Gaps that are expected at d = ``at``."""
@@ -111,14 +63,10 @@ class Predictor:
         on = at - point.at
         if not (on * self.way > 0 and abs(on) < PREDICTION_TRUSTED * abs(self.way)):
             return point.extrapolate(at)
-        led = math.nan
-        if self._way_by_lead is not None:
-            led = self._led(on / self.way, self._way_by_lead)
         earlier = self._earlier
         gaps: Array = predict_gaps(
-            point.gaps, point.rate, earlier.gaps, earlier.rate, on, self.way, self._lead,
-            self._gone, led,
-        )  # fmt: skip
+            point.gaps, point.rate, earlier.gaps, earlier.rate, on, self.way, self._leading
+        )
         return gaps
 
     def reach(self, most: float, finest: float) -> float:
@@ -131,10 +79,11 @@ class Predictor:
             return straight
         if self.fold_distance < 0.8 * finest:
             return self.across(finest)
-        most = most / abs(self._gone)
-        if most < self._fold and self._way_by_lead is not None:
-            here, square, cube = self._way_by_lead
-            straight = abs(self.way) * most * (here + most * (square + most * cube))
+        leading = self._leading
+        most = most / abs(leading.gone)
+        if math.isfinite(leading.here) and most < leading.fold:
+            polynomial = leading.here + most * (leading.square + most * leading.cube)
+            straight = abs(self.way) * most * polynomial
         else:
             straight = self.fold_distance
         left = max(LEFT_BEFORE_FOLD * self.fold_distance, LEAST_LEFT_BEFORE_FOLD * finest)
@@ -145,17 +94,100 @@ class Predictor:
         return (1 + LEFT_BEFORE_FOLD) * self.fold_distance + BEYOND_FOLD * finest
 
 
+class LeadingEdge(NamedTuple):
+    """The edge that leads between two points of a branch, and d along its motion.
+
+    d is a polynomial of how far the edge goes on, both in units of their ways between the points:
+    here·λ + square·λ² + cube·λ³; NaN if no edge leads.
+
+    Attributes
+    ----------
+    edge : int
+    fastest, gone : float
+        |dn/dd| at the second point, and how far it has gone between them.
+    here, square, cube : float
+    fold, fold_distance : float
+        Where the polynomial has its extremum, and that distance in d; inf without one.
+    """
+
+    edge: int
+    fastest: float
+    gone: float
+    here: float
+    square: float
+    cube: float
+    fold: float
+    fold_distance: float
+
+
+@compiled
+def leading_edge(
+    gaps: Array, rate: Array, gaps_before: Array, rate_before: Array, way: float
+) -> LeadingEdge:
+    """Find the leading edge of two points that are ``way`` apart in d, and the fold ahead."""
+    edge = int(np.argmax(np.abs(rate)))
+    k, side = edge // 2, edge % 2
+    fastest = abs(rate[edge])
+    gone = (gaps[k, side] - gaps_before[k, side]) * (1 - 2 * side)
+    before, here = gone / (way * rate_before[edge]), gone / (way * rate[edge])
+    if not (0 < before < np.inf and 0 < here < np.inf):
+        return LeadingEdge(edge, fastest, gone, np.nan, np.nan, np.nan, np.inf, np.inf)
+    square, cube = 2 * here + before - 3, here + before - 2
+    root = square * square - 3 * cube * here
+    if root >= 0 and np.sqrt(root) > square:
+        fold = here / (np.sqrt(root) - square)
+        if fold < CUBIC_TRUSTED:
+            distance = abs(way) * fold * (here + fold * (square + fold * cube))
+            return LeadingEdge(edge, fastest, gone, here, square, cube, fold, distance)
+    # by the derivatives alone
+    square = (here - before) / 2
+    fold, distance = np.inf, np.inf
+    if before > here and here * here < 2 * PREDICTION_TRUSTED * (before - here):
+        fold = here / (before - here)
+        distance = abs(way) * here * fold / 2
+    return LeadingEdge(edge, fastest, gone, here, square, 0.0, fold, distance)
+
+
+@compiled
+def _led(on: float, way: float, leading: LeadingEdge) -> float:
+    """Solve for the way of the leading edge where d has gone ``on``, both in units of ways."""
+    here, square, cube, fold = leading.here, leading.square, leading.cube, leading.fold
+    if on * abs(way) >= leading.fold_distance:
+        return fold
+    low, high = 0.0, min(fold, 2 * on / here)
+    while high < fold and high * (here + high * (square + high * cube)) < on:
+        low, high = high, 2 * high
+        if high > PREDICTION_TRUSTED * 2 * on / here:
+            return low
+    lead = min(on / here, high)
+    for _ in range(PREDICTOR_ITERATIONS):
+        value = lead * (here + lead * (square + lead * cube)) - on
+        if value > 0:
+            high = lead
+        else:
+            low = lead
+        slope = here + lead * (2 * square + 3 * lead * cube)
+        newton = lead - value / slope if slope > 0 else np.inf
+        if abs(newton - lead) < 1e-9 * high:
+            break
+        lead = newton if low < newton < high else 0.5 * (low + high)
+    return lead
+
+
 @compiled
 def predict_gaps(
-    gaps: Array, rate: Array, gaps_before: Array, rate_before: Array, on: float, way: float,
-    lead: int, gone: float, led: float,
-) -> Array:  # fmt: skip
-    """Predict gaps at a distance ``on`` in d, from two points that are ``way`` apart.
-
-    The edge ``lead`` has ``gone`` so far between them, and goes ``led`` times as far; NaN if no
-    edge leads.
-    """
-    here_by, before_by = gone / rate[lead], gone / rate_before[lead]
+    gaps: Array,
+    rate: Array,
+    gaps_before: Array,
+    rate_before: Array,
+    on: float,
+    way: float,
+    leading: LeadingEdge,
+) -> Array:
+    """Predict gaps at a distance ``on`` in d from two points that are ``way`` apart."""
+    here_by = leading.gone / rate[leading.edge]
+    before_by = leading.gone / rate_before[leading.edge]
+    led = np.nan if np.isnan(leading.here) else _led(on / way, way, leading)
     out = np.empty_like(gaps)
     for e in range(rate.shape[0]):
         k, side = e // 2, e % 2

@@ -10,7 +10,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.solution import Solution
-from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT, RIGHT_PATCH, map_gaps
+from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, measure_at
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 from adhesis.solver.sharp.tolerances import CLOSING_SHARE
@@ -55,11 +55,30 @@ class EdgeLaw(NamedTuple):
 @compiled
 def shortest_length(gaps: Array) -> float:
     """Find the length of the shortest gap or patch."""
-    table = map_gaps(gaps)
+    count = gaps.shape[0]
     least = 2 * np.pi
-    for k in range(table.shape[0]):
-        least = min(least, table[k, RIGHT] - table[k, LEFT], table[k, RIGHT_PATCH])
+    for k in range(count):
+        after = gaps[k + 1, 0] if k + 1 < count else gaps[0, 0] + 2 * np.pi
+        least = min(least, gaps[k, 1] - gaps[k, 0], after - gaps[k, 1])
     return least
+
+
+@compiled
+def total_length(gaps: Array) -> float:
+    """Add up the lengths of all gaps."""
+    total = 0.0
+    for k in range(gaps.shape[0]):
+        total += gaps[k, 1] - gaps[k, 0]
+    return total
+
+
+@compiled
+def total_motion(before: Array, after: Array) -> float:
+    """Add up the motion of all edges between two states of the same gaps."""
+    total = 0.0
+    for k in range(before.shape[0]):
+        total += abs(after[k, 0] - before[k, 0]) + abs(after[k, 1] - before[k, 1])
+    return total
 
 
 @compiled

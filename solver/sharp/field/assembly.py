@@ -45,9 +45,8 @@ def assemble_dense(
         nodes.slope[gaps] = 1.0
         equations.end_terms[gaps] = 0.0
     _fill_gaps(np.arange(gaps), nodes, equations, offset, model)
-    sine, cosine = np.sin(0.5 * nodes.theta), np.cos(0.5 * nodes.theta)
     for k in range(gaps):
-        _fill_rows(k, nodes, sine, cosine, equations.matrix)
+        _fill_rows(k, nodes, equations.matrix)
     return nodes, equations
 
 
@@ -59,8 +58,9 @@ def assemble_changed(
     old, known = before.nodes, before.equations
     offset = old.offset
     nodes = Nodes(
-        table, old.orders, offset, old.theta.copy(), old.weight.copy(), old.slope.copy()
-    )
+        table, old.orders, offset, old.theta.copy(), old.weight.copy(), old.sine.copy(),
+        old.cosine.copy(), old.slope.copy(),
+    )  # fmt: skip
     equations = Equations(known.matrix.copy(), known.load.copy(), known.end_terms.copy())
     known_table = old.table
     differs = np.zeros(table.shape[0], dtype=np.bool_)
@@ -70,10 +70,9 @@ def assemble_changed(
                 differs[k] = True
     changed: Integers = np.flatnonzero(differs)
     _fill_gaps(changed, nodes, equations, offset, model)
-    sine, cosine = np.sin(0.5 * nodes.theta), np.cos(0.5 * nodes.theta)
     matrix = equations.matrix
     for gap in changed:
-        _fill_rows(gap, nodes, sine, cosine, matrix)
+        _fill_rows(gap, nodes, matrix)
         for i in range(offset[gap], offset[gap + 1]):
             for j in range(offset[gap]):
                 matrix[j, i] = matrix[i, j]
@@ -109,7 +108,10 @@ def _allocate(
 ) -> tuple[Nodes, Equations]:
     """Allocate nodes and equations."""
     gaps, n = table.shape[0], offset[-1]
-    nodes = Nodes(table, orders, offset, np.empty(n), np.empty(n), np.empty((gaps, 2)))
+    nodes = Nodes(
+        table, orders, offset, np.empty(n), np.empty(n), np.empty(n), np.empty(n),
+        np.empty((gaps, 2)),
+    )  # fmt: skip
     equations = Equations(
         matrix=np.empty((n, columns)),
         load=np.empty((n, fields + 1)),
@@ -161,6 +163,7 @@ def _fill_nodes(k: int, s: Array, nodes: Nodes, load: Array, rules: GaussRules) 
     start, square = rules.vector_start[order], rules.matrix_start[order]
     modes = rules.modes[square : square + m * m].reshape(m, m)
     slope, theta, weight, base = nodes.slope, nodes.theta, nodes.weight, nodes.offset[k]
+    sine, cosine = nodes.sine, nodes.cosine
     eta, weights = rules.eta, rules.weights
     slope[k, 0] = 1 / theta_at(gap, -1.0)[1]
     slope[k, 1] = 1 / theta_at(gap, 1.0)[1]
@@ -168,6 +171,7 @@ def _fill_nodes(k: int, s: Array, nodes: Nodes, load: Array, rules: GaussRules) 
         place = base + i
         theta[place], stretch = theta_at(gap, eta[start + i])
         weight[place] = weights[start + i] * stretch
+        sine[place], cosine[place] = np.sin(0.5 * theta[place]), np.cos(0.5 * theta[place])
         load[i, 1] = weight[place]
         for field in range(s.shape[1]):
             total = 0.0
@@ -238,9 +242,10 @@ def mapped_kernel(alpha: float, x: float) -> float:
 
 
 @compiled
-def _fill_rows(k: int, nodes: Nodes, sine: Array, cosine: Array, matrix: Array) -> None:
+def _fill_rows(k: int, nodes: Nodes, matrix: Array) -> None:
     """Fill in the rows of gap k outside its diagonal block."""
     first, behind, weight = nodes.offset[k], nodes.offset[k + 1], nodes.weight
+    sine, cosine = nodes.sine, nodes.cosine
     for i in range(first, behind):
         _row_of_others(i, first, behind, sine, cosine, weight, matrix[i])
 

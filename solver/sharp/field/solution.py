@@ -56,6 +56,8 @@ class Nodes(NamedTuple):
         Order of each gap's rule, and first node of each gap.
     theta, weight : array, shape (N,)
         θ and X of the nodes.
+    sine, cosine : array, shape (N,)
+        Of θ/2.
     slope : array, shape (L, 2)
         dη/dθ at the gap ends.
     """
@@ -65,6 +67,8 @@ class Nodes(NamedTuple):
     offset: Integers
     theta: Array
     weight: Array
+    sine: Array
+    cosine: Array
     slope: Array
 
 
@@ -171,7 +175,7 @@ def no_solution(table: Array, orders: Integers, device: LoadingDevice) -> Soluti
     empty, none = np.empty(0), np.empty((0, 0))
     offset = np.zeros(gaps + 1, dtype=np.int64)
     return Solution(
-        nodes=Nodes(table, orders, offset, empty, empty, np.empty((gaps, 2))),
+        nodes=Nodes(table, orders, offset, empty, empty, empty, empty, np.empty((gaps, 2))),
         equations=Equations(none, none, np.empty((0, 0, 0))),
         factor=none,
         solved=none,

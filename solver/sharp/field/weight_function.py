@@ -83,8 +83,7 @@ def singular_loads(
     n = nodes.theta.shape[0]
     load = np.zeros((n, columns))
     area = np.zeros(edges.shape[0])
-    sine = np.sin(0.5 * nodes.theta)
-    cosine = np.cos(0.5 * nodes.theta)
+    sine, cosine = nodes.sine, nodes.cosine
     column = np.empty(n)
     for c in range(edges.shape[0]):
         e = edges[c]

@@ -42,16 +42,6 @@ _MINUS, _PLUS, _STRESS, _SLOPE = 0, 1, 2, 3
 
 
 @compiled
-def _widened(nodes: Array, count: int, more: int) -> Array:
-    """Return ``nodes`` with space for ``more`` columns beyond ``count``."""
-    if count + more <= nodes.shape[1]:
-        return nodes
-    wider = np.empty((nodes.shape[0], 2 * (count + more)))
-    wider[:, :count] = nodes[:, :count]
-    return wider
-
-
-@compiled
 def _artanh_over(y: float) -> float:
     """Compute artanh z/z, y = z², where |z| is hardly above 1/3."""
     series = 1 / 15 + y * (1 / 17 + y * (1 / 19 + y * (1 / 21 + y / 23)))
@@ -229,10 +219,10 @@ def _panel_nodes(
 
 
 @compiled
-def _short_gap(gap: Array, modes: int, panels: Panels, nodes: Array) -> tuple[Array, int]:
+def _short_gap(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Array, int]:
     """Put Gauss-Chebyshev nodes of the first kind in η: they serve s_n and s^± alike."""
     count = max(3 * panels.x.shape[0] + 6, 2 * modes)
-    nodes = _widened(nodes, 0, count)
+    nodes = np.empty((2 + fields, count))
     for i in range(count):
         t = (i + 0.5) * np.pi / count
         theta, stretch = theta_at(gap, np.cos(t))
@@ -248,17 +238,13 @@ def _short_gap(gap: Array, modes: int, panels: Panels, nodes: Array) -> tuple[Ar
 @compiled
 def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Array, int]:
     """Make the nodes of the moments of one gap; returns their number, too."""
-    nodes = np.empty((2 + fields, 1024))
     left = gap[LEFT]
     right = gap[RIGHT]
     width = panels.width
     if right - left <= SHORT_GAP_PANELS * width:
-        return _short_gap(gap, modes, panels, nodes)
+        return _short_gap(gap, modes, panels, fields)
     first = int(np.floor(left / width)) + 2  # an end piece is one to two finest panels long
     last = int(np.ceil(right / width)) - 2
-    nodes = _widened(nodes, 0, _most_end_nodes(gap[LEFT_PATCH], gap[RIGHT_PATCH], panels))
-    count = _end_piece(gap, 0, first * width - left, panels, nodes, 0)
-    count = _end_piece(gap, 1, right - last * width, panels, nodes, count)
     levels = panels.level_start.shape[0]
     tiles = np.empty((3, max(0, last - first)), dtype=np.int64)
     tiled = 0
@@ -290,7 +276,10 @@ def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Arra
         )
         tiled += 1
         panel += size
-    nodes = _widened(nodes, count, tiled * panels.x.shape[0])
+    most = _most_end_nodes(gap[LEFT_PATCH], gap[RIGHT_PATCH], panels)
+    nodes = np.empty((2 + fields, most + tiled * panels.x.shape[0]))
+    count = _end_piece(gap, 0, first * width - left, panels, nodes, 0)
+    count = _end_piece(gap, 1, right - last * width, panels, nodes, count)
     count = _panel_nodes(gap, tiles, tiled, panels, nodes, count)
     return nodes, count
 

@@ -16,9 +16,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import Nodes
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules, Integers
+from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 from adhesis.solver.sharp.tolerances import (
     CLEARANCE_LEFT,
     CLOSING_SAFETY,
@@ -76,43 +75,6 @@ NOT_SEEN = Seen(
 )  # fmt: skip
 
 
-class Clearances:
-    """What is known of the gaps since they were last looked at.
-
-    Parameters
-    ----------
-    wave : float
-        λ_min in θ.
-    critical : float
-        Critical opening C_c.
-
-    Attributes
-    ----------
-    seen : Seen
-        Set by whoever goes on from another state.
-    """
-
-    def __init__(self, wave: float, critical: float) -> None:
-        self._near, self._beside = COMPARABLE * wave, critical / np.sqrt(wave)
-        self.seen = NOT_SEEN
-
-    def left(self, field: GapField) -> Left:
-        """Return the clearance that is surely left in each gap."""
-        of = field.solution
-        left: Left = clearance_left(
-            field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, self._near,
-            self._beside,
-        )  # fmt: skip
-        return left
-
-    def note(self, field: GapField, place: Integers, clearance: Array) -> None:
-        """Keep what was seen: gaps just looked at (``place`` negative) with their clearance."""
-        of = field.solution
-        self.seen = noted(
-            field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, place, clearance
-        )
-
-
 @compiled
 def _low_opening(f: float, kind: int, node: int, rules: GaussRules) -> float:
     eta = rules.eta[rules.vector_start[kind] + node]
@@ -146,7 +108,11 @@ def clearance_left(
     near: float,
     beside: float,
 ) -> Left:
-    """As :meth:`Clearances.left`; ``beside`` is the closing beside an edge for its motion."""
+    """Compute the clearance that is surely left in each gap.
+
+    Nodes further than ``near`` from their place are not compared; ``beside`` is the closing beside
+    an edge for its motion.
+    """
     orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
     left = np.full(gaps.shape[0], -1.0)
     place = np.full(gaps.shape[0], -1)
@@ -204,7 +170,7 @@ def noted(
     place: Integers,
     clearance: Array,
 ) -> Seen:
-    """As :meth:`Clearances.note`."""
+    """Note what was seen: gaps just looked at (``place`` negative) with their clearance."""
     orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
     new_gaps = gaps.copy()
     new_theta = theta.copy()

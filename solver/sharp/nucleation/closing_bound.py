@@ -6,6 +6,7 @@ import numpy as np
 
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.griffith import total_length
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 
 
@@ -44,4 +45,4 @@ class ClosingBound:
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """
         factor = self._edges.system(point.gaps).closing_factor
-        return float(factor * 2 * np.pi / (point.gaps[:, 1] - point.gaps[:, 0]).sum())
+        return factor * 2 * np.pi / float(total_length(point.gaps))

@@ -22,14 +22,16 @@ from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.ends import with_patches
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules, Integers
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.clearance import Clearances
+from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN, Seen, clearance_left, noted
 from adhesis.solver.sharp.nucleation.closing import Closing
 from adhesis.solver.sharp.nucleation.gap_minima import bottoms_of
 from adhesis.solver.sharp.nucleation.location import Located
-from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, OVERLAP, TOUCH_TRIALS
+from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, COMPARABLE, OVERLAP, TOUCH_TRIALS
 
 
 @dataclass(frozen=True)
@@ -41,16 +43,33 @@ class Touch:
     curvature: float
 
 
-@dataclass(frozen=True, eq=False)
-class Minima:
-    """Local minima of the openings of all gaps: place, value and curvature, shape (minima,)."""
+class Minima(NamedTuple):
+    """Local minima of the openings of some gaps: place, value and curvature, shape (minima,)."""
 
     theta: Array
     opening: Array
     curvature: Array
 
 
-NO_MINIMA = Minima(np.empty(0), np.empty(0), np.empty(0))
+class Lengths(NamedTuple):
+    """Constants of a problem that a search for touches takes.
+
+    Attributes
+    ----------
+    near, beside : float
+        See ``clearance.clearance_left``.
+    surface, narrowest, widest : float
+        See :func:`seed_width`.
+    top : int
+        Highest harmonic of the profile.
+    """
+
+    near: float
+    beside: float
+    surface: float
+    narrowest: float
+    widest: float
+    top: int
 
 
 class TrackedGaps(NamedTuple):
@@ -61,37 +80,82 @@ class TrackedGaps(NamedTuple):
 
 
 @compiled
-def seed_width(curvature: float, surface: float, narrowest: float, widest: float) -> float:
+def seed_width(curvature: float, lengths: Lengths) -> float:
     """Width of the patch that is put where surfaces with the energy Γ touch with this curvature."""
-    first = (16 * surface / (np.pi * curvature**2)) ** (1 / 3)
-    width: float = min(max(0.5 * first, narrowest), widest)
+    first = (16 * lengths.surface / (np.pi * curvature**2)) ** (1 / 3)
+    width: float = min(max(0.5 * first, lengths.narrowest), lengths.widest)
     return width
 
 
 @compiled
-def clearances(
-    opening: Array, curvature: Array, surface: float, narrowest: float, widest: float
-) -> Array:
+def clearances(opening: Array, curvature: Array, lengths: Lengths) -> Array:
     """As :meth:`Nucleation.clearance`."""
     out = np.empty(opening.shape[0])
     for i in range(opening.shape[0]):
-        width = seed_width(curvature[i], surface, narrowest, widest)
+        width = seed_width(curvature[i], lengths)
         out[i] = opening[i]
         # Overlap of a narrow patch of width w: κw²/8 times a logarithm of the distance over which
         # the surface follows it, 10 to 20 here.
-        if width <= narrowest:
+        if width <= lengths.narrowest:
             out[i] += 4 * curvature[i] * width**2
     return out
 
 
+@compiled
+def look_at(
+    gaps: Integers, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
+    out: Array,
+) -> Minima:  # fmt: skip
+    """Find the minima of some gaps; ``out`` receives their least clearances, at their places."""
+    theta, opening, curvature, where = bottoms_of(gaps, nodes, f, rules, lengths.top, panels)
+    values = clearances(opening, curvature, lengths)
+    for k in gaps:
+        out[k] = np.inf
+    for i in range(where.shape[0]):
+        out[where[i]] = min(out[where[i]], values[i])
+    return Minima(theta, opening, curvature)
+
+
+@compiled
+def search(
+    gaps: Array, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
+    seen: Seen,
+) -> tuple[float, int, Minima, Seen]:  # fmt: skip
+    """Find the least clearance of a field, looking only at gaps that may be used up.
+
+    Also returns the number of these gaps, their minima, and what has been seen now.
+    """
+    left, place, fresh, is_same = clearance_left(
+        gaps, nodes, f, rules, seen, lengths.near, lengths.beside
+    )
+    minima = Minima(np.empty(0), np.empty(0), np.empty(0))
+    if fresh.shape[0] > 0:
+        minima = look_at(fresh, nodes, f, rules, panels, lengths, left)
+    if not is_same:
+        seen = noted(gaps, nodes, f, rules, seen, place, left)
+    return left.min(), fresh.shape[0], minima, seen
+
+
 class Nucleation:
-    """Finds touching points and puts seeds there: a criterion of ``location.locate``."""
+    """Finds touching points and puts seeds there: a criterion of ``location.locate``.
+
+    Attributes
+    ----------
+    seen : Seen
+        Gaps as they were when they were looked at; set by whoever goes on from another state.
+    """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
-        self.clearances = Clearances(edges.wave, edges.critical)
-        surface = math.pi * edges.critical**2 / 8  # Γ
-        self._seed = surface, 3 * edges.smallest, edges.longest_step
+        self.seen = NOT_SEEN
+        self._lengths = Lengths(
+            near=COMPARABLE * edges.wave,
+            beside=float(edges.critical / np.sqrt(edges.wave)),
+            surface=math.pi * edges.critical**2 / 8,  # Γ
+            narrowest=float(3 * edges.smallest),
+            widest=float(edges.longest_step),
+            top=edges.source.top,
+        )
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
         self.overlap = OVERLAP * problem.profile.h_max * problem.profile.q0
 
@@ -108,18 +172,9 @@ class Nucleation:
         overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
         return profile.h_max * profile.q0 - overlap, highest
 
-    def minima(self, field: GapField, gaps: Integers) -> tuple[Minima, Integers]:
-        """Local minima of the opening inside some gaps, and in which of them each lies."""
-        self.edges.count.openings += len(gaps)
-        of, source = field.solution, field.source
-        theta, opening, curvature, where = bottoms_of(
-            gaps, of.nodes, of.scaled_opening, GAUSS_RULES, source.top, source.panels
-        )
-        return Minima(theta, opening, curvature), where
-
     def clearance(self, opening: Array, curvature: Array) -> Array:
         """Opening left at minima before a patch is put there; not positive when it is time."""
-        return clearances(opening, curvature, *self._seed)
+        return clearances(opening, curvature, self._lengths)
 
     def ready(self, minima: Minima) -> list[Touch]:
         """Where to put patches: the place of largest overlap, and those that equal it."""
@@ -139,15 +194,13 @@ class Nucleation:
 
         Only those are looked at; see ``clearance``.
         """
-        left, place, fresh, is_same = self.clearances.left(field)
-        minima = NO_MINIMA
-        if fresh.size > 0:
-            minima, where = self.minima(field, fresh)
-            left[fresh] = np.inf
-            np.minimum.at(left, where, self.clearance(minima.opening, minima.curvature))
-        if not is_same:
-            self.clearances.note(field, place, left)
-        return float(left.min()), minima
+        of = field.solution
+        least, looked_at, minima, self.seen = search(
+            field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, field.source.panels,
+            self._lengths, self.seen,
+        )  # fmt: skip
+        self.edges.count.openings += looked_at
+        return least, minima
 
     @property
     def tolerance(self) -> float:
@@ -165,14 +218,21 @@ class Nucleation:
 
     def _clearance_of(self, field: GapField, gaps: Integers) -> Array:
         """Clearance of each of some gaps."""
-        minima, where = self.minima(field, gaps)
-        out = np.full(len(field.gaps), np.inf)
-        np.minimum.at(out, where, self.clearance(minima.opening, minima.curvature))
+        self.edges.count.openings += len(gaps)
+        of, out = field.solution, np.empty(len(field.gaps))
+        look_at(
+            gaps, of.nodes, of.scaled_opening, GAUSS_RULES, field.source.panels, self._lengths, out
+        )
         return out[gaps]
 
     def tracked(self, clear: Point, hit: Point) -> TrackedGaps | None:
         """Track the gaps that are open at one point and overlap at another."""
-        closed = np.flatnonzero(self.clearances.left(hit.field).clearance <= 0)
+        of, lengths = hit.field.solution, self._lengths
+        left = clearance_left(
+            hit.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, lengths.near,
+            lengths.beside,
+        )  # fmt: skip
+        closed = np.flatnonzero(left.clearance <= 0)
         after = self._clearance_of(hit.field, closed)
         closed, after = closed[after < 0], after[after < 0]
         if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:
@@ -210,5 +270,5 @@ class Nucleation:
         return with_patches(
             gaps,
             np.array([t.theta for t in touches]),
-            np.array([seed_width(t.curvature, *self._seed) for t in touches]),
+            np.array([seed_width(t.curvature, self._lengths) for t in touches]),
         )

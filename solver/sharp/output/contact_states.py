@@ -17,6 +17,7 @@ from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN, Seen
+from adhesis.solver.values import with_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +157,7 @@ class States:
             apart = gap_field.separation + gap_field.separation_by_prescribed * way
         work = -np.pi * (apart - gap_field.separation) * (gap_field.pressure + pressure)
         separation, mean_stress = apart / self.q0, pressure * self._half
-        return replace(
+        return with_values(
             state,
             separation=separation,
             mean_stress=mean_stress,

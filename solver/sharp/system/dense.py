@@ -12,7 +12,7 @@ from adhesis.solver.sharp.descent.gradient_flow import Descent, descend
 from adhesis.solver.sharp.descent.track import Stage, Track
 from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, total_motion
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
@@ -82,4 +82,4 @@ class DenseSystem(EdgeSystem):
 
     def closing_motion(self, before: Array, after: Array) -> float:
         """Motion of all edges together."""
-        return float(np.abs(after - before).sum())
+        return float(total_motion(before, after))
