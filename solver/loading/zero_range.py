@@ -283,20 +283,23 @@ def beyond_limit(
     loss: Any,
     work_of_adhesion: Any,
     largest_contact_fraction: Any,
-    *,
-    opens: bool = False,
+    strength: Any = math.inf,
+    barrier: Any = 0.0,
 ) -> NDArray[np.bool_]:
-    """Return which losses are those of the zero-range limit alone; values or arrays of one shape.
+    """Return which losses zero range alone makes so large; values or arrays of one shape.
 
     Their valid range is below :data:`DOUBTFUL_RANGE`, or they are more than :data:`DOUBTFUL_LOSS`
-    times the work of adhesion of the largest contact. None of them is where patches open from
-    inside, at a finite strength.
+    times the work of adhesion of the largest contact. At a finite strength it is those at which
+    the tension inside patches exceeds it :data:`DOUBTFUL_EXCESS` times, or whose barriers are more
+    than :data:`DOUBTFUL_BARRIER` of them. None is where the strength is unknown (NaN).
     """
-    if opens:
-        return np.zeros(np.shape(loss), dtype=np.bool_)
-    most = DOUBTFUL_LOSS * np.asarray(work_of_adhesion) * np.asarray(largest_contact_fraction)
-    above = (np.asarray(loss) > most) & (np.asarray(work_of_adhesion) > 0)
-    return np.asarray((np.asarray(valid_range) < DOUBTFUL_RANGE) | above)
+    loss, gamma = np.asarray(loss), np.asarray(work_of_adhesion)
+    valid_range, strength = np.asarray(valid_range), np.asarray(strength)
+    most = DOUBTFUL_LOSS * gamma * np.asarray(largest_contact_fraction)
+    closed = (valid_range < DOUBTFUL_RANGE) | ((loss > most) & (gamma > 0))
+    exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
+    opened = exceeded | (np.asarray(barrier) > DOUBTFUL_BARRIER * np.abs(loss))
+    return np.asarray(np.where(np.isposinf(strength), closed, np.isfinite(strength) & opened))
 
 
 def range_warnings(

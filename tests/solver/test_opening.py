@@ -378,7 +378,14 @@ def test_barriers_and_tensions_that_are_not_small_make_a_loss_doubtful():
     assert len(range_warnings(problem, GAMMA / (1.02 * STRENGTH), 1.0, [0.5])) == 1
     (excess,) = range_warnings(problem, GAMMA / (2 * STRENGTH), 1.0, [0.5])
     assert "reaches 8 Pa, 2 times the strength (4 Pa)" in excess
-    assert not beyond_limit([1e-12], [1.0], 0.02, 0.5, opens=True).any()
+    # excess, barrier over the loss; the last has zero range, the one before it an unknown strength
+    wrong = beyond_limit(
+        0.02 / (1e9 * np.array([1.005, 1.02, 0.5, 0.5, 1.02, 1e3])),
+        *([1.0] * 6, 0.02, 0.5),
+        [1e9, 1e9, 1e9, 1e9, math.nan, math.inf],
+        [0.0, 0.0, 0.09, 0.11, math.nan, 0.0],
+    )
+    assert wrong.tolist() == [False, True, False, True, False, True]
 
 
 # ---------------------------------------------------------------------- the problem
