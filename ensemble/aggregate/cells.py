@@ -30,9 +30,12 @@ _PER_TASK = (
     *("wall_time", "cpu_time", "states", "jump_count"),
     *("loss_error", "races", "energy_at_stake"),
     *("valid_range", "edge_range", "largest_interior_tension"),
+    *("opening_strength", "openings", "barrier"),
 )
-# Of these the least or the largest of a cell counts; a range may be infinite.
-_NOT_AVERAGED = frozenset(("valid_range", "edge_range", "largest_interior_tension"))
+# Of these the least or the largest of a cell counts; a range or a strength may be infinite.
+_NOT_AVERAGED = frozenset(
+    ("valid_range", "edge_range", "largest_interior_tension", "opening_strength")
+)
 _WITH_INTERVAL = (
     "loss",
     "loss_dimensionless",
@@ -82,8 +85,8 @@ class Cell:
         ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
         spent per largest contact area, in J/m²).
     estimates : dict of Estimate
-        Means of these, but not of ``valid_range``, ``edge_range``, ``largest_interior_tension``.
-        Only losses, pull-off and largest contact have an interval.
+        Means of these, but not of ``valid_range``, ``edge_range``, ``largest_interior_tension``,
+        ``opening_strength``. Only losses, pull-off and largest contact have an interval.
     curves : dict of Curve
         ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
         (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,

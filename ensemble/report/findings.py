@@ -15,7 +15,7 @@ from adhesis.ensemble.campaign.precision import as_percent
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import cell_name, lines_along, place, together
 from adhesis.ensemble.report.tables.loss_tables import least
-from adhesis.ensemble.task.doubt import BEYOND_LIMIT, bound, doubtful
+from adhesis.ensemble.task.doubt import bound, doubtful, why_beyond
 from adhesis.solver.loading.zero_range import beyond_limit
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
@@ -235,13 +235,16 @@ def _limit(data: Aggregate) -> list[str]:
         for cell in data.cells
         if (value := least(cell.values["valid_range"])) is not None
     ]
-    if not found or data.campaign.material.opens:
-        return []  # patches open from inside where the limit ends
-    low, cell = min(found, key=lambda entry: entry[0])
-    out = [
-        f"The zero-range limit holds for ranges of adhesion below {low:.3g} m: the least "
-        f"valid_range of all loops, at {cell_name(cell)}."
-    ]
+    if not found:
+        return []
+    opens = data.campaign.material.opens
+    out = []
+    if not opens:  # else patches open from inside where the limit ends
+        low, cell = min(found, key=lambda entry: entry[0])
+        out.append(
+            f"The zero-range limit holds for ranges of adhesion below {low:.3g} m: the least "
+            f"valid_range of all loops, at {cell_name(cell)}."
+        )
     beyond = [
         (int(wrong.sum()), cell)
         for cell in data.cells
@@ -251,13 +254,14 @@ def _limit(data: Aggregate) -> list[str]:
                 cell.values["loss"],
                 cell.work_of_adhesion,
                 cell.values["largest_contact_fraction"],
+                *((cell.values["opening_strength"], cell.values["barrier"]) if opens else ()),
             )
         ).any()
     ]
     if beyond:
         count = sum(number for number, _ in beyond)
         out.append(
-            f"WARNING: {count} of {data.done} losses are doubtful, for {BEYOND_LIMIT}: "
+            f"WARNING: {count} of {data.done} losses are doubtful, for {why_beyond(opens)}: "
             f"{_listed([cell_name(cell) for _, cell in beyond])}."
         )
     return out

@@ -27,7 +27,7 @@ from adhesis.ensemble.results.read import (
     named_rows,
 )
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from adhesis.ensemble.task.doubt import BEYOND_LIMIT, doubtful
+from adhesis.ensemble.task.doubt import doubtful, why_beyond
 from adhesis.solver.loading.zero_range import beyond_limit
 from adhesis.solver.values import finite
 
@@ -35,6 +35,7 @@ _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
 _LIMIT = ("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction")
+_STRENGTH = ("opening_strength", "barrier")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
 
@@ -56,8 +57,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         cell are pending), and all this as a sentence (``precision``); ``failures``, one dict for
         each failed task; ``doubtful``, one for each loss whose own checks say that it is wrong
         (:mod:`adhesis.ensemble.task.doubt`), the worst first; ``beyond_limit``, one for each loss
-        that is that of the zero-range limit alone
+        that is beyond what zero range describes
         (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least valid range first;
+        ``opens``, whether patches may open from inside;
         ``last_row``, when the file was last written to (as ``time.time()`` counts), None before the
         first row.
 
@@ -80,7 +82,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
             "loss_dimensionless",
             "audit_residual",
             "loss_error",
-            *("valid_range", "largest_contact_fraction"),
+            *("valid_range", "largest_contact_fraction", *(_STRENGTH if opens else ())),
         )
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
@@ -110,6 +112,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
+        "opens": opens,
         "beyond_limit": _beyond_limit(state, column, opens=opens),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
@@ -146,7 +149,8 @@ def _doubtful(
 def _beyond_limit(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]], *, opens: bool
 ) -> list[dict[str, Any]]:
-    beyond = beyond_limit(*(column[name] for name in _LIMIT), opens=opens)
+    names = (*_LIMIT, *(_STRENGTH if opens else ()))
+    beyond = beyond_limit(*(column[name] for name in names))
     rows = np.flatnonzero(beyond & (state == DONE))
     rows = rows[np.argsort(column["valid_range"][rows], kind="stable")]
     return [
@@ -264,7 +268,7 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     if status["doubtful"]:
         lines += ["", *_doubt_lines(status["doubtful"])]
     if status["beyond_limit"]:
-        lines += ["", *_limit_lines(status["beyond_limit"])]
+        lines += ["", *_limit_lines(status["beyond_limit"], status["opens"])]
     if status["failures"]:
         lines += ["", *_failure_lines(status["failures"])]
     return printable("\n".join(lines))
@@ -306,8 +310,8 @@ def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _limit_lines(rows: list[dict[str, Any]]) -> list[str]:
-    lines = [f"{len(rows)} losses are doubtful: {BEYOND_LIMIT}"]
+def _limit_lines(rows: list[dict[str, Any]], opens: bool) -> list[str]:
+    lines = [f"{len(rows)} losses are doubtful: {why_beyond(opens)}"]
     for d in rows[:_MOST_FAILURES_SHOWN]:
         known = d["valid_range"]
         shown = "unknown" if known is None else f"{known:.2g} m"

@@ -421,9 +421,9 @@ class _Session:
         wrong = doubtful(self._campaign.solver.accuracy, loss, residual, error)
         steered = float(row[self._campaign.stop.quantity])
         contact = row["largest_contact_fraction"]
-        opens = self._campaign.material.opens
         beyond = beyond_limit(
-            row["valid_range"], loss, task.work_of_adhesion, contact, opens=opens
+            *(row["valid_range"], loss, task.work_of_adhesion, contact),
+            *(row["opening_strength"], row["barrier"]),
         )
         return RowSummary(loss, residual, error, bool(wrong), steered, bool(beyond))
 

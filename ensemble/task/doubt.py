@@ -11,7 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.solver.loading.zero_range import DOUBTFUL_LOSS, DOUBTFUL_RANGE
+from adhesis.solver.loading.zero_range import (
+    DOUBTFUL_BARRIER,
+    DOUBTFUL_EXCESS,
+    DOUBTFUL_LOSS,
+    DOUBTFUL_RANGE,
+)
 
 BEYOND_LIMIT = (
     f"valid_range is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "
@@ -19,6 +24,18 @@ BEYOND_LIMIT = (
     "inside and lose less (docs/zero-range.md)"
 )
 """Why losses are doubtful that are those of the zero-range limit alone."""
+
+BEYOND_STRENGTH = (
+    f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, or the "
+    f"barriers of openings are more than {DOUBTFUL_BARRIER:g} of the loss, so that how patches "
+    "open, which zero range leaves open, matters for it (docs/zero-range.md)"
+)
+"""Why losses are doubtful where patches open from inside."""
+
+
+def why_beyond(opens: bool) -> str:
+    """Return why losses of a campaign are beyond what zero range describes."""
+    return BEYOND_STRENGTH if opens else BEYOND_LIMIT
 
 
 def bound(accuracy: float) -> float:

@@ -106,6 +106,21 @@ _RANGES = (
         lambda loop: np.nan if loop.interior is None else loop.interior.penetration,
         since=(1, 2),
     ),
+    _task(
+        *("opening_strength", FLOAT, "Pa", "strength at which patches open from inside"),
+        lambda loop: loop.problem.strength,
+        since=(1, 3),
+    ),
+    _task(
+        *("openings", FLOAT, "1", "jumps that begin with a gap that opens inside a patch"),
+        lambda loop: loop.openings,
+        since=(1, 3),
+    ),
+    _task(
+        *("barrier", FLOAT, "J m-2", "energy up to the cracks that open patches"),
+        lambda loop: loop.barrier,
+        since=(1, 3),
+    ),
 )
 # Of each loop, one number.
 NUMBERS = (

@@ -40,8 +40,9 @@ DOUBTFUL_RANGE = 1e-9
 DOUBTFUL_LOSS = 20.0
 """Loss over γ A_max/A0 above which a loss is doubtful (docs/zero-range.md)."""
 
-DOUBTFUL_EXCESS = 1.1
-"""Tension inside patches over a finite strength above which a loss is doubtful."""
+DOUBTFUL_EXCESS = 1.01
+"""Tension inside patches over a finite strength above which a loss is doubtful: a hundredth is
+what a crack that closed again waits for (``solver.crack.HEALED_TENSION``)."""
 
 DOUBTFUL_BARRIER = 0.1
 """Barriers of all openings over the loss above which a loss is doubtful (docs/zero-range.md)."""
@@ -51,6 +52,7 @@ DOUBTFUL_BARRIER = 0.1
 _JUMPS, _SAMPLES = 16, 6
 _MOST_OF_LOSS = 0.9
 _SAME = 1e-9  # of the period: edges that differ by less have not moved
+_ROUNDED = 1e-12  # prescribed values that differ by less, of themselves, are equal
 
 
 @dataclass(frozen=True)
@@ -81,19 +83,15 @@ class InteriorTension:
 def interior_tension(method: Method, record: Record) -> InteriorTension | None:
     """Find the largest tension inside patches on a path; None if there is none.
 
-    Looked at are the states before the sixteen jumps of unloading with the largest drops, openings
-    first, and six states evenly spaced on the path. Without adhesion nothing is in tension.
+    With zero range the states before the sixteen jumps of unloading with the largest drops are
+    looked at, and six states evenly spaced on the path. At a finite strength it is all states but
+    those that a jump led to and from which patches open at once. Without adhesion nothing is in
+    tension.
     """
     if method.problem.work_of_adhesion == 0:
         return None
-    starts = [
-        (math.inf if jump.kind == "opening" else jump.energy_drop, place)
-        for jump, place in zip(record.jumps, jump_places(record), strict=True)
-        if jump.branch == "unloading"
-    ]
-    starts.sort(key=lambda entry: -entry[0])
-    spaced = np.linspace(0, len(record.states) - 1, _SAMPLES + 2)[1:-1].astype(int)
-    places = sorted({*(place for _, place in starts[:_JUMPS]), *spaced.tolist()})
+    opens = math.isfinite(method.problem.strength)
+    places = _without_passed(method.problem, record) if opens else _sampled(record)
     places = [place for place in places if record.states[place].patches]
     found = method.largest_tension([record.states[place] for place in places])
     if found is None:
@@ -106,6 +104,35 @@ def interior_tension(method: Method, record: Record) -> InteriorTension | None:
         branch=record.branches[place],
         penetration=float(method.problem.penetration(separation)),
     )
+
+
+def _sampled(record: Record) -> list[int]:
+    """Return the places of the states that are looked at where nothing opens."""
+    starts = [
+        (jump.energy_drop, place)
+        for jump, place in zip(record.jumps, jump_places(record), strict=True)
+        if jump.branch == "unloading"
+    ]
+    starts.sort(key=lambda entry: -entry[0])
+    spaced = np.linspace(0, len(record.states) - 1, _SAMPLES + 2)[1:-1].astype(int)
+    return sorted({*(place for _, place in starts[:_JUMPS]), *spaced.tolist()})
+
+
+def _without_passed(problem: Problem, record: Record) -> list[int]:
+    """Return the places of all states but those at which a path does not stay.
+
+    A jump led to them, and an opening starts from them at the same prescribed value.
+    """
+    opened = {(j.separation, j.contact_before) for j in record.jumps if j.kind == "opening"}
+    out = []
+    before = math.nan
+    for place, state in enumerate(record.states):
+        prescribed = problem.prescribed_in(state)
+        stays = (state.separation, state.contact_fraction) not in opened
+        if stays or not math.isclose(before, prescribed, rel_tol=_ROUNDED):
+            out.append(place)
+        before = prescribed
+    return out
 
 
 def jump_places(record: Record) -> list[int]:
@@ -256,20 +283,23 @@ def beyond_limit(
     loss: Any,
     work_of_adhesion: Any,
     largest_contact_fraction: Any,
-    *,
-    opens: bool = False,
+    strength: Any = math.inf,
+    barrier: Any = 0.0,
 ) -> NDArray[np.bool_]:
-    """Return which losses are those of the zero-range limit alone; values or arrays of one shape.
+    """Return which losses zero range alone makes so large; values or arrays of one shape.
 
     Their valid range is below :data:`DOUBTFUL_RANGE`, or they are more than :data:`DOUBTFUL_LOSS`
-    times the work of adhesion of the largest contact. None of them is where patches open from
-    inside, at a finite strength.
+    times the work of adhesion of the largest contact. At a finite strength it is those at which
+    the tension inside patches exceeds it :data:`DOUBTFUL_EXCESS` times, or whose barriers are more
+    than :data:`DOUBTFUL_BARRIER` of them. None is where the strength is unknown (NaN).
     """
-    if opens:
-        return np.zeros(np.shape(loss), dtype=np.bool_)
-    most = DOUBTFUL_LOSS * np.asarray(work_of_adhesion) * np.asarray(largest_contact_fraction)
-    above = (np.asarray(loss) > most) & (np.asarray(work_of_adhesion) > 0)
-    return np.asarray((np.asarray(valid_range) < DOUBTFUL_RANGE) | above)
+    loss, gamma = np.asarray(loss), np.asarray(work_of_adhesion)
+    valid_range, strength = np.asarray(valid_range), np.asarray(strength)
+    most = DOUBTFUL_LOSS * gamma * np.asarray(largest_contact_fraction)
+    closed = (valid_range < DOUBTFUL_RANGE) | ((loss > most) & (gamma > 0))
+    exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
+    opened = exceeded | (np.asarray(barrier) > DOUBTFUL_BARRIER * np.abs(loss))
+    return np.asarray(np.where(np.isposinf(strength), closed, np.isfinite(strength) & opened))
 
 
 def range_warnings(
@@ -284,10 +314,12 @@ def range_warnings(
     if math.isfinite(problem.strength):
         excess = problem.work_of_adhesion / range_ / problem.strength
         if excess > DOUBTFUL_EXCESS:
+            largest_tension = problem.work_of_adhesion / range_
             out.append(
-                f"the tension inside patches reaches {excess:.3g} times the strength "
-                f"({problem.strength:.3g} Pa) where no crack that fits grows: how such places "
-                "yield, which zero range leaves open, may matter for the loss (docs/zero-range.md)"
+                f"the tension inside patches reaches {largest_tension:.3g} Pa, {excess:.3g} times "
+                f"the strength ({problem.strength:.3g} Pa), where no crack that fits grows: how "
+                "such places yield, which zero range leaves open, may matter for the loss "
+                "(docs/zero-range.md)"
             )
         return out
     if range_ < DOUBTFUL_RANGE:

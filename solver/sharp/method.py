@@ -54,12 +54,14 @@ from adhesis.solver.sharp.tolerances import (
     FINER_UNDER_LOAD,
     JUMP_RESOLUTION,
     LARGEST_FIELD_TOLERANCE,
+    LARGEST_WORK_OF_STEP,
     LATE_DROP,
     LEAST_DROP,
     LEAST_FIELD_TOLERANCE,
     LEAST_JUMP_RESOLUTION,
     PLACED_BY_PROFILE,
     TRAPEZOID,
+    WEAKNESS_POWER,
     WORK_OF_STEP,
 )
 
@@ -145,15 +147,21 @@ class SharpMethod(Method):
         strength = _strength(profile, critical)
         if strength > 0:
             tolerance = max(min(tolerance, PLACED_BY_PROFILE / strength), LEAST_FIELD_TOLERANCE)
+        # Steps whose work is compared with the energy need an energy that is as exact.
+        work = math.inf
+        if math.isfinite(problem.strength):
+            share = min(WORK_OF_STEP * weak**WEAKNESS_POWER, LARGEST_WORK_OF_STEP)
+            work = share * accuracy * problem.work_of_adhesion
+            exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
+            tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance)
         self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
         self.states = States(problem, source, self.edges.count)
         finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)
-        opens = math.isfinite(problem.strength)
         self.resolution = Resolution(
             jump=max(JUMP_RESOLUTION * accuracy * (accuracy if load else 1.0), finest) * h_max,
-            bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**1.25),
-            work=WORK_OF_STEP * accuracy * problem.work_of_adhesion if opens else math.inf,
+            bend=float(TRAPEZOID * np.sqrt(min(1.0, accuracy / 1e-3)) * weak**WEAKNESS_POWER),
+            work=work,
             h_max=h_max,
             finest=finest * h_max,
             late=LATE_DROP * accuracy,

@@ -47,7 +47,7 @@ from adhesis.ensemble.report.tables.table import number
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
-from tests.support.synthetic_results import campaign, rows, write
+from tests.support.synthetic_results import campaign, rows, text_of, write
 
 ROOT = Path(__file__).parent.parent.parent
 GAMMAS = (0.01, 0.04, 0.07)
@@ -889,6 +889,26 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     names = [column.name for column in table.columns]
     shown = [row[names.index("valid_range_least [m]")] for row in table.rows]
     assert shown == pytest.approx([0.5e-9, values["valid_range"][4:].min()])
+
+
+def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
+    """By their tension over the strength, or by their barriers over the loss."""
+    text = text_of(hurst=(0.7,), gamma=(0.02,), realisations=4)
+    plan = parse_campaign(text.replace("poisson = 0.5", "poisson = 0.5\nstrength = 1e9"))
+    values = rows(plan)
+    values["audit_residual"][:] = 1e-5
+    values["opening_strength"][:] = 1e9
+    values["valid_range"][:] = 0.02 / 1e9
+    sound = write(tmp_path / "sound.h5", plan, values)
+    assert not read_status(sound)["beyond_limit"]
+    values["valid_range"][1] /= 1.02
+    values["barrier"][3] = 0.11 * values["loss"][3]
+    path = write(tmp_path / "r.h5", plan, values)
+    status = read_status(path)
+    assert [row["row"] for row in status["beyond_limit"]] == [1, 3]
+    assert "2 losses are doubtful: the tension inside patches exceeds" in as_text(status)
+    (warning,) = (text for text in findings.quality(aggregate(path)) if "barriers" in text)
+    assert warning.startswith("WARNING: 2 of 4 losses")
 
 
 def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, drawn):

@@ -94,6 +94,11 @@ def test_the_range_of_adhesion_is_in_the_row():
     assert [row[name] for name in names] == [gamma / 2e5, 2e5, 3e-4]
     assert row["interior_tension_penetration"] == -0.5
     assert row["edge_range"] > 0
+    assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [np.inf, 0, 0.0]
+    opening = Jump("unloading", 1e-6, 1.0, "opening", 1, 2, 0.5, 0.4, 1e-5, barrier=0.5)
+    problem = replace(loop.problem, strength=1e12)
+    row = loop_row(campaign, replace(loop, jumps=(opening, opening), problem=problem))
+    assert [row[name] for name in ("opening_strength", "openings", "barrier")] == [1e12, 2, 1.0]
 
 
 def test_curves_are_cut_where_the_axis_ends():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesis import Control, run_loop
+from adhesis import Control, LoopResult, run_loop
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.method import SharpMethod
 from tools.hostile import draw, independent_clearance, judge
@@ -20,6 +20,21 @@ def test_a_hostile_loop_keeps_every_promise(number):
     found = judge(scene, number)
     assert found["wrong"] == []
     assert found["kind"] == ("tight" if number % 4 == 0 else "loop")
+
+
+@pytest.mark.parametrize(("number", "flagged"), [(21, True), (23, False)])
+def test_tension_above_the_strength_is_stated(number, flagged):
+    """No state has more inside a patch unless the loss is doubtful for it."""
+    found = judge(draw(41270, number, strength=True), number)
+    assert found["wrong"] == []
+    assert found["openings"] > 0
+    assert found["flagged"] == (found["excess"] > 1.01) == flagged
+
+
+def test_tension_above_the_strength_without_a_doubt_is_wrong(monkeypatch):
+    monkeypatch.setattr(LoopResult, "warnings", ())
+    wrong = judge(draw(41270, 21, strength=True), 22)["wrong"]
+    assert any("strengths without a doubt" in text for text in wrong)
 
 
 @pytest.mark.parametrize(

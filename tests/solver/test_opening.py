@@ -32,6 +32,7 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.references.last_gap import LastGap
 from adhesis.solver.references.periodic_punch import pull_off_stress
+from adhesis.solver.sharp.continuation.branch import Branch
 from adhesis.solver.sharp.equilibrium.griffith import imbalance
 from adhesis.solver.sharp.field.patch_tension import RefinedTension
 from adhesis.solver.sharp.gap.ends import with_gaps
@@ -204,6 +205,38 @@ def test_many_gaps_open_as_few_do():
     assert abs(loops[0].loss - loops[1].loss) < loops[0].loss_error + loops[1].loss_error
 
 
+@pytest.mark.parametrize(
+    ("error_of", "judged"),
+    [
+        (lambda span: 100 * span**5, (100.0, 3.125)),  # of the step: halved further
+        (lambda span: 100.0, (100.0, 4.0)),  # of the energies: a state on each side of it
+        (lambda span: 3.0, (3.0, 3.0)),
+    ],
+    ids=("step", "energies", "small"),
+)
+def test_a_difference_that_shorter_steps_keep_is_none_of_the_steps(error_of, judged):
+    """Where the number of modes of a gap changes the energies differ, however short a step is."""
+    branch = SimpleNamespace(
+        _imbalance=lambda output, point: error_of(point.at),
+        _resolution=SimpleNamespace(jump=1e-6, work=1.0),
+        _work_before=(0.0, math.inf),
+    )
+    start = SimpleNamespace(at=0.0)
+    found = [Branch._work_error(branch, start, SimpleNamespace(at=at)) for at in (1.0, 0.5)]
+    assert found == pytest.approx(judged)
+
+
+def test_energies_are_as_exact_as_the_work_they_are_compared_with():
+    finite, zero_range = (
+        make_method("sharp", Problem(rough(), HalfSpace(1e11, 0.5), 0.04, strength=strength))
+        for strength in (1e8, math.inf)
+    )
+    energy = finite.problem.full_contact_energy
+    assert finite.edges.tolerance * energy <= finite.resolution.work
+    assert finite.edges.tolerance < zero_range.edges.tolerance
+    assert zero_range.resolution.work == math.inf
+
+
 def test_work_and_energy_agree_between_openings():
     """Between two folds the slopes at the ends of a step hide the error of its integral."""
     loop = run_loop(make_method("sharp", troughs_problem()), max_penetration=0.99, load_steps=5)
@@ -303,29 +336,24 @@ def test_a_crack_grows_by_the_field_with_the_crack():
     assert release(field, np.pi, 20 * griffith) < 20 / 2
 
 
-def test_the_tension_before_an_opening_counts_whatever_its_drop():
-    """An opening may lose less than nothing, up to its barrier."""
-    count, opening = 30, 13
+def test_the_tension_of_every_state_counts_at_which_a_path_stays():
+    """A jump led to the states at s = 2, and an opening starts from them at once."""
+    places = ((0, 0.9), (1, 0.8), (2, 0.7), (2, 0.6), (2, 0.6), (2, 0.5), (3, 0.4), (3, 0.3))
     states = [
-        SimpleNamespace(separation=float(i // 2), contact_fraction=float(i), patches=1)
-        for i in range(2 * count)
+        SimpleNamespace(separation=s, mean_stress=0.0, contact_fraction=a, patches=1)
+        for s, a in places
     ]
     jumps = [
-        SimpleNamespace(
-            kind="opening" if k == opening else "receding",
-            energy_drop=-1.0 if k == opening else 1.0,
-            branch="unloading",
-            separation=float(k),
-            contact_before=2.0 * k,
-            contact_after=2.0 * k + 1,
-        )
-        for k in range(count)
+        SimpleNamespace(kind=kind, separation=s, contact_before=before)
+        for kind, s, before in (("receding", 2, 0.7), ("opening", 2, 0.6), ("opening", 3, 0.4))
     ]
     seen = []
     method = SimpleNamespace(problem=troughs_problem(), largest_tension=seen.extend)
     record = SimpleNamespace(states=states, jumps=jumps, branches=["unloading"] * len(states))
     assert interior_tension(method, record) is None
-    assert states[2 * opening] in seen
+    assert [(state.separation, state.contact_fraction) for state in seen] == [
+        *places[:3], *places[5:]
+    ]  # fmt: skip
 
 
 def test_an_energy_that_rises_by_a_barrier_is_no_error():
@@ -346,10 +374,18 @@ def test_barriers_and_tensions_that_are_not_small_make_a_loss_doubtful():
     barrier = sum(jump.barrier for jump in opened)
     assert opening_warnings(opened, 11 * barrier) == []
     assert "add up to" in opening_warnings(opened, 9 * barrier)[0]
-    assert range_warnings(problem, GAMMA / (1.05 * STRENGTH), 1.0, [0.5]) == []
+    assert range_warnings(problem, GAMMA / (1.005 * STRENGTH), 1.0, [0.5]) == []
+    assert len(range_warnings(problem, GAMMA / (1.02 * STRENGTH), 1.0, [0.5])) == 1
     (excess,) = range_warnings(problem, GAMMA / (2 * STRENGTH), 1.0, [0.5])
-    assert "reaches 2 times the strength (4 Pa)" in excess
-    assert not beyond_limit([1e-12], [1.0], 0.02, 0.5, opens=True).any()
+    assert "reaches 8 Pa, 2 times the strength (4 Pa)" in excess
+    # excess, barrier over the loss; the last has zero range, the one before it an unknown strength
+    wrong = beyond_limit(
+        0.02 / (1e9 * np.array([1.005, 1.02, 0.5, 0.5, 1.02, 1e3])),
+        *([1.0] * 6, 0.02, 0.5),
+        [1e9, 1e9, 1e9, 1e9, math.nan, math.inf],
+        [0.0, 0.0, 0.09, 0.11, math.nan, 0.0],
+    )
+    assert wrong.tolist() == [False, True, False, True, False, True]
 
 
 # ---------------------------------------------------------------------- the problem

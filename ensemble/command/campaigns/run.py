@@ -234,7 +234,7 @@ def _report_end(
     """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
     from adhesis.ensemble.run.progress import duration
-    from adhesis.ensemble.task.doubt import BEYOND_LIMIT, bound
+    from adhesis.ensemble.task.doubt import bound, why_beyond
 
     failed = f", {summary.failed} failed" if summary.failed else ""
     say(
@@ -252,7 +252,8 @@ def _report_end(
             f"(adhesis status {path})"
         )
     if summary.beyond_limit:
-        say(f"{summary.beyond_limit} losses are doubtful: {BEYOND_LIMIT} (adhesis status {path})")
+        why = why_beyond(campaign.material.opens)
+        say(f"{summary.beyond_limit} losses are doubtful: {why} (adhesis status {path})")
     if summary.stopped:
         say(
             f"stopped early: {summary.stopped}; {summary.pending} tasks are left, "

@@ -29,6 +29,8 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
+    WORK_RESOLVED,
+    WORK_STALLED,
 )
 
 
@@ -91,6 +93,7 @@ class Branch:
         self.in_windows = edges.uses_windows(point.gaps)
         self._window: LocalBranch | None = None  # of the point that is predicted from
         self._returned_to: Point | None = None
+        self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
 
     def advance(self) -> Accepted | Fold:
         """Take steps until one is accepted, or the smallest one finds no equilibrium."""
@@ -181,6 +184,7 @@ class Branch:
     ) -> None:
         self.trail.add(event.point, closed, window)
         self.point, self._window = event.point, window
+        self._work_before = (0.0, math.inf)
         if event.is_output:
             self._output = event.point
         if event.point.at == self._target.at:
@@ -217,10 +221,18 @@ class Branch:
         """Difference of work and energy since the last output, in units of what is allowed.
 
         Not known where the field is not that of all edges. Not asked for in steps much shorter than
-        the resolution of jumps, where it is the error of the fields.
+        the resolution of jumps. One that a shorter step has not made smaller is no error of the
+        step: energies differ by it where the number of modes of a gap changes. It is put between
+        two states, and halves no further step.
         """
-        short = abs(point.at - output.at) < 0.1 * self._resolution.jump
+        span = abs(point.at - output.at)
+        short = span < WORK_RESOLVED * self._resolution.jump
         if self._imbalance is None or short or isinstance(point, LocalPoint):
             return 0.0
         error = abs(self._imbalance(output, point)) / self._resolution.work
-        return 0.0 if math.isnan(error) else error
+        if math.isnan(error):
+            return 0.0
+        longer, larger = self._work_before
+        self._work_before = span, error
+        stalled = span < longer and error > WORK_STALLED * larger
+        return min(error, TRAPEZOID_FAR) if stalled else error
