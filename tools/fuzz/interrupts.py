@@ -141,7 +141,7 @@ class Traces:
         profile = self_affine_profile(0.8, period=1e-3, n0=4, ratio=6, seed=2, h_rms=1e-6)
         x = np.linspace(0.0, 1e-3, 400, endpoint=False, dtype=np.float64)
         heights = profile.at(x) + 5e-9 * np.random.default_rng(0).standard_normal(400)
-        self._prepared = prepare_trace(Trace(Path("t.txt"), heights, 1e-3 / 400))
+        self._prepared = prepare_trace(Trace(heights, 1e-3 / 400, "t.txt"))
         self._half_space = HalfSpace(young=1e6, poisson=0.5)
         self._processes, self._longest = processes, longest
 
