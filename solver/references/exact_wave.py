@@ -169,7 +169,7 @@ class ExactWave(Method):
         s = wave.separation(widths) if separation is None else np.full(widths.size, separation)
         adhesion, energy = wave.adhesion_energy(widths), wave.energy(widths)
         columns = (widths, s, wave.mean_stress(widths), energy - adhesion, adhesion)
-        return [self._state_of(*values) for values in zip(*map(np.ndarray.tolist, columns), strict=True)]
+        return [self._state_of(*values) for values in np.column_stack(columns).tolist()]
 
     def _state_of(
         self, a: float, s: float, stress: float, elastic: float, adhesion: float
