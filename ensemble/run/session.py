@@ -285,7 +285,8 @@ def _warm_up(comm: Any, methods: Collection[str], say: Callable[[str], None]) ->
     """
     if not methods:
         return
-    from adhesis.ensemble.warm import compiled_in, warm_up  # brings the compiler in
+    from adhesis.ensemble.warm import warm_up  # brings the compiler in
+    from adhesis.solver.precompile import compiled_in
 
     def prepare_rank(first: bool) -> bool:
         lacking = any(compiled_in(method) is None for method in methods)
