@@ -41,6 +41,7 @@ from adhesis.ensemble.results.schema import (
 )
 from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
+from adhesis.solver.runtime.uninterrupted import signals_held
 
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
 
@@ -54,6 +55,8 @@ def create(
     grown_from: Results | None = None,
 ) -> None:
     """Lay out a results file at full size, by one process; all or nothing.
+
+    Signals are held back meanwhile: h5py would drop what their handlers raise.
 
     Parameters
     ----------
@@ -75,28 +78,29 @@ def create(
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
     needed = file_size(campaign, part)
-    try:
-        free = shutil.disk_usage(path.parent).free
-        if needed > free:
-            raise InputError(
-                f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
-            )
-        # Made anew, so that a link of that name is removed and not followed.
-        unfinished.unlink(missing_ok=True)
-        with h5py.File(unfinished, "x", locking=False) as file:
-            reserve_head(file)
-            _lay_out(file, campaign, part)
-            _describe(file, campaign, part, versions or {}, grown_from)
-            if grown_from is not None:
-                _copy_rows(grown_from, file, campaign, part)
-        write_head(unfinished)
-        with unfinished.open("rb") as handle:
-            os.fsync(handle.fileno())
-        unfinished.replace(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {reason(error)}") from error
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with signals_held():
+        try:
+            free = shutil.disk_usage(path.parent).free
+            if needed > free:
+                raise InputError(
+                    f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
+                )
+            # Made anew, so that a link of that name is removed and not followed.
+            unfinished.unlink(missing_ok=True)
+            with h5py.File(unfinished, "x", locking=False) as file:
+                reserve_head(file)
+                _lay_out(file, campaign, part)
+                _describe(file, campaign, part, versions or {}, grown_from)
+                if grown_from is not None:
+                    _copy_rows(grown_from, file, campaign, part)
+            write_head(unfinished)
+            with unfinished.open("rb") as handle:
+                os.fsync(handle.fileno())
+            unfinished.replace(path)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written: {reason(error)}") from error
+        finally:
+            unfinished.unlink(missing_ok=True)
 
 
 def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:

@@ -34,6 +34,7 @@ from adhesis.ensemble.results.schema import (
 )
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS, Row
+from adhesis.solver.runtime.uninterrupted import signals_held
 
 _KEPT_NAMES = frozenset(d.name for d in DATASETS if d.dims[0] == KEPT)
 _NAMES = frozenset(d.name for d in RESULT_DATASETS)
@@ -112,7 +113,7 @@ class Writer:
         """Make rows pending again; what they held is lost."""
         cleared = (*_CONTENT, CHECKSUM)
         for row in rows:
-            with self._telling(row):
+            with self._writing(row):
                 # First the status: a row that is being emptied must not be taken for a whole one.
                 self._write_status(row, PENDING)
                 self.flush()
@@ -127,7 +128,7 @@ class Writer:
         """Mark rows without a result: they are to be computed, or need not be."""
         for row in rows:
             if needed:
-                with self._telling(row):
+                with self._writing(row):
                     self._write_status(row, PENDING)
             else:
                 self._write(row, {}, NOT_NEEDED)
@@ -138,7 +139,7 @@ class Writer:
 
         All of a row is written: a run that was killed may have left a part of it.
         """
-        with self._telling(row):
+        with self._writing(row):
             blocks = {STATUS.name: self._datasets[STATUS.name].block(status)}
             for dataset in _CONTENT:
                 name, place = dataset.name, self._place(dataset.name, row)
@@ -169,13 +170,15 @@ class Writer:
         return self._kept.get(row) if name in _KEPT_NAMES else row
 
     @contextmanager
-    def _telling(self, row: int) -> Iterator[None]:
-        try:
-            yield
-        except (OSError, RuntimeError) as error:
-            raise WriteError(
-                f"row {row} of {self.path} could not be written: {reason(error)}"
-            ) from error
+    def _writing(self, row: int) -> Iterator[None]:
+        """Name the row in an error of the disk; what a signal handler raises comes afterwards."""
+        with signals_held():
+            try:
+                yield
+            except (OSError, RuntimeError) as error:
+                raise WriteError(
+                    f"row {row} of {self.path} could not be written: {reason(error)}"
+                ) from error
 
     def flush(self) -> None:
         """Hand what was written to the operating system."""

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from queue import SimpleQueue
 from typing import Any, TypeVar
@@ -29,19 +30,29 @@ class _Worker(threading.Thread):
     abandoned = False
 
 
-def _start(worker: _Worker) -> None:
-    """Start a thread with all signals blocked that Python handles.
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Hold back the signals that Python handles until the block has ended.
 
-    They are blocked here during the start, too: :mod:`threading` does not expect an exception then.
+    What a handler raises then arrives from here. Inside code that drops exceptions, as the
+    callbacks of weak references in h5py and :mod:`threading` are, it would be lost.
     """
     handled = {each for each in signal.valid_signals() if callable(signal.getsignal(each))}
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, handled)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+def _start(worker: _Worker) -> None:
+    """Start a thread with all signals blocked that Python handles."""
     size = threading.stack_size(_STACK)
     try:
-        worker.start()
+        with signals_held():
+            worker.start()
     finally:
         threading.stack_size(size)
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
 def uninterrupted(function: F) -> F:

@@ -8,6 +8,7 @@ import itertools
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 
@@ -70,6 +71,47 @@ def test_a_new_file_is_whole_and_pending(path, campaign):
             assert empty.all(), column.name
         assert not results.column("error").view(np.uint8).any()
     assert not list(path.parent.glob("*.part"))
+
+
+class Late(TimeoutError):
+    """What a user's handler of a time limit raises: an OSError, as the errors of a disk are."""
+
+
+@pytest.fixture
+def limit():
+    """Return what sends a signal whose handler raises."""
+
+    def handler(number, frame):
+        raise Late
+
+    before = signal.signal(signal.SIGALRM, handler)
+    yield lambda *_: signal.raise_signal(signal.SIGALRM)
+    signal.signal(signal.SIGALRM, before)
+
+
+def test_an_interrupt_of_writing_arrives_as_itself_after_a_whole_row(
+    path, campaign, limit, monkeypatch
+):
+    result = fake_result(campaign, campaign.tasks()[0])
+    writer = Writer(path)
+    monkeypatch.setattr(Writer, "flush", limit)
+    with pytest.raises(Late):
+        writer.write_result(0, result)
+    monkeypatch.undo()
+    writer.close()
+    with Results(path) as results:
+        assert results.status()[0] == DONE
+        assert not results.damaged().size
+
+
+def test_an_interrupt_of_laying_out_arrives_as_itself_after_a_whole_file(
+    tmp_path, campaign, limit, monkeypatch
+):
+    monkeypatch.setattr("adhesis.ensemble.results.layout.reserve_head", limit)
+    monkeypatch.setattr("adhesis.ensemble.results.layout.write_head", lambda _: None)
+    with pytest.raises(Late):
+        create(tmp_path / "r.h5", campaign)
+    assert [file.name for file in tmp_path.iterdir()] == ["r.h5"]
 
 
 def test_every_dataset_has_unit_name_and_scales(path):

@@ -83,6 +83,7 @@ SOLVER_FOR_ENSEMBLE = {
     "adhesis.solver.model.profile",
     "adhesis.solver.references.single_wave",
     "adhesis.solver.registry",
+    "adhesis.solver.runtime.uninterrupted",
     "adhesis.solver.model.measured_profile",
     "adhesis.solver.loading.turning_points",
     "adhesis.solver.validate.claims",
