@@ -15,7 +15,15 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-from adhesis import HalfSpace, LoopResult, Problem, make_method, run_loop, self_affine_profile
+from adhesis import (
+    HalfSpace,
+    LoopResult,
+    PathError,
+    Problem,
+    make_method,
+    run_loop,
+    self_affine_profile,
+)
 
 GAMMA, RANGE = 0.04, 0.3e-9
 NARROW = {"period": 2e-3, "n0": 2, "ratio": 25}
@@ -31,14 +39,23 @@ def loop_of(young: float, seed: int, adhesion_range: float | None, gamma: float)
     return run_loop(method, max_penetration=0.9, load_steps=20)
 
 
+def pair_of(young: float, seed: int, gamma: float) -> tuple[LoopResult, LoopResult] | None:
+    """Loops of zero range and of a finite one; None if the path of one is not found."""
+    try:
+        return loop_of(young, seed, None, gamma), loop_of(young, seed, RANGE, gamma)
+    except PathError as error:
+        print(f"E = {young:g} Pa, profile {seed}: {error}", file=sys.stderr, flush=True)
+        return None
+
+
 def row_of(young: float, seeds: range, gamma: float) -> tuple[float, ...]:
-    """Mean loss of zero range and of a finite one, openings a loop, barriers over the loss."""
-    zero = np.mean([loop_of(young, seed, None, gamma).loss for seed in seeds])
-    found = [loop_of(young, seed, RANGE, gamma) for seed in seeds]
-    finite = np.mean([loop.loss for loop in found])
-    openings = np.mean([loop.openings for loop in found])
-    barriers = np.mean([loop.barrier for loop in found])
-    return float(zero), float(finite), float(openings), float(barriers / finite)
+    """Mean losses of zero and finite range, openings a loop, barriers over loss, and profiles."""
+    pairs = [pair for seed in seeds if (pair := pair_of(young, seed, gamma)) is not None]
+    zero = np.mean([pair[0].loss for pair in pairs])
+    finite = np.mean([pair[1].loss for pair in pairs])
+    openings = np.mean([pair[1].openings for pair in pairs])
+    barriers = np.mean([pair[1].barrier for pair in pairs])
+    return float(zero), float(finite), float(openings), float(barriers / finite), len(pairs)
 
 
 def main() -> None:
@@ -46,8 +63,8 @@ def main() -> None:
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("opening.png")
     seeds = range(int(sys.argv[2]) if len(sys.argv) > 2 else 10)
     rows = []
-    print("| E (Pa) | γ (J/m²) | zero range | range 0.3 nm | openings | barriers over loss |")
-    print("|---|---|---|---|---|---|")
+    head = ("E (Pa)", "γ (J/m²)", "zero range", "range 0.3 nm", "openings", "barriers over loss")
+    print(f"| {' | '.join((*head, 'profiles'))} |\n|{'---|' * (len(head) + 1)}")
     scenes = [(young, GAMMA) for young in MODULI] + [(2e11, gamma) for gamma in GAMMAS[1:]]
     for young, gamma in scenes:
         row = row_of(young, seeds, gamma)
