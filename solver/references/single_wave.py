@@ -263,9 +263,8 @@ class SingleWave:
         _, y, _ = self._angle(a)
         u = np.maximum(np.abs(np.sin(np.pi * np.asarray(x, dtype=float) / self.period)), np.sqrt(y))
         p1 = self.adhesive_tension(a) / self.full_contact_stress
-        return np.asarray(
-            2 * self.amplitude * (u * np.sqrt(u**2 - y) + (p1 - y) * np.arccosh(u / np.sqrt(y)))
-        )
+        root = np.sqrt(np.maximum(u**2 - y, 0.0))  # in contact u² may be y but for rounding
+        return np.asarray(2 * self.amplitude * (u * root + (p1 - y) * np.arccosh(u / np.sqrt(y))))
 
     # ------------------------------------------------------------------ the loop
 

@@ -30,7 +30,6 @@ PAGES = [
 
 # Commands that are read by their parser, or whose files are looked for, but that are not run here.
 NOT_RUN = {
-    "adhesis report paper.h5 --to paper": "of 90 loops; tests/ensemble/test_report.py",
     "adhesis report my.h5 --to my/": "twenty seconds; tests/ensemble/test_report.py",
     ".venv/bin/adhesis doctor": "starts ranks; tests/ensemble/test_doctor.py",
     "make run": "sets a machine up; tests/project/test_setup.py",
