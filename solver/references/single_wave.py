@@ -261,10 +261,11 @@ class SingleWave:
     def gap(self, x: ArrayLike, a: ArrayLike) -> Array:
         """Compute t(x) in m at equilibrium with half-width a; 0 in contact, crest at x = 0."""
         _, y, _ = self._angle(a)
-        u = np.maximum(np.abs(np.sin(np.pi * np.asarray(x, dtype=float) / self.period)), np.sqrt(y))
+        edge = np.sqrt(y)
+        u = np.maximum(np.abs(np.sin(np.pi * np.asarray(x, dtype=float) / self.period)), edge)
         p1 = self.adhesive_tension(a) / self.full_contact_stress
-        root = np.sqrt(np.maximum(u**2 - y, 0.0))  # in contact u² may be y but for rounding
-        return np.asarray(2 * self.amplitude * (u * root + (p1 - y) * np.arccosh(u / np.sqrt(y))))
+        root = np.sqrt((u - edge) * (u + edge))
+        return np.asarray(2 * self.amplitude * (u * root + (p1 - y) * np.arccosh(u / edge)))
 
     # ------------------------------------------------------------------ the loop
 
