@@ -284,7 +284,7 @@ CLOSING_SAFETY = 1.5
 CLEARANCE_LEFT = 0.3
 """Share of a clearance that must surely be left, else the gap is searched again."""
 NO_MINIMUM_WITHIN = 0.12
-"""λ_min. Nearer to the ends of a gap no minimum appears in a gap that has none."""
+"""λ_min. Nearer to the ends of a gap openings are small; only a negative one is looked at."""
 MINIMUM_IS_LOW = 0.1
 """Of the parabola's rise over its half-width: lower minima are located more finely."""
 MINIMUM_DOUBT = 3.0

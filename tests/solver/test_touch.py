@@ -7,6 +7,7 @@ import pytest
 
 from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wave
 from adhesis.solver.references.single_wave import SingleWave
+from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.nucleation.closing import Closing
 from adhesis.solver.sharp.nucleation.gap_minima import bottoms
@@ -35,6 +36,31 @@ def test_the_deepest_place_gets_a_patch_and_those_that_equal_it() -> None:
     assert places(adhesive, [-3e-5, -3e-5, -2e-5]) == [0, 1]
     # Without adhesion nothing runs, so that the order does not matter.
     assert places(nucleation(0.0), [-1e-2, -3e-2, 1.0, -2e-2]) == [0, 1, 3]
+
+
+@pytest.mark.parametrize("seed", [1, 9])
+def test_a_touch_is_found_in_a_gap_whose_other_minimum_is_far_from_touching(seed: int) -> None:
+    """In stiff contact the surfaces come together beside an edge, at a minimum that appears."""
+    profile = self_affine_profile(0.8, seed=seed, period=2e-3, n0=1, ratio=10, h_rms=1e-6)
+    stiff = Problem(profile, HalfSpace(1e12, 0.5), 0.04)
+    found = run_loop(SharpMethod(stiff, accuracy=1e-2), max_penetration=0.9, load_steps=4)
+    assert abs(found.audit_residual) < 1e-4
+
+
+def test_seeds_that_meet_are_one_patch() -> None:
+    """In a gap from 1 to 2: seeds apart, that meet each other, that meet the patches beside."""
+    gaps, widths = np.array([[1.0, 2.0], [3.0, 7.0]]), np.array([0.1, 0.1])
+
+    def first_gap(*centres: float) -> list[float]:
+        found = with_patches(gaps, np.array(centres), widths)
+        assert found[-1].tolist() == [3.0, 7.0]
+        return [round(float(end), 6) for end in found[:-1].ravel()]
+
+    assert first_gap(1.3, 1.6) == [1.0, 1.25, 1.35, 1.55, 1.65, 2.0]
+    assert first_gap(1.35, 1.4) == [1.0, 1.3, 1.45, 2.0]
+    assert first_gap(1.02, 1.98) == [1.07, 1.93]
+    open_surface = with_patches(np.empty((0, 2)), np.array([1.0, 1.06, 4.0]), np.full(3, 0.1))
+    np.testing.assert_allclose(open_surface, [[1.11, 3.95], [4.05, 0.95 + 2 * np.pi]])
 
 
 @pytest.mark.parametrize("gamma", [1e-5, 1e-4])

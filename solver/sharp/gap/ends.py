@@ -47,18 +47,27 @@ def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
 
 
 def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
-    """Put patches of the given widths into gaps (no gaps at all: into the open surface)."""
+    """Put patches of the given widths into gaps (no gaps at all: into the open surface).
+
+    Patches that meet, or meet one that was there, are one: the gap between them closes.
+    """
     if len(gaps) == 0:
         order = np.argsort(centres)
         left, right = (centres + widths / 2)[order], (centres - widths / 2)[order]
-        return np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1)
+        return _open(np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1))
     order = np.argsort(centres, kind="stable")
     centres, widths = centres[order], widths[order]
     place = np.searchsorted(gaps[:, 0], centres) - 1
     inside = (place >= 0) & (centres < gaps[place, 1])
     seeds = np.stack([centres - widths / 2, centres + widths / 2], axis=1)[inside]
     ends = np.insert(gaps.ravel(), np.repeat(2 * place[inside] + 1, 2), seeds.ravel())
-    return np.asarray(ends.reshape(-1, 2))
+    return _open(np.asarray(ends.reshape(-1, 2)))
+
+
+def _open(gaps: Array) -> Array:
+    """Drop gaps that end where they begin, or before; the last gap never closes."""
+    opened = gaps[:, 1] > gaps[:, 0]
+    return gaps[opened] if opened.any() else gaps
 
 
 def with_gaps(gaps: Array, centres: Array, widths: Array) -> Array:

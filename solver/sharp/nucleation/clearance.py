@@ -1,11 +1,14 @@
 """How much of a gap's clearance can have been used up since it was looked at.
 
-The fine opening of a gap (``opening_series``) costs as much as many
-fields, and most gaps are far from touching. Inside a gap the surface is free: between two states
-with nearly the same edges its opening changes smoothly, so the nodes of the field tell by how much
-it has closed. Only beside an edge that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)),
-for which that a fourth of the shortest wave away is taken. A gap is looked at again when a good
-part of its clearance can be gone, or where nothing of this can be said.
+The fine opening of a gap (``opening_series``) costs as much as many fields, and most gaps are far
+from touching. Inside a gap the surface is free: between two states with nearly the same edges its
+opening changes smoothly, so the nodes of the field show by how much it has closed. Only beside an
+edge that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)), for which that a fourth of the
+shortest wave away is taken.
+
+A gap is looked at again when a good part of its clearance can be gone, or of its opening at any
+node: a minimum may appear there, whatever others there are. Beside the ends of a gap openings are
+small in any case; there it is looked at again when one is negative.
 """
 
 from __future__ import annotations
@@ -83,22 +86,6 @@ def _low_opening(f: float, kind: int, node: int, rules: GaussRules) -> float:
 
 
 @compiled
-def _to_any_minimum(seen: Seen, gap: int, nodes: int, inside: float) -> float:
-    """How far a gap without a minimum has to close before it can touch in one that appears.
-
-    That is its opening at the nodes further than ``inside`` from its ends; of a shorter gap the
-    largest opening.
-    """
-    least = np.inf
-    most = 0.0
-    for i in range(seen.offset[gap], seen.offset[gap] + nodes):
-        most = max(most, seen.opening[i])
-        if min(seen.theta[i] - seen.gaps[gap, 0], seen.gaps[gap, 1] - seen.theta[i]) > inside:
-            least = min(least, seen.opening[i])
-    return min(least, most)
-
-
-@compiled
 def clearance_left(
     gaps: Array,
     nodes: Nodes,
@@ -114,6 +101,7 @@ def clearance_left(
     an edge for its motion.
     """
     orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
+    within = NO_MINIMUM_WITHIN / COMPARABLE * near
     left = np.full(gaps.shape[0], -1.0)
     place = np.full(gaps.shape[0], -1)
     j = 0
@@ -126,9 +114,12 @@ def clearance_left(
         end = gaps[k, 1] - seen.gaps[j, 1]
         if abs(begin) > near or abs(end) > near or orders[k] != seen.orders[j]:
             continue
+        grown = max(begin, 0.0) + max(-end, 0.0)
         closed = 0.0
+        most = 0.0
         m = rules.counts[orders[k]]
         comparable = True
+        none_inside = True
         for i in range(m):
             at = seen.offset[j] + i
             # the slope between the node's neighbours, or the gap's end
@@ -140,19 +131,28 @@ def clearance_left(
                 after, high = seen.theta[at + 1], seen.opening[at + 1]
             else:
                 after, high = seen.gaps[j, 1], 0.0
-            moved = theta[offset[k] + i] - seen.theta[at]
+            here = theta[offset[k] + i]
+            moved = here - seen.theta[at]
+            was = seen.opening[at] + (high - low) / (after - before) * moved
+            now = _low_opening(f[offset[k] + i], orders[k], i, rules)
+            closed = max(closed, was - now)
+            most = max(most, was)
             if abs(moved) > near:
                 comparable = False
-            was = seen.opening[at] + (high - low) / (after - before) * moved
-            closed = max(closed, was - _low_opening(f[offset[k] + i], orders[k], i, rules))
+            # a minimum may appear at any node, but hardly beside the ends
+            if min(here - gaps[k, 0], gaps[k, 1] - here) > within:
+                none_inside = False
+                rest = was - CLOSING_SAFETY * max(was - now, 0.0) - beside * grown
+                comparable = comparable and rest > CLEARANCE_LEFT * was
+            elif now < 0 <= was:
+                comparable = False
         if not comparable:
             continue
-        grown = max(begin, 0.0) + max(-end, 0.0)
         clearance = seen.clearance[j]
-        if clearance == np.inf:
-            clearance = _to_any_minimum(seen, j, m, NO_MINIMUM_WITHIN / COMPARABLE * near)
+        if clearance == np.inf and none_inside:
+            clearance = most
         rest = clearance - CLOSING_SAFETY * closed - beside * grown
-        if rest > CLEARANCE_LEFT * clearance:
+        if clearance == np.inf or rest > CLEARANCE_LEFT * clearance:
             left[k] = rest if seen.clearance[j] < np.inf else np.inf
             place[k] = j
     fresh: Integers = np.flatnonzero(place < 0)
