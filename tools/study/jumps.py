@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import norm
+from scipy.special import log_ndtr
 
 from tools.study.data import Array, Rows
 
@@ -220,8 +220,9 @@ def _against_lognormal(tail: Array, exponent: float) -> float:
 
     def density(parameters: Array) -> Array:
         mean, spread = parameters[0], np.exp(parameters[1])
-        above = norm.logsf((start - mean) / spread)
-        return np.asarray(norm.logpdf((logs - mean) / spread) - np.log(spread) - logs - above)
+        above = log_ndtr((mean - start) / spread)
+        normal = -0.5 * (((logs - mean) / spread) ** 2 + np.log(2 * np.pi))
+        return np.asarray(normal - np.log(spread) - logs - above)
 
     first = np.array([logs.mean(), np.log(logs.std())])
     best = minimize(lambda p: -np.sum(density(p)), first, method="Nelder-Mead")
