@@ -5,6 +5,7 @@ Values and helpers that several tests use are in :mod:`tests.support`.
 
 from __future__ import annotations
 
+import gc
 import os
 from typing import Any
 
@@ -40,6 +41,12 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Hand out tests of several processes by groups (tests/support/two_processes.py)."""
     return scheduler(config, log)
+
+
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector all that was imported and collected, which stays to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from adhesis.ensemble import versions
+from adhesis.ensemble.command.main import main
 from adhesis.ensemble.doctor import examine as doctor
 from adhesis.ensemble.run import launch
 from adhesis.solver import precompile as warm
@@ -54,8 +55,15 @@ def test_parallel_hdf5_means_that_ranks_wrote_a_file(findings: dict[str, Any]) -
         assert findings["writer"] == "mpio"
 
 
-def test_text_names_the_writer_and_every_library() -> None:
-    text = run_doctor().stdout
+def test_text_names_the_writer_and_every_library(
+    findings: dict[str, Any], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = {name: value for name, value in findings.items() if name != "usable"}
+    checks = [doctor.Check(**check) for check in findings["checks"]]
+    diagnosis = doctor.Diagnosis(**{**found, "checks": checks})
+    monkeypatch.setattr("adhesis.ensemble.command.doctor.examine", lambda directory: diagnosis)
+    assert main(["doctor"]) == (0 if findings["usable"] else 1)
+    text = capsys.readouterr().out
     for word in ("MPI ", "mpirun ", "HDF5 ", "FFTW ", "numba ", "cores ", "writer "):
         assert f"\n{word}" in text
 

@@ -67,25 +67,34 @@ def result(request: pytest.FixtureRequest) -> LoopResult | PathResult:
 # ---------------------------------------------------------------------- shown
 
 
-def test_every_public_object_has_a_short_repr(result):
-    method = wave_method()
-    state = result.contact_states[3]
-    objects: list[Any] = [
-        *(result, result.jumps, state, method, method.recipe, method.fields(state, 64)),
-        *(WAVE, method.problem, method.problem.half_space, Control(), result.method),
-        *(method.follow(method.detached(1e-6), 0.9e-6), *method.openings(state)),
-        *result.jumps[:1],
-        *getattr(result, "minor_loops", ()),
-        *(result.film(frames=2),),
-    ]
+def check_short_repr(*objects: Any) -> None:
     shapes = (LoopResult, PathResult, adhesis.Profile, Problem, adhesis.Fields, adhesis.Opening)
     for thing in objects:
         assert len(repr(thing)) < 800, type(thing)
         assert " at 0x" not in repr(thing)
-        if type(thing).__module__.startswith("adhesis") and thing is not result.method:
+        if type(thing).__module__.startswith("adhesis"):
             page = thing._repr_html_()
             assert page.startswith(("<table><tr><th>", "<iframe")), type(thing)
             assert ("data:image/png;base64," in page) == isinstance(thing, shapes), type(thing)
+
+
+def test_every_object_of_a_result_has_a_short_repr(result):
+    method = wave_method()
+    state = result.contact_states[3]
+    check_short_repr(
+        *(result, result.jumps, state, method.fields(state, 64), *method.openings(state)),
+        *(*result.jumps[:1], *getattr(result, "minor_loops", ()), result.film(frames=2)),
+    )
+    assert len(repr(result.method)) < 800
+    assert " at 0x" not in repr(result.method)
+
+
+def test_every_object_without_a_result_has_a_short_repr():
+    method = wave_method()
+    check_short_repr(
+        *(method, method.recipe, WAVE, method.problem, method.problem.half_space, Control()),
+        method.follow(method.detached(1e-6), 0.9e-6),
+    )
 
 
 def test_a_notebook_shows_the_main_numbers_and_the_figure(result):

@@ -32,12 +32,12 @@ class Rows:
 
     def where(self, **values: Any) -> Rows:
         """Rows with these values; numbers within rounding of the table."""
-        keep = np.ones(len(self), bool)
+        kept = np.arange(len(self))
         for name, value in values.items():
-            column = self[name]
+            column = self[name][kept]
             same = column == value if name in TEXTS else np.isclose(column, value, rtol=1e-5)
-            keep &= same
-        return Rows({name: column[keep] for name, column in self.columns.items()})
+            kept = kept[same]
+        return Rows({name: column[kept] for name, column in self.columns.items()})
 
     def values(self, name: str) -> list[float]:
         """Different values of a column, ascending."""

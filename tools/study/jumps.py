@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import norm
+from scipy.special import log_ndtr
 
 from tools.study.data import Array, Rows
 
@@ -64,20 +64,21 @@ def fit(values: Array) -> tuple[float, float, float]:
     top = values.size - FEWEST
     places = np.unique(np.linspace(0, max(top, 0), CANDIDATES).astype(int))
     best = (np.nan, values[0], np.inf)
+    logs = np.log(values)
     for place in places.tolist():
-        tail = values[place:]
-        exponent = 1 + tail.size / np.sum(np.log(tail / tail[0]))
+        tail = logs[place:] - logs[place]
+        exponent = 1 + tail.size / np.sum(tail)
         distance = _distance(tail, exponent)
         if distance < best[2]:
-            best = (float(exponent), float(tail[0]), distance)
+            best = (float(exponent), float(values[place]), distance)
     return best
 
 
-def _distance(tail: Array, exponent: float) -> float:
-    law = 1 - (tail / tail[0]) ** (1 - exponent)
-    n = tail.size
-    above = np.arange(1, n + 1) / n - law
-    return float(max(above.max(), (law - np.arange(n) / n).max()))
+def _distance(logs: Array, exponent: float) -> float:
+    """Distance of Kolmogorov and Smirnov of sorted ln(x/x_min) from the law."""
+    n = logs.size
+    above = np.arange(1, n + 1) / n + np.expm1((1 - exponent) * logs)
+    return float(max(above.max(), 1 / n - above.min()))
 
 
 def power_law(rows: Rows, name: str) -> PowerLaw:
@@ -152,13 +153,13 @@ class CutPowerLaw:
 _NODES = 400
 
 
-def _grid(smallest: float, cut: float) -> tuple[Array, Array]:
-    """Places from ``smallest`` to far beyond the cut, and weights of ∫ dx over them."""
+def _grid(smallest: float, cut: float, exponent: float) -> tuple[Array, Array]:
+    """Places from ``smallest`` to far beyond the cut, and the law's density dx at them."""
     logs = np.linspace(np.log(smallest), np.log(60 * cut + smallest), _NODES)
     x = np.exp(logs)
-    weights = np.full(_NODES, logs[1] - logs[0])
-    weights[[0, -1]] *= 0.5
-    return x, weights * x
+    density = (logs[1] - logs[0]) * np.exp((1 - exponent) * logs - x / cut)
+    density[[0, -1]] *= 0.5
+    return x, density
 
 
 def fit_cut(tail: Array, smallest: float) -> tuple[float, float]:
@@ -167,8 +168,7 @@ def fit_cut(tail: Array, smallest: float) -> tuple[float, float]:
 
     def negative(parameters: Array) -> float:
         exponent, cut = float(parameters[0]), float(np.exp(parameters[1]))
-        x, weights = _grid(smallest, cut)
-        whole = np.log(np.sum(weights * x**-exponent * np.exp(-x / cut)))
+        whole = np.log(np.sum(_grid(smallest, cut, exponent)[1]))
         return float(exponent * sum_logs + total / cut + tail.size * whole)
 
     best = minimize(negative, np.array([1.2, np.log(tail.max() / 3)]), method="Nelder-Mead")
@@ -207,8 +207,7 @@ def cut_power_law(rows: Rows, name: str, decades: float) -> CutPowerLaw:
 
 def share_above(x: Array, smallest: float, exponent: float, cut: float) -> Array:
     """Share of the jumps above ``smallest`` that are larger than ``x``, by the law."""
-    places, weights = _grid(smallest, cut)
-    density = weights * places**-exponent * np.exp(-places / cut)
+    places, density = _grid(smallest, cut, exponent)
     below = np.interp(x, places, (np.cumsum(density) - 0.5 * density) / density.sum())
     return np.asarray(1 - below)
 
@@ -221,8 +220,9 @@ def _against_lognormal(tail: Array, exponent: float) -> float:
 
     def density(parameters: Array) -> Array:
         mean, spread = parameters[0], np.exp(parameters[1])
-        above = norm.logsf((start - mean) / spread)
-        return np.asarray(norm.logpdf((logs - mean) / spread) - np.log(spread) - logs - above)
+        above = log_ndtr((mean - start) / spread)
+        normal = -0.5 * (((logs - mean) / spread) ** 2 + np.log(2 * np.pi))
+        return np.asarray(normal - np.log(spread) - logs - above)
 
     first = np.array([logs.mean(), np.log(logs.std())])
     best = minimize(lambda p: -np.sum(density(p)), first, method="Nelder-Mead")

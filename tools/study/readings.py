@@ -149,7 +149,7 @@ class Reading:
         factor = np.linalg.cholesky(self.covariance / np.outer(spread, spread))
         of_draw = (self._left * spread) @ factor / self._spread[:, None]
         z = of_draw @ _normals(len(self.cells), DRAWS)
-        return float(np.mean(np.abs(z).max(axis=0) >= np.abs(self.z).max()))
+        return float(np.mean(np.abs(z, out=z).max(axis=0) >= np.abs(self.z).max()))
 
     @property
     def worst(self) -> Cell:
@@ -238,6 +238,7 @@ def _square(study: Study, normalisation: str, hurst: float, ratio: int) -> float
     return float(2 * C0 * powers / 1e-12)
 
 
+@cache
 def _height_factor(study: Study, heights: str, hurst: float, ratio: int) -> Series:
     """What W~ with own h_max is to be multiplied by, for each realisation."""
     h_max = Losses(study).direct("h_max", hurst, 0.04, 0.8, ratio)
