@@ -17,7 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.grid.kernels import advance, dot, update_direction
+from adhesis.solver.grid.kernels import (
+    advance,
+    dot,
+    residual_inside,
+    restrict,
+    total,
+    update_direction,
+)
 from adhesis.solver.method import PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.profile import Array
@@ -195,7 +202,8 @@ class ContactSolver:
         response.displacement, residual, _ = self._solve(
             inside, response.stress, response.displacement, unit, most / scale, np.inf
         )
-        mean, per_separation = float(contact.stress.mean()), float(response.stress.mean())
+        n = self.elastic.n
+        mean, per_separation = total(contact.stress) / n, total(response.stress) / n
         control = self.control
         if control.is_load:
             if per_separation == 0:
@@ -225,17 +233,14 @@ class ContactSolver:
         the largest residual in m, and the energy gained by the last iteration in J/m.
         """
         elastic = self.elastic
-        kept = stress * inside
-        if np.array_equal(kept, stress):
-            displacement = displacement.copy()
-        else:
-            stress[:] = kept
-            displacement = elastic.displacement(stress).copy()
-        residual = (target - displacement) * inside
+        if not restrict(stress, inside):
+            displacement = elastic.displacement(stress)
+        displacement = displacement.copy()
+        residual = np.empty_like(stress)
+        largest = residual_inside(target, displacement, inside, residual)
         direction = np.zeros_like(residual)
         rz_before = 0.0
         gain = np.inf
-        largest = float(np.abs(residual).max())
         for _ in range(_MAX_ITERATIONS):
             if (largest <= most and gain <= energy_tolerance) or largest <= _NEGLIGIBLE * most:
                 break

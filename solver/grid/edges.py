@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact, Mask
+from adhesis.solver.grid.kernels import edges_of, patches_of
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.model.profile import Array
 
@@ -20,18 +21,8 @@ def patch_ranges(mask: Mask) -> tuple[Indices, Indices]:
     Sorted by the first node; a patch may extend across the end of the period. A contact set without
     a free node is one patch that starts at node 0.
     """
-    ends = np.flatnonzero(mask[1:] != mask[:-1])
-    ends += 1
-    if mask[0] and mask[-1]:  # the last patch extends across the end of the period
-        if ends.size == 0:
-            return np.zeros(1, dtype=np.intp), np.array([mask.size])
-        ends = np.concatenate((ends[1:], ends[:1] + mask.size))
-    elif mask[0]:
-        ends = np.concatenate(([0], ends))
-    elif mask[-1]:
-        ends = np.concatenate((ends, [mask.size]))
-    first = ends[::2]
-    return first, ends[1::2] - first
+    first, width = patches_of(mask)
+    return first, width
 
 
 @dataclass(frozen=True)
@@ -81,17 +72,9 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         none = np.empty(0, dtype=np.intp)
         nothing = np.empty(0)
         return Edges(none, none, none, none, none, nothing, nothing, np.empty(0, dtype=bool))
-    last = first + width - 1
-    gap_right = np.concatenate((first[1:], first[:1] + n)) - last - 1
-    gap_left = np.concatenate((gap_right[-1:], gap_right[:-1]))
-    side = np.ones(2 * count, dtype=np.intp)
-    side[:count] = -1
-    inner = np.concatenate((first, last)) % n
-    outer = (inner + side) % n
-    gap = np.concatenate((gap_left, gap_right))
-
+    side, inner, outer, both_widths, gap = edges_of(first, width, n)
     grow, recede = [0.0] * (2 * count), [0.0] * (2 * count)
-    w, gl, gr = width.tolist(), gap_left.tolist(), gap_right.tolist()
+    w, gl, gr = width.tolist(), gap[:count].tolist(), gap[count:].tolist()
     total = sum(w)
     for k in range(count):
         before, after = w[k - 1], w[(k + 1) % count]
@@ -123,5 +106,4 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         overlap[:] = False
     stress = contact.stress[inner]
     recession = np.where(stress < 0, dx * (adhesion[inner] - 0.5 * stress**2 * s_recede), np.inf)
-    both_widths = np.concatenate((width, width))
     return Edges(side, inner, outer, both_widths, gap, growth, recession, overlap)

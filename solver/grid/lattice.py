@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import EDGE_COMPLIANCE, Contact
 from adhesis.solver.grid.elasticity import ElasticGrid
+from adhesis.solver.grid.kernels import total, total_inside
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
@@ -84,13 +85,13 @@ class Lattice:
         """
         if contact.response is None or not contact.mask.any():
             return 0.0, np.zeros(nodes.size)
-        k, per_separation = self.control.stiffness, float(contact.response.stress.mean())
+        k, per_separation = self.control.stiffness, total(contact.response.stress) / self.n
         opening = 1 - contact.response.displacement[nodes]
         return self.dx / (self.elastic.period * (k + per_separation)), opening
 
     def conjugate(self, contact: Contact) -> float:
         """Compute Y of ``control``: p̄ in Pa, under a load s - h_max in m."""
-        mean_stress = float(contact.stress.mean())
+        mean_stress = total(contact.stress) / self.n
         return self.control.conjugate(contact.separation, mean_stress, self.h_max)
 
     def gap(self, contact: Contact) -> Array:
@@ -99,7 +100,7 @@ class Lattice:
 
     def adhesion_energy(self, contact: Contact) -> float:
         """Compute -Σ γ sqrt(1 + h'²) dx over the contact nodes, in J/m."""
-        return -self.dx * float(np.sum(self.adhesion[contact.mask]))
+        return float(-self.dx * total_inside(self.adhesion, contact.mask))
 
     def energy(self, contact: Contact) -> float:
         """Compute W of ``control`` in J/m, per period: U at fixed separation.
@@ -111,7 +112,7 @@ class Lattice:
             return energy
         if self.control.is_load and contact.prescribed > 0 and not contact.mask.any():
             return -np.inf
-        mean_stress = float(contact.stress.mean())
+        mean_stress = total(contact.stress) / self.n
         return self.control.potential(
             energy, contact.separation, mean_stress, self.h_max, self.elastic.period
         )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact
 from adhesis.solver.grid.edges import Indices, patch_ranges
+from adhesis.solver.grid.kernels import total
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.method import ContactState
 
@@ -38,7 +39,7 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
     period = lattice.elastic.period
     left, right = left + wrapped * period, right + wrapped * period
     order = np.argsort(left, kind="stable")
-    mean_stress = float(contact.stress.mean())
+    mean_stress = total(contact.stress) / lattice.n
     control, hold_energy = lattice.control, 0.0
     if not control.is_fixed:
         hold_energy = control.potential(0.0, contact.separation, mean_stress, lattice.h_max, period)

@@ -18,7 +18,7 @@ from adhesis.solver.validate.claims import METHODS, Row, validate
 WAVE_CLAIMS = tuple(
     claim
     for claim in validation.CLAIMS
-    if claim.__name__ not in ("order", "full_contact", "audit")  # not one wave, or not one grid
+    if claim.__name__ not in ("order", "full_contact", "opening", "audit")  # not one wave or grid
 )
 
 
