@@ -51,7 +51,7 @@ docs: setup  ## the documentation site in docs/_build, its examples run
 check-package: setup  ## wheel and source distribution, used in a bare environment
 	@tools/check_package.sh
 
-figures-of-docs: setup  ## every figure of README and docs, by its command, stamped (half an hour)
+figures-of-docs: setup  ## every figure of README and docs, by its command, stamped (an hour)
 	$(bin)/python tools/figures_of_docs.py $(ARGS)
 
 lock: setup-test  ## both lists of versions, from .venv

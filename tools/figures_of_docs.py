@@ -1,6 +1,6 @@
 """Makes the figures of README and docs/ again, each by its command, stamped with the commit.
 
-    make figures-of-docs                         all of them (half an hour of two cores)
+    make figures-of-docs                         all of them (an hour of two cores)
     make figures-of-docs ARGS='loop paper'       some
     make figures-of-docs ARGS=--check            says of which commit each is
 
@@ -72,6 +72,7 @@ PARTS = {
     "zero-range": Part(
         ("docs/figures/zero_range.py OUT/zero_range.png",), "zero_range.png", "figures"
     ),
+    "opening": Part(("docs/figures/opening.py OUT/opening.png",), "opening.png", "figures"),
     "one-asperity": Part(
         ("docs/figures/one_asperity.py OUT/one_asperity.png",), "one_asperity.png", "figures"
     ),
