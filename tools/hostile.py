@@ -208,6 +208,9 @@ def _of_fields(method: SharpMethod, loop: LoopResult, states: list[ContactState]
     for k in rng.choice(len(kept), min(_LOOKED_AT, len(kept)), replace=False):
         fields = method.fields(kept[k], nodes)
         tension = np.where(fields.stress != 0, -fields.stress, np.nan)
+        # of a gap between two nodes there is no other sign
+        middle = kept[k].internal.gaps.mean(axis=1)
+        tension[np.rint(middle / (2 * np.pi) * nodes).astype(int) % nodes] = np.nan
         for node in highest_peaks(tension, 1):
             largest = max(largest, float(tension[node]) / method.problem.strength)
     return largest
