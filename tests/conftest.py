@@ -17,6 +17,9 @@ from tests.support.launchers import without_mpi, without_slurm
 from tests.support.progress import Waiting
 from tests.support.two_processes import rank_of, scheduler
 
+# Nothing that is imported and collected is garbage: until all is, looking for some is in vain.
+gc.disable()
+
 # The same examples every time. `make fuzz` draws anew, from a seed that it prints.
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("anew", deadline=None, database=None, print_blob=True)
@@ -47,6 +50,7 @@ def pytest_collection_finish() -> None:
     """Spare the garbage collector all that was imported and collected, which stays to the end."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -131,12 +131,17 @@ def one_a_node_first(comm: Any, function: Callable[[bool], T]) -> T:
         return function(True)
     from mpi4py import MPI
 
+    wait_for_all(comm)  # in the split, and in what follows, a rank that waits would burn a core
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     first: bool = node.rank == 0
-    result = function(True) if first else None
+    if first:
+        result = function(True)
+    wait_for_all(node)
+    if not first:
+        result = function(False)
     wait_for_all(node)
     node.Free()
-    return function(False) if result is None else result
+    return result
 
 
 class MpiChannel:

@@ -6,13 +6,16 @@ import heapq
 import queue
 import random
 import signal
+import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numba import njit
 
+from adhesis.ensemble.run import ranks
 from adhesis.ensemble.run.attempt import GivenUp, Outcome, attempt
 from adhesis.ensemble.run.dispatch import (
     AHEAD,
@@ -802,3 +805,56 @@ def test_one_process_does_a_unit_at_once_and_stops_between_its_tasks():
     limits = Limits(stop=lambda: "enough" if len(order) == 3 else None)
     reason = work_alone(schedule, group_of, compute, lambda o: o, lambda o: None, limits, units)
     assert (reason, order) == ("enough", [0, 2, 1])
+
+
+def test_ranks_that_get_ready_wait_without_burning_a_core(monkeypatch):
+    """What blocks is called when all have come there, and they go on together."""
+    mpi = SimpleNamespace(COMM_TYPE_SHARED=0)
+    monkeypatch.setitem(sys.modules, "mpi4py", SimpleNamespace(MPI=mpi))
+    rounds, splits, events = [0, 0], [], []
+    looks, left = threading.Event(), threading.Event()
+
+    class Comm:
+        def __init__(self, rank):
+            self.rank = rank
+
+        def Ibarrier(self):
+            rounds[self.rank] += 1
+            mine = rounds[self.rank]
+
+            def arrived():
+                if self.rank == 0 and min(rounds) < mine:
+                    looks.set()
+                return min(rounds) >= mine
+
+            return SimpleNamespace(Test=arrived)
+
+        def Split_type(self, kind):
+            splits.append(min(rounds))
+            return self
+
+        def Free(self):
+            pass
+
+    def ready(comm):
+        def prepare(first):
+            if not first:
+                looks.clear()
+                # until rank 0 waits for this one, or has gone on without it
+                while not looks.wait(0.01) and not left.is_set():
+                    pass
+            events.append(("ready", first))
+            return first
+
+        assert ranks.one_a_node_first(comm, prepare) is (comm.rank == 0)
+        events.append(("left", comm.rank))
+        left.set()
+
+    first = threading.Thread(target=ready, args=(Comm(0),), daemon=True)
+    first.start()
+    assert looks.wait(30)
+    ready(Comm(1))
+    first.join(30)
+    assert splits == [1, 1]
+    assert events[:2] == [("ready", True), ("ready", False)]
+    assert sorted(events[2:]) == [("left", 0), ("left", 1)]
