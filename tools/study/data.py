@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -89,14 +90,20 @@ class Study:
 
     def joined(self, name: str, campaigns: Sequence[str], **values: Any) -> dict[int, float]:
         """One column of the loops with these values; the first campaign that has a realisation."""
-        found: dict[int, float] = {}
-        for campaign in campaigns:
-            found = {**self.by_realisation(name, campaign=campaign, **values), **found}
-        return found
+        return dict(_joined(self, name, tuple(campaigns), **values))
 
     def by_realisation(self, name: str, **values: Any) -> dict[int, float]:
         """One column of the loops with these values, by realisation."""
         return by_realisation(self.loops.where(**values), name)
+
+
+@cache
+def _joined(study: Study, name: str, campaigns: tuple[str, ...], **values: Any) -> dict[int, float]:
+    """Look a cell up once: many tables and readings use the same."""
+    found: dict[int, float] = {}
+    for campaign in campaigns:
+        found = {**study.by_realisation(name, campaign=campaign, **values), **found}
+    return found
 
 
 def by_realisation(rows: Rows, name: str) -> dict[int, float]:
