@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import sys
 from collections.abc import Callable
-from importlib import metadata
 from pathlib import Path
 
 _PACKAGES = ("adhesis", "numpy", "scipy", "numba", "llvmlite", "pyfftw", "h5py", "mpi4py")
@@ -91,6 +90,8 @@ def _checked_out() -> str | None:
 
 
 def _package(name: str, missing: str = "not installed") -> str:
+    from importlib import metadata  # takes long to load; only rank 0 has a use for it
+
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

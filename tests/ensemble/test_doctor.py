@@ -69,14 +69,16 @@ def test_text_names_the_writer_and_every_library(
 
 
 @pytest.mark.mpi
-def test_a_launcher_of_another_mpi_is_told_from_the_right_one(tmp_path: Path) -> None:
+def test_a_launcher_of_another_mpi_is_told_from_the_right_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     # As the other MPI's mpirun does to these ranks: two processes, each alone in its world.
     wrong = tmp_path / "mpirun"
     wrong.write_text('#!/bin/sh\nshift 2\n"$@" & "$@"\nwait\n')
     wrong.chmod(0o755)
-    done = run_doctor("--json", MPIRUN=str(wrong))
-    found = json.loads(done.stdout)
-    assert done.returncode == 1
+    monkeypatch.setenv("MPIRUN", str(wrong))
+    assert main(["doctor", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
     (check,) = [check for check in found["checks"] if check["name"] == "ranks"]
     assert not check["ok"]
     assert "another MPI" in check["text"]
