@@ -13,6 +13,7 @@ import pytest
 from hypothesis import settings
 
 from tests.support import one_thread  # noqa: F401  # before what loads numpy
+from tests.support.launcher_crash import pytest_runtest_protocol  # noqa: F401  # a hook
 from tests.support.launchers import without_mpi, without_slurm
 from tests.support.progress import Waiting
 from tests.support.two_processes import rank_of, scheduler

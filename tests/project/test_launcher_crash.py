@@ -1,0 +1,46 @@
+"""A test in which mpirun itself crashes runs once more; no other test does."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+
+TESTS = """
+import pytest
+
+runs = []
+crash = "PMIx_" + "server_finalize"  # not to be read in the source of the test
+
+@pytest.fixture(scope="module")
+def shared():
+    runs.append("shared")
+    return "shared"
+
+@pytest.mark.parametrize("stack", [crash, "adhesis"])
+@pytest.mark.parametrize("crashes", [1, 2])
+def test_crash(stack, crashes, shared):
+    runs.append((len(stack), crashes))
+    assert runs.count((len(stack), crashes)) > crashes, stack
+
+def test_count(shared):
+    assert len(runs) == 1 + 2 * 2 + 2
+"""
+
+
+def test_a_test_runs_once_more_if_mpirun_crashes_in_it(tmp_path: Path) -> None:
+    path = tmp_path / "test_it.py"
+    path.write_text(TESTS)
+    words = ("-q", "-rA", "-p", "tests.support.launcher_crash", "-c", "/dev/null", str(path))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *words], cwd=ROOT, capture_output=True, text=True
+    )
+    lines = done.stdout.splitlines()
+    passed = {line.split("::")[1] for line in lines if line.startswith("PASSED")}
+    failed = {line.split("::")[1].split()[0] for line in lines if line.startswith("FAILED")}
+    crash = "PMIx_" + "server_finalize"
+    assert passed == {f"test_crash[1-{crash}]", "test_count"}
+    assert failed == {"test_crash[1-adhesis]", f"test_crash[2-{crash}]", "test_crash[2-adhesis]"}
+    assert "mpirun itself crashed: this test runs once more" in done.stdout
