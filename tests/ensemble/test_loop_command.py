@@ -317,7 +317,7 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
     young, cycle, code, tmp_path, capsys
 ):
     out = tmp_path / "loop.json"
-    words = ("--hurst", 0.8, "--seed", 0, "--period", 2e-3, "--n0", 2, "--ratio", 4)
+    words = ("--hurst", 0.8, "--seed", 0, "--period", 2e-3, "--n0", 1, "--ratio", 4)
     more = ("--load-steps", 10, "--strict", "--quiet", "--json", out)
     assert run(*words, "--young", young, *cycle, *more) == code
     data, text = json.loads(out.read_text()), capsys.readouterr()
@@ -474,7 +474,8 @@ def test_the_strength_of_the_interface_is_an_option_and_stands_in_the_json(
 ):
     out = tmp_path / "loop.json"
     for words in (("--strength", 1e4), ("--adhesion-range", GAMMA / 1e4)):
-        assert run(*wave_words(wave_file, "--max-penetration", 0.8, "--json", out, *words)) == 0
+        steps = ("--max-penetration", 0.8, "--load-steps", 2)
+        assert run(*wave_words(wave_file, *steps, "--json", out, *words)) == 0
         data = json.loads(out.read_text())
         assert data["strength"] == pytest.approx(1e4)
         assert (data["openings"], data["barrier"]) == (0, 0.0)
