@@ -317,7 +317,7 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
     young, cycle, code, tmp_path, capsys
 ):
     out = tmp_path / "loop.json"
-    words = ("--hurst", 0.8, "--seed", 0, "--period", 2e-3, "--n0", 1, "--ratio", 4)
+    words = ("--hurst", 0.8, "--seed", 0, "--period", 2e-3, "--n0", 2, "--ratio", 4)
     more = ("--load-steps", 10, "--strict", "--quiet", "--json", out)
     assert run(*words, "--young", young, *cycle, *more) == code
     data, text = json.loads(out.read_text()), capsys.readouterr()
