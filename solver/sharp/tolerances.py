@@ -32,16 +32,6 @@ MOST_CHARGES = 160
 """Charges of a run, at most: enough for patches of 3e-7 of their run at an accuracy of 1e-14, and
 of 1e-17 at 1e-5."""
 
-FORCE_SAMPLES = 16
-"""Places along a step of a running edge at which its force, a cubic, is looked at for a zero."""
-
-CUBIC_ERROR = 1 / 24
-"""Error of that cubic in units of its twist (h³/6 of its third derivative): that of a wave over
-almost half its length."""
-
-FORCE_MARGIN = 0.02
-"""Share of a force's range along a step below which it may be zero."""
-
 ENERGY_NODES = 3.0
 """Sine nodes per λ_min for the energy: two resolve the shortest wave, the rest is margin."""
 
@@ -160,39 +150,39 @@ HELD_BACK = 0.03
 OTHER_MINIMUM = 0.01
 """λ_min. Edges this far apart are those of different minima."""
 
-# Lengths are in longest steps of a running edge, 0.05 λ_min: unchecked steps above 0.1 λ_min
-# leap over pinned minima. How often a length decides a loss: benchmarks/descent_steps.py.
-UNCHECKED_ALONE = 2.0
-"""Longest steps (0.1 λ_min); up to here a step of one edge that runs alone is not checked for a
-minimum, up to 1 that of several. The check is a cubic of the force."""
-LONGEST_STRIDE = 3.0
-"""Longest steps (0.15 λ_min); checked steps of several edges. With 0.3 λ_min a loop of
-benchmarks/descent_steps.py changed by 4e-3 without a race."""
-LONGEST_STRIDE_ALONE = 6.0
-"""Longest steps (0.3 λ_min); checked steps of one edge. 0.45 λ_min leapt over a minimum in 3 of 12
-loops of benchmarks/few_gaps.py; 0.3 missed less than unchecked 0.1."""
+# Steps of the flow through the model of the openings. How often a length decides a loss:
+# benchmarks/descent_steps.py.
+FIRST_REACH = 12.0
+"""Longest steps (0.6 λ_min) that the first step of a flow through the model may go."""
+LEAST_REACH = 2.0
+"""Longest steps (0.1 λ_min); where the model is wrong sooner the next step is a short one."""
+LONGEST_REACH = 100.0
+"""Longest steps (5 λ_min)."""
+REACH_GROWTH = 3.0
+"""Largest growth of the reach from one step to the next."""
+RECOVERY = 1.5
+"""Growth of the reach with every short step."""
+REACH_SAFETY = 0.8
+"""Of the reach at which the error would be what is allowed: that of a tangent grows as its
+square."""
+MODEL_ERROR = 0.005
+"""C_c, or C if that is more. Error of an opening of the model that is allowed."""
+MODEL_SHARE = 0.1
+"""Of the distance of an opening from its critical value: the error that is allowed in addition."""
+MODEL_STEPS = 200
+"""Steps through the model in one step of a descent."""
+RUNNING_ENDS = 0.1
+"""Longest steps; a shorter one ends the flow through the model."""
 RUNNING_LENGTH = 0.5
-"""Longest steps; an edge that moves further runs."""
-RUNNING_SHARE = 0.25
-"""Of the longest motion; an edge that moves less does not run beside it."""
-STANDING_SHARE = 0.01
-"""Of its limit; while others run an edge that would move less stands, so that nodes, moments and
-kernels of its gap are kept."""
-REUSES = 2
-"""Steps; further ones of several edges with one tangent, which decides their direction."""
-REUSES_ALONE = 8
-"""Steps; of one edge, where the tangent decides the length of a step only."""
-TURNING_SHARE = 0.2
-"""Of the reach; an edge that would turn by so much asks for a new tangent."""
+"""Longest steps; edges that move further in the model run."""
+TIME_TRIES = 20
+"""Times Δτ that are tried for one step in the model."""
+TIME_REDUCTION = 0.25
+"""By which Δτ falls at most from one try to the next."""
 ENERGY_ROUNDING = 1e-3
 """Of the work done either way; a smaller rise of the energy is rounding."""
 LEAST_STEP_SHARE = 0.02
 """Of the longest step; steps are not shortened below."""
-TURNS = 8
-"""Turns of one edge over a minimum that no check shows, after which steps become shorter."""
-TURNS_FACTOR = 0.8
-"""By which they do at each further turn."""
-
 # Step of the linear flow, in shares of an edge's limit.
 FLOW_REACHED = 0.97
 """A step that takes an edge so far is long enough."""
@@ -232,10 +222,8 @@ ON_TRAJECTORY = 0.4
 contact 0.32 and 0.60 in tests/solver/test_kinetics.py."""
 COMPARISONS = 3
 """In a row, after which a descent has rejoined the trajectory."""
-FIELDS_PER_COMPARISON = 2
-"""Fields from one comparison to the next."""
 SEGMENT_MARGIN = 1.2
-"""Of the longest stride; a longer segment lies between two descents."""
+"""Longest steps; a longer segment lies between two descents."""
 SEGMENT_SHARE = 0.25
 """Of an edge's distance from a point, in segments: further away is far."""
 

@@ -87,7 +87,7 @@ class RaceCheck:
                 apart = np.abs(way[:saddle] - way[saddle]).max(axis=1, initial=0.0)
                 far = np.flatnonzero(apart > SADDLE_APPROACH * self._edges.wave)
                 begin = int(far[-1]) if far.size else 0
-                fields = int(SHORT_WAY * (left - begin) / SHORTENED_STEPS)
+                fields = int(SHORT_WAY * (left - begin))
                 beyond = Track(ways, has_left=True, short_fields=fields)
                 return way[begin].reshape(-1, 2), beyond
         return None

@@ -17,6 +17,7 @@ from adhesis.solver.sharp.field.dense_solver import solve, solve_again
 from adhesis.solver.sharp.field.exterior import Exterior
 from adhesis.solver.sharp.field.solution import FieldModel, Solution
 from adhesis.solver.sharp.gap.quadrature import Integers
+from adhesis.solver.sharp.tolerances import ENERGY_ROUNDING
 
 
 class FlowProblem(NamedTuple):
@@ -56,20 +57,6 @@ class Forces(NamedTuple):
     slope: Array
 
 
-class ForceRows(NamedTuple):
-    """Derivatives of the openings between edges, C_e ∂C_e/∂n_f, changed in place.
-
-    Attributes
-    ----------
-    values : array, shape (2L, 2L)
-    known : int array, shape (2L,)
-        Whether row e belongs to the present edges (not zero) or to earlier ones.
-    """
-
-    values: Array
-    known: Integers
-
-
 @compiled
 def forces_at(
     gaps: Array, prescribed: float, orders: Integers, before: Solution, system: FlowProblem
@@ -94,8 +81,8 @@ def forces_at(
 
 
 @compiled
-def energy_change(before: Array, after: Array, step: Array) -> tuple[float, float]:
-    """Integrate the change of the energy over a step, and the work done either way.
+def energy_rises(before: Array, after: Array, step: Array) -> bool:
+    """Whether the energy rises over a step, by more than rounding of the work done either way.
 
     ``before`` and ``after`` are dU/dn at both ends of the step (trapezoidal rule).
     """
@@ -105,7 +92,7 @@ def energy_change(before: Array, after: Array, step: Array) -> tuple[float, floa
         of_edge = 0.5 * (before[e] + after[e]) * step[e]
         change += of_edge
         work += abs(of_edge)
-    return change, work
+    return change > ENERGY_ROUNDING * work
 
 
 @compiled
@@ -119,31 +106,3 @@ def slope_along(
     for e in range(step.shape[0]):
         force -= residual[e] * (2 * of.opening[e] - residual[e]) * step[e]
     return force
-
-
-@compiled
-def force_rates(now: Forces, way: Array, edges: Integers, rows: Array) -> Array:
-    """Differentiate the force on each of ``edges``, along its own way, by the way of all edges.
-
-    ``rows`` are those of ``force_along_step.force_derivatives``.
-    """
-    opening, residual, drift = now.solution.opening, now.residual, now.drift
-    rates = np.empty(edges.shape[0])
-    for i in range(edges.shape[0]):
-        e = edges[i]
-        total = 0.0
-        for f in range(way.shape[0]):
-            total += rows[e, f] * way[f]
-        critical = opening[e] - residual[e]
-        rate = critical * drift[e] * (1 - 2 * (e % 2)) * way[e]
-        rate -= np.sign(opening[e]) * total
-        rates[i] = 2 * rate * np.sign(way[e])
-    return rates
-
-
-@compiled
-def add_interaction(rows: Array, step: Array, interaction: Array) -> None:
-    """Add the force that each edge's motion (columns) takes from every edge (rows)."""
-    for e in range(step.shape[0]):
-        for f in range(step.shape[0]):
-            interaction[e, f] += 2 * rows[e, f] * step[f]

@@ -1,8 +1,9 @@
 """Descent in energy along a jump: integration of the edges' gradient flow, compiled.
 
-The integrator solves the field, judges the step that led there (``flow_state``), and chooses the
-next one, by linear kinetics (``linear_kinetics``) or by the rule that it is compared with, equal
-speeds (``bound_constrained_step``). Its step-size control is ``step_size``. It ends with an event.
+Where edges run, a step follows the flow through a model of the openings (``model_flow``), over
+several shortest waves. Near equilibria, saddles and overlaps it follows the linear flow
+(``short_step``). Either is judged by the field at its end (``step_size``). For comparison edges
+move with equal speeds. A descent ends with an event.
 """
 
 from __future__ import annotations
@@ -13,28 +14,23 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.descent.bound_constrained_step import bound_constrained_step
 from adhesis.solver.sharp.descent.edge_forces import (
     FlowProblem,
-    ForceRows,
     Forces,
-    add_interaction,
+    energy_rises,
     forces_at,
 )
-from adhesis.solver.sharp.descent.flow_state import (
-    State,
-    accepted,
-    accepted_share,
-    bounded,
-    initial_state,
-    moved,
-    share_to_minimum,
-    taken_back,
-    turned,
+from adhesis.solver.sharp.descent.edge_model import model_about
+from adhesis.solver.sharp.descent.model_flow import ModelFlow, add_forces, flow_through, no_flow
+from adhesis.solver.sharp.descent.short_step import short_step
+from adhesis.solver.sharp.descent.step_size import (
+    StepSize,
+    after_long_step,
+    after_short_step,
+    initial_size,
+    may_raise,
+    model_error,
 )
-from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
-from adhesis.solver.sharp.descent.saddle import QuadraticModel, step_off_saddle
-from adhesis.solver.sharp.descent.step_size import keeps_tangent, turns_back
 from adhesis.solver.sharp.descent.trajectory import (
     Comparison,
     Trajectory,
@@ -42,20 +38,19 @@ from adhesis.solver.sharp.descent.trajectory import (
     compared,
     extended,
     note_force,
-    without_last,
 )
 from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
     edge_tangent,
+    move_edges,
     raise_orders,
     shortest_length,
     step_limits,
-    symmetrise,
 )
 from adhesis.solver.sharp.field.solution import FieldModel, no_solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
-from adhesis.solver.sharp.tolerances import COMPARISONS, FIELDS_PER_COMPARISON
+from adhesis.solver.sharp.tolerances import COMPARISONS, LEAST_REACH, RUNNING_LENGTH
 
 # Events that end a descent.
 AT_REST = 0  # the steps have become short: Newton's iteration finds the equilibrium
@@ -99,6 +94,30 @@ class Descent(NamedTuple):
     interaction: Array
 
 
+class Step(NamedTuple):
+    """Step that has not been judged yet.
+
+    Attributes
+    ----------
+    gaps : array, shape (L, 2)
+        At its end.
+    motion : array, shape (2L,)
+        Outward motion of the contact at every edge.
+    length : float
+        Of the largest motion.
+    flow : ModelFlow
+        Through the model; without points for a short step.
+    curvature : array, shape (2L, 2L)
+        Of the energy, at the start of a short step.
+    """
+
+    gaps: Array
+    motion: Array
+    length: float
+    flow: ModelFlow
+    curvature: Array
+
+
 @compiled
 def descend(
     gaps: Array,
@@ -111,74 +130,58 @@ def descend(
 ) -> Descent:
     """Descend in energy, d being ``prescribed``, until an event.
 
-    No edge moves in a step by more than the longest step, or a quarter of the gap or patch that it
-    may close. Forces are always fresh; a tangent serves several steps while edges run, unless one
-    turns. ``least`` are the least orders of the gaps, empty for any.
+    No edge moves in a step by more than the reach of the step, or a quarter of the gap or patch
+    that it may close. ``least`` are the least orders of the gaps, empty for any.
     """
-    law, rules = system.law, system.model.rules
-    state = initial_state(gaps)
+    law, model = system.law, system.model
     trajectory = begun(gaps)
-    orders = least
-    edges = 2 * gaps.shape[0]
-    solution = no_solution(map_gaps(gaps), np.empty(0, dtype=np.int64), system.model.device)
-    rows = ForceRows(np.zeros((edges, edges)), np.zeros(edges, dtype=np.int64))
-    interaction = np.zeros((edges, edges))
-    values, matrix = np.zeros(edges), np.zeros((edges, edges))
-    fields, tangents, event = 0, 0, STEP_LIMIT
-    while fields < most_fields:
-        fields += 1
-        orders = raise_orders(least_orders(state.gaps, system.model), orders)
-        now = forces_at(state.gaps, prescribed, orders, solution, system)
-        solution = now.solution
-        if not np.isfinite(solution.pressure):
-            event = NO_FIELD
-            break
-        rows.known[:] = 0
-        share = accepted_share(state, now.slope, share_to_minimum(state, now, rows, rules))
-        if share < 1:
-            state, trajectory = backed_up(state, share, trajectory, rows, interaction)
-            continue
-        add_interaction(rows.values, state.step, interaction)
-        state = accepted(state, now.slope)
-        note_force(trajectory, now.slope)
-        if fields % FIELDS_PER_COMPARISON == 0:
-            comparison = compared(comparison, state.gaps, law.longest_step)
+    interaction = np.zeros((gaps.size, gaps.size))
+    tangent = interaction
+    orders = raise_orders(least_orders(gaps, model), least)
+    start = no_solution(map_gaps(gaps), np.empty(0, dtype=np.int64), model.device)
+    now = forces_at(gaps, prescribed, orders, start, system)
+    fields, tangents, size = 1, 0, initial_size()
+    event = STEP_LIMIT if np.isfinite(now.solution.pressure) else NO_FIELD
+    accepted, is_long = True, False
+    last = now.solution
+    while event == STEP_LIMIT:
+        if accepted:
+            note_force(trajectory, now.slope)
+            if is_long or fields % 2 == 0:
+                comparison = compared(comparison, gaps, law.longest_step)
             if comparison.matches == COMPARISONS:
                 event = REJOINED
                 break
-        keeps = keeps_tangent(state.size)
-        if not keeps:
+            tangent, _ = edge_tangent(now.solution, now.drift, model.rules)
             tangents += 1
-            values, matrix = linearise(now, rows, equal_speeds, system)
-        state, lengths = bounded(state, law.longest_step)
-        model = QuadraticModel(values, matrix, step_limits(solution.nodes.table, lengths.reach))
-        step = kinetic_step(model, now, equal_speeds, law.force_error)
-        if keeps and turns_back(step, state.step, lengths.reach):
-            state = turned(state)
-            continue
-        close_overlaps(step, solution.opening, model.limit, law.overlap_limit)
-        if not keeps and np.abs(step).max() <= law.field_error:
-            step, tried = step_off_saddle(
-                step, model, state.gaps, prescribed, orders, equal_speeds, system
-            )
-            fields += tried
-        length = np.abs(step).max()
-        if not length < np.inf:
-            event = NO_FIELD
+        if fields >= most_fields:
             break
-        state = moved(state, step, now, lengths, model.limit, rows, rules)
-        trajectory = extended(trajectory, state.gaps)
-        event = event_after(state.gaps, length, law)
-        if event != STEP_LIMIT:
-            break
-    if event == VANISHED:
-        add_interaction(rows.values, state.step, interaction)
+        step, tried = next_step(
+            gaps, prescribed, orders, now, tangent, size, equal_speeds, system
+        )
+        fields += tried
+        is_long = step.flow.points.shape[0] > 0
+        event = event_after(step, law)
+        if event == STEP_LIMIT:
+            orders = raise_orders(least_orders(step.gaps, model), orders)
+            there = forces_at(step.gaps, prescribed, orders, last, system)
+            fields += 1
+            accepted, size = judged(step, now, there, size, law)
+            if np.isfinite(there.solution.pressure):
+                last = there.solution
+            elif not is_long:
+                event = NO_FIELD
+            if accepted:
+                now = there
+        if event != NO_FIELD and (accepted or event != STEP_LIMIT):
+            trajectory = followed(trajectory, step)
+            take(step, interaction)
+            gaps = step.gaps
     points = trajectory.points[: trajectory.length]
     forces = trajectory.forces[: trajectory.length - 1]
     return Descent(
-        state.gaps, event, orders, fields, tangents, points, forces, comparison.has_left,
-        interaction,
-    )  # fmt: skip
+        gaps, event, orders, fields, tangents, points, forces, comparison.has_left, interaction
+    )
 
 
 @compiled
@@ -188,64 +191,78 @@ def least_orders(gaps: Array, model: FieldModel) -> Integers:
 
 
 @compiled
-def backed_up(
-    state: State, share: float, trajectory: Trajectory, rows: ForceRows, interaction: Array
-) -> tuple[State, Trajectory]:
-    """Take the last step back to a ``share`` of it, and correct the record of the descent."""
-    step = share * state.step
-    state = taken_back(state, share)
-    trajectory = without_last(trajectory)
-    if share > 0:
-        add_interaction(rows.values, step, interaction)
-        trajectory = extended(trajectory, state.gaps)
-    return state, trajectory
+def next_step(
+    gaps: Array, prescribed: float, orders: Integers, now: Forces, tangent: Array, size: StepSize,
+    equal_speeds: bool, system: FlowProblem,
+) -> tuple[Step, int]:  # fmt: skip
+    """Choose the next step from solved edges; also returns the number of fields that took.
 
-
-@compiled
-def event_after(gaps: Array, length: float, law: EdgeLaw) -> int:
-    """Detect an event after a step of this length; STEP_LIMIT if there is none."""
-    if shortest_length(gaps) < law.smallest:
-        return VANISHED
-    return AT_REST if length < law.rest_step else STEP_LIMIT
-
-
-@compiled
-def linearise(
-    now: Forces, rows: ForceRows, equal_speeds: bool, system: FlowProblem
-) -> tuple[Array, Array]:
-    """Linearise the forces about the present edges: values and matrix of the quadratic model."""
-    of, opening, drift, derivatives = now.solution, now.solution.opening, now.drift, rows.values
-    tangent, _ = edge_tangent(of, drift, system.model.rules)
-    edges = tangent.shape[0]
-    for e in range(edges):
-        for f in range(edges):
-            derivatives[e, f] = opening[e] * tangent[e, f]
-        derivatives[e, e] += opening[e] * drift[e] * (1 - 2 * (e % 2))
-    rows.known[:] = 1
-    if equal_speeds:
-        values, matrix = symmetrise(of, tangent, system.law.overlap_limit)
-    else:
-        positive = np.maximum(opening, 0.0)
-        values, matrix = np.linalg.eigh(hessian(positive, now.residual, drift, tangent))
-    return values, matrix
-
-
-@compiled
-def kinetic_step(model: QuadraticModel, now: Forces, equal_speeds: bool, faint: float) -> Array:
-    """Choose the step of all edges, by linear kinetics or with equal speeds.
-
-    By linear kinetics edges move in proportion to their excess energy release rates. With equal
-    speeds, for comparison, edges out of equilibrium run, all at the same speed (their limit, twice
-    as long for one that runs alone), and edges near equilibrium follow them by Newton's step.
+    It is a long one where the edges run in the model, and a short one otherwise, and where surfaces
+    would overlap.
     """
-    if equal_speeds:
-        return bound_constrained_step(model.matrix, model.values, -now.residual, model.limit)
-    return flow_step(model.values, model.matrix, -now.slope, model.limit, faint)
+    law, panels = system.law, system.model.panels
+    opening, table = now.solution.opening, now.solution.nodes.table
+    none = np.empty((0, 0))
+    if size.reach >= LEAST_REACH:
+        limit = step_limits(table, size.reach * law.longest_step)
+        model = model_about(gaps, now, tangent, panels)
+        flow = flow_through(gaps, opening, model, limit, equal_speeds, law, panels)
+        length = np.abs(flow.motion).max()
+        if length > RUNNING_LENGTH * law.longest_step:
+            end = flow.points[-1].copy().reshape(gaps.shape)
+            return Step(end, flow.motion, length, flow, none), 0
+    limit = step_limits(table, size.share * law.longest_step)
+    motion, curvature, tried = short_step(
+        gaps, prescribed, orders, now, tangent, limit, equal_speeds, system
+    )
+    length = np.abs(motion).max()
+    return Step(move_edges(gaps, motion), motion, length, no_flow(), curvature), tried
 
 
 @compiled
-def close_overlaps(step: Array, opening: Array, limit: Array, overlapping: float) -> None:
-    """Let contact grow as far as it may at edges beside which surfaces would overlap."""
-    for e in range(step.shape[0]):
-        if opening[e] < -overlapping:
-            step[e] = limit[e]
+def judged(
+    step: Step, before: Forces, after: Forces, size: StepSize, law: EdgeLaw
+) -> tuple[bool, StepSize]:
+    """Judge a step by the field at its end: whether it is accepted, and the next step size."""
+    solved = np.isfinite(after.solution.pressure)
+    if step.flow.points.shape[0] > 0:
+        error = np.inf
+        if solved:
+            error = model_error(
+                step.flow.opening, after.solution.opening, after.residual, law.critical
+            )
+        return error <= 1, after_long_step(size, step.length / law.longest_step, error)
+    rises = solved and energy_rises(before.slope, after.slope, step.motion)
+    return solved and (not rises or may_raise(size)), after_short_step(size, not rises)
+
+
+@compiled
+def event_after(step: Step, law: EdgeLaw) -> int:
+    """Detect an event after a step; STEP_LIMIT if there is none."""
+    if not step.length < np.inf:
+        return NO_FIELD
+    if shortest_length(step.gaps) < law.smallest:
+        return VANISHED
+    return AT_REST if step.length < law.rest_step else STEP_LIMIT
+
+
+@compiled
+def followed(trajectory: Trajectory, step: Step) -> Trajectory:
+    """Add the points of a step to a trajectory."""
+    points, forces = step.flow.points, step.flow.forces
+    for i in range(points.shape[0]):
+        if i > 0:
+            trajectory.forces[trajectory.length - 1] = forces[i]
+        trajectory = extended(trajectory, points[i])
+    if points.shape[0] == 0:
+        trajectory = extended(trajectory, step.gaps.ravel())
+    return trajectory
+
+
+@compiled
+def take(step: Step, interaction: Array) -> None:
+    """Add to ``interaction`` what the edges took from each other in a step."""
+    if step.flow.points.shape[0] > 0:
+        interaction += step.flow.interaction
+    else:
+        add_forces(step.curvature, step.motion, interaction)

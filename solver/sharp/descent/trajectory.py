@@ -13,7 +13,6 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.tolerances import (
-    LONGEST_STRIDE_ALONE,
     ON_TRAJECTORY,
     SEGMENT_MARGIN,
     SEGMENT_SHARE,
@@ -63,7 +62,7 @@ def begun(gaps: Array) -> Trajectory:
 
 
 @compiled
-def extended(trajectory: Trajectory, gaps: Array) -> Trajectory:
+def extended(trajectory: Trajectory, edges: Array) -> Trajectory:
     """Add a point to a trajectory."""
     points, forces, length = trajectory.points, trajectory.forces, trajectory.length
     if length == points.shape[0]:
@@ -73,7 +72,7 @@ def extended(trajectory: Trajectory, gaps: Array) -> Trajectory:
         more = np.zeros(2 * length)
         more[:length] = forces
         forces = more
-    points[length] = gaps.ravel()
+    points[length] = edges
     return Trajectory(points, forces, length + 1)
 
 
@@ -84,12 +83,6 @@ def note_force(trajectory: Trajectory, slope: Array) -> None:
     for e in range(slope.shape[0]):
         square += slope[e] * slope[e]
     trajectory.forces[trajectory.length - 1] = np.sqrt(square)
-
-
-@compiled
-def without_last(trajectory: Trajectory) -> Trajectory:
-    """Drop the last point of a trajectory."""
-    return Trajectory(trajectory.points, trajectory.forces, trajectory.length - 1)
 
 
 @compiled
@@ -107,7 +100,7 @@ def compared(comparison: Comparison, gaps: Array, longest: float) -> Comparison:
 @compiled
 def distance_to(trajectory: Array, at: Array, longest: float) -> float:
     """Measure the largest distance of an edge from a trajectory, at its nearest; inf if far."""
-    longest_segment = SEGMENT_MARGIN * LONGEST_STRIDE_ALONE * longest
+    longest_segment = SEGMENT_MARGIN * longest
     least = np.inf
     for i in range(trajectory.shape[0] - 1):
         along = 0.0

@@ -29,6 +29,9 @@ _NODES = ((1e-5, 8), (1e-7, 10), (2e-9, 12), (0.0, 14))
 _TILT_NODES = 12
 _PIECES_BY_SLOPE = 4.0
 
+# Nodes of the opening of a half-plane crack on a finest panel: 7e-6 of the shortest wave's.
+_HALF_PLANE_NODES = 8
+
 
 class Panels(NamedTuple):
     """Panels of a source, for the compiled code; p nodes a panel.
@@ -45,6 +48,8 @@ class Panels(NamedTuple):
         Chebyshev coefficients of S and S' on each finest panel.
     tilt : array, shape (finest, 12)
         Those of h'.
+    half_plane : array, shape (2, finest, 8)
+        Those of the opening C of a half-plane crack that begins at θ, and of one that ends there.
     weights : array, shape (2, 2·finest, p)
         ω for S and for S', of every panel of every level, the finest level first.
     level_start : int array
@@ -60,6 +65,7 @@ class Panels(NamedTuple):
     stress: Array
     slope: Array
     tilt: Array
+    half_plane: Array
     weights: Array
     level_start: NDArray[np.int64]
     end_x: Array
@@ -105,6 +111,8 @@ class StressSource:
         slope = _on_panels(1j * m * m * h, x, count)
         y, v = legendre.leggauss(_TILT_NODES)
         tilt = _on_panels(1j * m * h, y, count) @ _to_chebyshev(y)
+        t, _ = legendre.leggauss(_HALF_PLANE_NODES)
+        half_plane = [a @ _to_chebyshev(t) for a in _half_plane_openings(m * h, t, count)]
 
         to_chebyshev = _to_chebyshev(x)
         self.steepest = float(np.abs(profile.slopes(8 * top)).max())
@@ -134,6 +142,7 @@ class StressSource:
             stress=np.ascontiguousarray(stress @ to_chebyshev),
             slope=np.ascontiguousarray(slope @ to_chebyshev),
             tilt=np.ascontiguousarray(tilt),
+            half_plane=np.stack(half_plane),
             weights=np.ascontiguousarray(np.concatenate(levels, axis=1)),
             level_start=np.cumsum([0, *sizes[:-1]]),
             end_x=(t + 1) / 2,
@@ -172,6 +181,20 @@ def _on_panels(a: NDArray[np.complex128], x: Array, count: int) -> Array:
         shifted[:size] = (a * np.exp(1j * m * (np.pi / count) * (node + 1)))[:size]
         out[:, i] = np.fft.irfft(shifted, count) * count
     return out
+
+
+def _half_plane_openings(
+    stress: NDArray[np.complex128], x: Array, count: int
+) -> list[Array]:
+    """Evaluate the opening C of a half-plane crack that begins, and that ends, at panel nodes.
+
+    A stress S on its faces opens the edge of a crack by C = -(2/π) ∫ S(ρ)/sqrt(ρ) dρ, ρ the
+    distance from the edge: -2/sqrt(π m) times the wave m, an eighth of it later (Tada, Paris and
+    Irwin, The Stress Analysis of Cracks Handbook, 3.6).
+    """
+    m = np.arange(stress.size)
+    scaled = -2 / np.sqrt(np.pi) * stress / np.sqrt(np.maximum(m, 1))
+    return [_on_panels(scaled * np.exp(side * 0.25j * np.pi), x, count) for side in (1, -1)]
 
 
 def _lagrange(nodes: Array, x: Array) -> Array:
@@ -244,6 +267,24 @@ def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
     tilt = _clenshaw(c, x)
     measure = np.sqrt(1 + tilt * tilt)
     return measure, tilt / measure * total * 2 / panels.width
+
+
+@compiled
+def half_plane_opening(theta: float, side: int, panels: Panels) -> tuple[float, float]:
+    """Evaluate C and dC/dθ of a half-plane crack that begins (side 0) or ends (1) at θ."""
+    place = theta / panels.width
+    k = int(np.floor(place))
+    x = 2 * (place - k) - 1
+    c = panels.half_plane[side, k & (panels.finest - 1)]
+    # d/dx of Σ c_j T_j = Σ j c_j U_{j-1}
+    total, rate = c[0], 0.0
+    t_prev, t, u_prev, u = 1.0, x, 0.0, 1.0
+    for j in range(1, c.shape[0]):
+        total += c[j] * t
+        rate += j * c[j] * u
+        t, t_prev = 2 * x * t - t_prev, t
+        u, u_prev = 2 * x * u - u_prev, u
+    return total, rate * 2 / panels.width
 
 
 @compiled

@@ -1,0 +1,178 @@
+"""Model of the edge openings about solved edges, compiled: half-plane cracks that interact.
+
+Over a shortest wave the opening C of an edge changes by the roughness under it, which is that of
+a half-plane crack and known beforehand (``full_contact_stress.half_plane_opening``). The rest, the
+finite length of the gap and the motion of the other edges, changes slowly. With n the outward
+motion of the contact,
+
+    dC_e = dR_e + own_e dn_e + Σ_{f≠e} coupling_ef C_f dn_f,
+
+R the opening of the half-plane crack, and ``coupling`` symmetric: both follow from the tangent.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.descent.edge_forces import Forces
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening
+from adhesis.solver.sharp.gap.full_contact_stress import Panels, half_plane_opening
+
+
+class EdgeModel(NamedTuple):
+    """Openings about solved edges.
+
+    Attributes
+    ----------
+    own : array, shape (2L,)
+        ∂C_e/∂n_e, less that of a half-plane crack.
+    coupling : array, shape (2L, 2L)
+        ∂C_e/∂n_f over C_f; zero on the diagonal.
+    """
+
+    own: Array
+    coupling: Array
+
+
+class ModelState(NamedTuple):
+    """Edges on their way through the model, changed in place; arrays have shape (2L,).
+
+    Attributes
+    ----------
+    theta, motion : array
+        Position in θ, and outward motion of the contact so far.
+    opening, rate : array
+        C, and ∂C_e/∂n_e.
+    half_plane : array
+        R.
+    critical, critical_rate : array
+        C_c, and its derivative by n.
+    """
+
+    theta: Array
+    motion: Array
+    opening: Array
+    rate: Array
+    half_plane: Array
+    critical: Array
+    critical_rate: Array
+
+
+@compiled
+def model_about(gaps: Array, now: Forces, tangent: Array, panels: Panels) -> EdgeModel:
+    """Make the model about solved edges from ``tangent`` = ∂(C_e - C_c)/∂n_f.
+
+    Of ``tangent[e, f]`` over C_f and its transpose, which are equal, that with the larger opening
+    is taken.
+    """
+    opening, drift = now.solution.opening, now.drift
+    edges = opening.shape[0]
+    own = np.empty(edges)
+    coupling = np.zeros((edges, edges))
+    for e in range(edges):
+        outwards = 1 - 2 * (e % 2)
+        _, slope = half_plane_opening(gaps[e // 2, e % 2], e % 2, panels)
+        own[e] = tangent[e, e] + outwards * (drift[e] - slope)
+        for f in range(e):
+            if abs(opening[f]) > abs(opening[e]):
+                value = tangent[e, f] / opening[f]
+            else:
+                value = tangent[f, e] / opening[e]
+            coupling[e, f] = value
+            coupling[f, e] = value
+    return EdgeModel(own, coupling)
+
+
+@compiled
+def initial_state(gaps: Array, opening: Array) -> ModelState:
+    """Put the edges where the model is made; rates are not known yet."""
+    edges = opening.shape[0]
+    return ModelState(
+        gaps.ravel().copy(), np.zeros(edges), opening.copy(), np.empty(edges), np.empty(edges),
+        np.empty(edges), np.empty(edges),
+    )  # fmt: skip
+
+
+@compiled
+def evaluate(state: ModelState, model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
+    """Evaluate R, C_c and the rates at the present edges."""
+    theta, rate, half_plane = state.theta, state.rate, state.half_plane
+    critical, critical_rate, own = state.critical, state.critical_rate, model.own
+    for e in range(theta.shape[0]):
+        outwards = 1 - 2 * (e % 2)
+        half_plane[e], slope = half_plane_opening(theta[e], e % 2, panels)
+        rate[e] = own[e] + outwards * slope
+        critical[e], drift = critical_opening(theta[e], law, panels)
+        critical_rate[e] = outwards * drift
+
+
+@compiled
+def advance(
+    state: ModelState, step: Array, model: EdgeModel, law: EdgeLaw, panels: Panels
+) -> None:
+    """Move the edges outwards by ``step``, and their openings with them."""
+    theta, motion, opening, half_plane = state.theta, state.motion, state.opening, state.half_plane
+    own, coupling = model.own, model.coupling
+    edges = step.shape[0]
+    by_motion = np.empty(edges)
+    for f in range(edges):
+        by_motion[f] = opening[f] * step[f]
+    for e in range(edges):
+        total = own[e] * step[e] - half_plane[e]
+        for f in range(edges):
+            total += coupling[e, f] * by_motion[f]
+        opening[e] += total
+        motion[e] += step[e]
+        theta[e] += (1 - 2 * (e % 2)) * step[e]
+    evaluate(state, model, law, panels)
+    for e in range(edges):
+        opening[e] += half_plane[e]
+
+
+@compiled
+def model_forces(state: ModelState) -> Array:
+    """Evaluate the forces C_c² - C |C|."""
+    opening, critical = state.opening, state.critical
+    force = np.empty(opening.shape[0])
+    for e in range(force.shape[0]):
+        force[e] = critical[e] * critical[e] - opening[e] * abs(opening[e])
+    return force
+
+
+@compiled
+def model_hessian(state: ModelState, model: EdgeModel) -> Array:
+    """Build H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others."""
+    opening, coupling = np.maximum(state.opening, 0.0), model.coupling
+    edges = opening.shape[0]
+    matrix = np.empty((edges, edges))
+    for e in range(edges):
+        twice = 2 * opening[e]
+        for f in range(edges):
+            matrix[e, f] = twice * opening[f] * coupling[e, f]
+        own = abs(state.opening[e]) * state.rate[e]
+        matrix[e, e] = 2 * (own - state.critical[e] * state.critical_rate[e])
+    return matrix
+
+
+@compiled
+def model_tangent(
+    state: ModelState, model: EdgeModel, least: float
+) -> tuple[Array, Array, Array]:
+    """Scale ∂(C_e - C_c)/∂n_f to a symmetric matrix: scale factors, matrix, and C - C_c.
+
+    Openings below ``least`` are scaled as if they were that.
+    """
+    opening, coupling = state.opening, model.coupling
+    edges = opening.shape[0]
+    scale = np.sqrt(np.maximum(opening, least))
+    matrix = np.empty((edges, edges))
+    for e in range(edges):
+        for f in range(edges):
+            mean = opening[f] * scale[e] / scale[f] + opening[e] * scale[f] / scale[e]
+            matrix[e, f] = 0.5 * coupling[e, f] * mean
+        matrix[e, e] = state.rate[e] - state.critical_rate[e]
+    return scale, matrix, opening - state.critical
