@@ -169,6 +169,8 @@ MODEL_ERROR = 0.005
 """C_c, or C if that is more. Error of an opening of the model that is allowed."""
 MODEL_SHARE = 0.1
 """Of the distance of an opening from its critical value: the error that is allowed in addition."""
+MODEL_STEP = 2.0
+"""Longest steps (0.1 λ_min) of one step through the model."""
 MODEL_STEPS = 200
 """Steps through the model in one step of a descent."""
 RUNNING_ENDS = 0.1
@@ -177,8 +179,8 @@ RUNNING_LENGTH = 0.5
 """Longest steps; edges that move further in the model run."""
 TIME_TRIES = 20
 """Times Δτ that are tried for one step in the model."""
-TIME_REDUCTION = 0.25
-"""By which Δτ falls at most from one try to the next."""
+RATE_GROWTH = 4.0
+"""By which 1/Δτ grows at most from one try to the next."""
 ENERGY_ROUNDING = 1e-3
 """Of the work done either way; a smaller rise of the energy is rounding."""
 LEAST_STEP_SHARE = 0.02

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_sums
 from adhesis.solver.sharp.descent.edge_forces import Forces
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, half_plane_opening
@@ -88,33 +88,37 @@ def model_about(gaps: Array, now: Forces, tangent: Array, panels: Panels) -> Edg
 
 
 @compiled
-def initial_state(gaps: Array, opening: Array) -> ModelState:
-    """Put the edges where the model is made; rates are not known yet."""
+def initial_state(
+    gaps: Array, opening: Array, model: EdgeModel, law: EdgeLaw, panels: Panels
+) -> ModelState:
+    """Put the edges where the model is made."""
     edges = opening.shape[0]
-    return ModelState(
-        gaps.ravel().copy(), np.zeros(edges), opening.copy(), np.empty(edges), np.empty(edges),
+    state = ModelState(
+        gaps.ravel().copy(), np.zeros(edges), np.zeros(edges), np.empty(edges), np.empty(edges),
         np.empty(edges), np.empty(edges),
     )  # fmt: skip
+    evaluate(state, model, law, panels)
+    state.opening[:] = opening
+    return state
 
 
 @compiled
 def evaluate(state: ModelState, model: EdgeModel, law: EdgeLaw, panels: Panels) -> None:
-    """Evaluate R, C_c and the rates at the present edges."""
-    theta, rate, half_plane = state.theta, state.rate, state.half_plane
+    """Evaluate R, C_c and the rates at the present edges, and add R to the openings."""
+    theta, rate, half_plane, opening = state.theta, state.rate, state.half_plane, state.opening
     critical, critical_rate, own = state.critical, state.critical_rate, model.own
     for e in range(theta.shape[0]):
         outwards = 1 - 2 * (e % 2)
         half_plane[e], slope = half_plane_opening(theta[e], e % 2, panels)
+        opening[e] += half_plane[e]
         rate[e] = own[e] + outwards * slope
         critical[e], drift = critical_opening(theta[e], law, panels)
         critical_rate[e] = outwards * drift
 
 
-@compiled
-def advance(
-    state: ModelState, step: Array, model: EdgeModel, law: EdgeLaw, panels: Panels
-) -> None:
-    """Move the edges outwards by ``step``, and their openings with them."""
+@compiled_sums
+def advance(state: ModelState, step: Array, model: EdgeModel) -> None:
+    """Move the edges outwards by ``step``; :func:`evaluate` is to follow."""
     theta, motion, opening, half_plane = state.theta, state.motion, state.opening, state.half_plane
     own, coupling = model.own, model.coupling
     edges = step.shape[0]
@@ -128,34 +132,30 @@ def advance(
         opening[e] += total
         motion[e] += step[e]
         theta[e] += (1 - 2 * (e % 2)) * step[e]
-    evaluate(state, model, law, panels)
-    for e in range(edges):
-        opening[e] += half_plane[e]
 
 
 @compiled
-def model_forces(state: ModelState) -> Array:
-    """Evaluate the forces C_c² - C |C|."""
+def model_forces(state: ModelState, force: Array) -> float:
+    """Evaluate the forces C_c² - C |C| into ``force``; returns their norm."""
     opening, critical = state.opening, state.critical
-    force = np.empty(opening.shape[0])
+    square = 0.0
     for e in range(force.shape[0]):
         force[e] = critical[e] * critical[e] - opening[e] * abs(opening[e])
-    return force
+        square += force[e] * force[e]
+    return float(np.sqrt(square))
 
 
 @compiled
-def model_hessian(state: ModelState, model: EdgeModel) -> Array:
+def model_hessian(state: ModelState, model: EdgeModel, matrix: Array) -> None:
     """Build H_ef = ∂(C_e |C_e| - C_c²)/∂n_f, symmetric: closing edges act on no others."""
-    opening, coupling = np.maximum(state.opening, 0.0), model.coupling
+    opening, rate, coupling = state.opening, state.rate, model.coupling
+    critical, critical_rate = state.critical, state.critical_rate
     edges = opening.shape[0]
-    matrix = np.empty((edges, edges))
     for e in range(edges):
-        twice = 2 * opening[e]
+        twice = 2 * max(opening[e], 0.0)
         for f in range(edges):
-            matrix[e, f] = twice * opening[f] * coupling[e, f]
-        own = abs(state.opening[e]) * state.rate[e]
-        matrix[e, e] = 2 * (own - state.critical[e] * state.critical_rate[e])
-    return matrix
+            matrix[e, f] = twice * max(opening[f], 0.0) * coupling[e, f]
+        matrix[e, e] = 2 * (abs(opening[e]) * rate[e] - critical[e] * critical_rate[e])
 
 
 @compiled

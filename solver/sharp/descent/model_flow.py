@@ -29,9 +29,10 @@ from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.field.cholesky import factor_rows, padded, solve_column
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
+    MODEL_STEP,
     MODEL_STEPS,
+    RATE_GROWTH,
     RUNNING_ENDS,
-    TIME_REDUCTION,
     TIME_TRIES,
 )
 
@@ -72,68 +73,86 @@ def flow_through(
     gaps: Array, opening: Array, model: EdgeModel, limit: Array, equal_speeds: bool,
     law: EdgeLaw, panels: Panels,
 ) -> ModelFlow:  # fmt: skip
-    """Follow the flow until an edge is at its limit, all are nearly at rest, or one closes."""
-    state = initial_state(gaps, opening)
-    evaluate(state, model, law, panels)
+    """Follow the flow until an edge is at its limit, or all are nearly at rest."""
+    state = initial_state(gaps, opening, model, law, panels)
     edges = opening.shape[0]
-    points, forces = np.empty((MODEL_STEPS, edges)), np.empty(MODEL_STEPS)
-    interaction = np.zeros((edges, edges))
+    points, norms = np.empty((MODEL_STEPS, edges)), np.empty(MODEL_STEPS)
+    interaction, matrix = np.zeros((edges, edges)), np.empty((edges, edges))
+    force, step = np.empty(edges), np.empty(edges)
+    factor = np.empty((edges, padded(edges)))
+    longest = MODEL_STEP * law.longest_step
     count = 0
     while count < MODEL_STEPS:
-        force, matrix = model_forces(state), model_hessian(state, model)
+        norms[count] = model_forces(state, force)
+        model_hessian(state, model, matrix)
         if equal_speeds:
-            step = step_with_equal_speeds(state, model, law)
+            size = step_with_equal_speeds(state, model, longest, law.overlap_limit, step)
         else:
-            step = implicit_step(matrix, force, law.longest_step)
-        if not np.abs(step).max() > RUNNING_ENDS * law.longest_step:
+            size = implicit_step(matrix, force, longest, factor, step)
+        if not size > RUNNING_ENDS * law.longest_step:
             break
         share = share_within(state.motion, step, limit)
-        step *= share
+        if share < 1:
+            step *= share
         add_forces(matrix, step, interaction)
-        advance(state, step, model, law, panels)
-        forces[count] = np.sqrt(force @ force)
+        advance(state, step, model)
+        evaluate(state, model, law, panels)
         points[count] = state.theta
         count += 1
         if share < 1:
             break
-    return ModelFlow(state.motion, state.opening, points[:count], forces[:count], interaction)
+    return ModelFlow(state.motion, state.opening, points[:count], norms[:count], interaction)
 
 
 @compiled
-def implicit_step(matrix: Array, force: Array, longest: float) -> Array:
-    """Take a linearly implicit Euler step of the flow, no edge moving further than ``longest``.
+def implicit_step(
+    matrix: Array, force: Array, longest: float, factor: Array, step: Array
+) -> float:
+    """Take a linearly implicit Euler step of the flow; returns the largest motion.
 
-    The time Δτ is that in which the largest force alone would move its edge so far, or less: where
-    1/Δτ + H is not positive definite the step would not be downhill.
+    No edge moves further than ``longest``. The time Δτ is that in which the largest force alone
+    would move its edge so far, or less: where 1/Δτ + H is not positive definite the step would not
+    be downhill. ``factor`` and ``step`` are changed in place.
     """
     edges = force.shape[0]
-    time = longest / np.abs(force).max()
-    factor = np.empty((edges, padded(edges)))
-    step = np.zeros(edges)
+    rate = largest(force) / longest
+    size = 0.0
     for _ in range(TIME_TRIES):
         for e in range(edges):
             for f in range(e + 1):
                 factor[e, f] = matrix[e, f]
-            factor[e, e] += 1 / time
+            factor[e, e] += rate
         if not factor_rows(factor, 0.0):
-            time *= TIME_REDUCTION
+            rate *= RATE_GROWTH
             continue
         step[:] = force
         solve_column(factor, step)
-        size = np.abs(step).max()
+        size = largest(step)
         if size <= longest:
             break
         step *= longest / size
-        time *= max(TIME_REDUCTION, 0.9 * longest / size)
-    return step
+        rate *= min(RATE_GROWTH, 1.1 * size / longest)
+        size = longest
+    return size
 
 
 @compiled
-def step_with_equal_speeds(state: ModelState, model: EdgeModel, law: EdgeLaw) -> Array:
-    """Take a step with equal speeds, at most a longest step."""
-    scale, matrix, residual = model_tangent(state, model, law.overlap_limit)
-    limit = np.full(scale.shape[0], law.longest_step)
-    return bound_constrained_step(matrix, scale, -residual, limit)
+def largest(values: Array) -> float:
+    """Find the largest of the absolute values."""
+    size = 0.0
+    for e in range(values.shape[0]):
+        size = max(size, abs(values[e]))
+    return size
+
+
+@compiled
+def step_with_equal_speeds(
+    state: ModelState, model: EdgeModel, longest: float, least_opening: float, step: Array
+) -> float:
+    """Take a step with equal speeds, in place, at most ``longest``; returns the largest motion."""
+    scale, matrix, residual = model_tangent(state, model, least_opening)
+    step[:] = bound_constrained_step(matrix, scale, -residual, np.full(step.shape[0], longest))
+    return largest(step)
 
 
 @compiled

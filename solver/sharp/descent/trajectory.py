@@ -13,6 +13,7 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.tolerances import (
+    MODEL_STEP,
     ON_TRAJECTORY,
     SEGMENT_MARGIN,
     SEGMENT_SHARE,
@@ -100,7 +101,7 @@ def compared(comparison: Comparison, gaps: Array, longest: float) -> Comparison:
 @compiled
 def distance_to(trajectory: Array, at: Array, longest: float) -> float:
     """Measure the largest distance of an edge from a trajectory, at its nearest; inf if far."""
-    longest_segment = SEGMENT_MARGIN * longest
+    longest_segment = SEGMENT_MARGIN * MODEL_STEP * longest
     least = np.inf
     for i in range(trajectory.shape[0] - 1):
         along = 0.0
