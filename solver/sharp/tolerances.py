@@ -166,7 +166,11 @@ REACH_SAFETY = 0.8
 """Of the reach at which the error would be what is allowed: that of a tangent grows as its
 square."""
 MODEL_ERROR = 0.005
-"""C_c, or C if that is more. Error of an opening of the model that is allowed."""
+"""C_c on a flat piece. Error of an opening of the model that is allowed."""
+PASSING_ERROR = 5e-4
+"""C_c on a flat piece. The same where the forces grow again on the way behind: at a saddle."""
+FORCES_GROW = 2.0
+"""Times; forces that grow by as much grow again."""
 MODEL_SHARE = 0.1
 """Of the distance of an opening from its critical value: the error that is allowed in addition."""
 MODEL_STEP = 2.0

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_triangular
 from scipy.optimize import brentq, lsq_linear
 
-from adhesis import HalfSpace, Problem, single_wave
+from adhesis import HalfSpace, Problem, self_affine_profile, single_wave
 from adhesis.solver.sharp.descent.bound_constrained_step import bound_constrained_step
-from adhesis.solver.sharp.descent.edge_forces import FlowProblem
-from adhesis.solver.sharp.descent.flow_state import (
-    LongStep,
-    State,
-    accepted,
-    accepted_share,
-    taken_back,
+from adhesis.solver.sharp.descent.edge_forces import (
+    FlowProblem,
+    Forces,
+    energy_rises,
+    forces_at,
+)
+from adhesis.solver.sharp.descent.edge_model import (
+    EdgeModel,
+    advance,
+    evaluate,
+    initial_state,
+    model_about,
+    model_forces,
+    model_hessian,
 )
 from adhesis.solver.sharp.descent.gradient_flow import (
     AT_REST,
@@ -27,31 +37,33 @@ from adhesis.solver.sharp.descent.gradient_flow import (
     descend,
 )
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step
+from adhesis.solver.sharp.descent.model_flow import ModelFlow, flow_through, implicit_step
 from adhesis.solver.sharp.descent.saddle import softest_step
 from adhesis.solver.sharp.descent.step_size import (
     StepSize,
-    after_turn,
-    keeps_tangent,
-    next_lengths,
-    turns_back,
+    after_long_step,
+    after_short_step,
+    initial_size,
+    may_raise,
+    model_error,
 )
 from adhesis.solver.sharp.descent.trajectory import Comparison, compared, distance_to
+from adhesis.solver.sharp.equilibrium.griffith import edge_tangent
+from adhesis.solver.sharp.field.cholesky import padded
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
+from adhesis.solver.sharp.field.solution import no_solution
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.quadrature import choose_orders
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.tolerances import (
     COMPARISONS,
     LEAST_STEP_SHARE,
-    LONGEST_STRIDE,
-    LONGEST_STRIDE_ALONE,
-    REUSES,
-    REUSES_ALONE,
-    TURNS,
-    TURNS_FACTOR,
-    UNCHECKED_ALONE,
+    LONGEST_REACH,
+    MODEL_STEP,
+    REACH_GROWTH,
 )
 
 SOLID = HalfSpace(1e6, 0.5)
-NO_LONG_STEP = LongStep(np.empty(0, dtype=np.int64), np.empty(0))
 
 
 # ------------------------------------------------------------------ steps
@@ -118,94 +130,231 @@ def test_a_saddle_is_left_along_the_softest_mode_within_every_limit():
     np.testing.assert_allclose(np.abs(step / np.linalg.norm(step)), np.abs(vectors[:, 0]))
 
 
+# ------------------------------------------------------------------ model of the openings
+
+
+class Solved(NamedTuple):
+    """Edges with their field, and the model about them."""
+
+    gaps: np.ndarray
+    separation: float
+    system: FlowProblem
+    forces: Forces
+    model: EdgeModel
+
+    def openings(self, motion: np.ndarray) -> np.ndarray:
+        """Openings of the field after outward motions."""
+        gaps = self.gaps + (motion * np.tile([1.0, -1.0], len(self.gaps))).reshape(-1, 2)
+        return solved(self.system, gaps, self.separation).solution.opening
+
+    def model_openings(self, motion: np.ndarray, steps: int = 400) -> np.ndarray:
+        """Openings of the model after outward motions in many equal steps."""
+        law, panels = self.system.law, self.system.model.panels
+        state = initial_state(self.gaps, self.forces.solution.opening, self.model, law, panels)
+        for _ in range(steps):
+            advance(state, motion / steps, self.model)
+            evaluate(state, self.model, law, panels)
+        np.testing.assert_allclose(state.motion, motion)
+        return state.opening
+
+
+def solved(system: FlowProblem, gaps: np.ndarray, separation: float) -> Forces:
+    orders = choose_orders(map_gaps(gaps), system.model.digits, system.model.rules.counts)
+    none = np.empty(0, dtype=np.int64)
+    before = no_solution(map_gaps(gaps), none, system.model.device)
+    return forces_at(gaps, separation, orders, before, system)
+
+
+@pytest.fixture(scope="module")
+def rough() -> Solved:
+    """Five gaps of a rough profile, one of them narrow, with waves much shorter than the gaps."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=60, seed=1, h_rms=1e-6)
+    method = SharpMethod(Problem(profile, SOLID, 0.02), accuracy=1e-6)
+    system = FlowProblem(method.edges.law, method.edges.model, NO_EXTERIOR)
+    gaps = np.array([[0.3, 0.8], [0.9, 2.0], [2.2, 3.1], [3.3, 4.1], [4.3, 6.4]])
+    separation = 0.5 * profile.h_max * profile.q0
+    forces = solved(system, gaps, separation)
+    tangent, _ = edge_tangent(forces.solution, forces.drift, system.model.rules)
+    model = model_about(gaps, forces, tangent, system.model.panels)
+    return Solved(gaps, separation, system, forces, model)
+
+
+def test_edges_open_as_half_plane_cracks_that_interact(rough):
+    """Error of the model: second order in the motions, and small over a whole shortest wave."""
+    wave = 2 * np.pi / 240
+    motion = wave * np.array([1.0, 0.1, -0.4, 0.3, 0.0, 1.0, -0.7, 0.2, 0.5, -1.0])
+    before = rough.forces.solution.opening
+    lengths = np.array([0.1, 0.2, 0.4, 1.0])
+    errors, changes = [], []
+    for length in lengths:
+        exact = rough.openings(length * motion)
+        errors.append(np.abs(exact - rough.model_openings(length * motion)).max())
+        changes.append(np.abs(exact - before).max())
+    orders = np.diff(np.log(errors)) / np.diff(np.log(lengths))
+    assert np.all(orders[:2] > 1.8)
+    assert errors[-1] < 0.02 * changes[-1]
+
+
+def test_the_model_is_that_of_the_tangent_about_its_edges(rough):
+    """Its Hessian is the derivative of its forces, and of those of the field."""
+    law, panels = rough.system.law, rough.system.model.panels
+    opening = rough.forces.solution.opening
+    state = initial_state(rough.gaps, opening, rough.model, law, panels)
+    edges = opening.size
+    matrix, force = np.empty((edges, edges)), np.empty(edges)
+    model_hessian(state, rough.model, matrix)
+    model_forces(state, force)
+    np.testing.assert_allclose(force, -rough.forces.slope, rtol=1e-12)
+    np.testing.assert_allclose(matrix, matrix.T)
+    tangent, _ = edge_tangent(rough.forces.solution, rough.forces.drift, rough.system.model.rules)
+    # C² - C_c² from C - C_c: 2 C dC - 2 C_c dC_c
+    by_tangent = 2 * opening[:, None] * tangent
+    drift = rough.forces.drift * np.tile([1, -1], len(rough.gaps))
+    by_tangent[np.diag_indices(edges)] += 2 * rough.forces.residual * drift
+    is_open = opening > 0  # edges beside an overlap act on no others
+    assert 4 <= is_open.sum() < edges
+    among = np.ix_(is_open, is_open)
+    largest = np.abs(by_tangent).max()
+    np.testing.assert_allclose(matrix[among], by_tangent[among], atol=1e-6 * largest)
+
+
+# ------------------------------------------------------------------ flow through the model
+
+
+def exact_flow_through(rough: Solved, limit: np.ndarray) -> np.ndarray:
+    """Motions when the first edge is at its limit, from ``scipy.integrate.solve_ivp``."""
+    law, panels, model = rough.system.law, rough.system.model.panels, rough.model
+    opening = rough.forces.solution.opening
+    edges = opening.size
+
+    def rates(_: float, y: np.ndarray) -> np.ndarray:
+        gaps = rough.gaps + (y[:edges] * np.tile([1.0, -1.0], edges // 2)).reshape(-1, 2)
+        state = initial_state(gaps, y[edges:], model, law, panels)
+        speed = state.critical**2 - y[edges:] * np.abs(y[edges:])
+        return np.concatenate([speed, state.rate * speed + model.coupling @ (y[edges:] * speed)])
+
+    def at_limit(_: float, y: np.ndarray) -> float:
+        return float((np.abs(y[:edges]) / limit).max() - 1)
+
+    at_limit.terminal = True  # type: ignore[attr-defined]
+    start = np.concatenate([np.zeros(edges), opening])
+    speed = np.abs(rough.forces.slope).max()
+    way = solve_ivp(
+        rates, (0.0, 1e3 * limit.max() / speed), start, "LSODA", events=at_limit,
+        rtol=1e-8, atol=1e-10,
+    )  # fmt: skip
+    assert way.status == 1  # an edge came to its limit
+    return np.asarray(way.y[:edges, -1])
+
+
+def test_steps_through_the_model_converge_to_its_flow(rough):
+    """Linearly implicit Euler steps: the error falls in proportion to their length."""
+    wave = 2 * np.pi / 240
+    limit = np.full(10, wave)
+    exact = exact_flow_through(rough, limit)
+    opening, law = rough.forces.solution.opening, rough.system.law
+    panels = rough.system.model.panels
+    errors = []
+    for share in (1.0, 0.5, 0.25):
+        finer = law._replace(longest_step=share * law.longest_step)
+        flow = flow_through(rough.gaps, opening, rough.model, limit, False, finer, panels)
+        ways = np.abs(np.diff(np.vstack([rough.gaps.ravel(), flow.points]), axis=0))
+        assert ways.max() <= MODEL_STEP * finer.longest_step * (1 + 1e-9)
+        assert np.abs(flow.motion).max() == pytest.approx(wave)
+        errors.append(np.abs(flow.motion - exact).max() / wave)
+    assert errors[0] < 0.1
+    assert errors[2] < 0.4 * errors[0]
+    # what the edges took from each other is the change of their forces
+    end = rough.openings(flow.motion)
+    taken = flow.interaction.sum(axis=1)
+    assert np.abs(taken).max() < 10 * np.abs(end**2 - opening**2).max()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_implicit_step_is_downhill_and_within_its_length(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 7))
+    root = rng.normal(size=(count, count))
+    matrix = root + root.T + np.diag(10.0 ** rng.uniform(0, 1.5, count))  # stiff, some unstable
+    force, step = rng.normal(size=count), np.empty(count)
+    factor = np.empty((count, padded(count)))
+    size = implicit_step(matrix, force, 0.01, factor, step)
+    assert size == pytest.approx(np.abs(step).max())
+    assert 0 < size <= 0.01 * (1 + 1e-12)
+    assert force @ step > 0
+    definite = root @ root.T + np.eye(count)
+    implicit_step(definite, force, 1e9, factor, step)  # no limit in reach: Newton's step
+    np.testing.assert_allclose(step, np.linalg.solve(definite, force), rtol=1e-6)
+
+
 # ------------------------------------------------------------------ judgement of a step
 
 
-def state_of(slope, step, *, share=1.0) -> State:
-    start = np.array([[1.0, 2.0]])
-    step = np.array(step)
-    gaps = start + (step * [1.0, -1.0]).reshape(1, 2)
-    return State(
-        gaps, start, step, np.array(slope), NO_LONG_STEP, StepSize(share, 2.0, 1, 1, 0)
-    )
-
-
 JUDGED = {
-    "falls": ([-1.0, 0.0], [-0.5, 0.0], [0.1, 0.0], 1.0, 1.0),
-    "rises": ([-1.0, 0.0], [1.5, 0.0], [0.1, 0.0], 1.0, 0.0),
-    "one edge rises, the other falls more": ([-1.0, -1.0], [1.5, -1.0], [0.1, 0.1], 1.0, 1.0),
-    "rises by rounding": ([-1.0, 1.0], [-1.0, 1.0 + 1e-6], [0.1, 0.1], 1.0, 1.0),
-    "rises by more": ([-1.0, 1.0], [-1.0, 1.0 + 1e-2], [0.1, 0.1], 1.0, 0.0),
-    "rises, but steps are the shortest": ([-1.0, 0.0], [1.5, 0.0], [0.1, 0.0], 0.01, 1.0),
-    "stands": ([-1.0, 1.0], [1.5, 1.0], [0.0, 0.0], 1.0, 1.0),
+    "falls": ([-1.0, 0.0], [-0.5, 0.0], [0.1, 0.0], False),
+    "rises": ([-1.0, 0.0], [1.5, 0.0], [0.1, 0.0], True),
+    "one edge rises, the other falls more": ([-1.0, -1.0], [1.5, -1.0], [0.1, 0.1], False),
+    "rises by rounding": ([-1.0, 1.0], [-1.0, 1.0 + 1e-6], [0.1, 0.1], False),
+    "rises by more": ([-1.0, 1.0], [-1.0, 1.0 + 1e-2], [0.1, 0.1], True),
+    "stands": ([-1.0, 1.0], [1.5, 1.0], [0.0, 0.0], False),
 }
 
 
 @pytest.mark.parametrize("case", JUDGED)
-def test_a_step_that_raises_the_energy_is_rejected(case):
-    before, after, step, share, wanted = JUDGED[case]
-    assert accepted_share(state_of(before, step, share=share), np.array(after), 1.0) == wanted
+def test_the_energy_of_a_step_rises_where_the_work_of_its_forces_says_so(case):
+    before, after, step, rises = JUDGED[case]
+    assert energy_rises(np.array(before), np.array(after), np.array(step)) == rises
 
 
-def test_a_rejected_step_is_halved_and_a_cut_one_ends_at_the_minimum():
-    state = state_of([-1.0, 0.0], [0.1, 0.0])
-    rejected = taken_back(state, accepted_share(state, np.array([1.5, 0.0]), 1.0))
-    assert np.array_equal(rejected.gaps, state.start)
-    assert (rejected.size.share, rejected.size.running) == (0.5, 0)
-    cut = taken_back(state, accepted_share(state, np.array([1.5, 0.0]), 0.25))
-    np.testing.assert_allclose(cut.gaps, [[1.025, 2.0]])
-    assert (cut.size.share, cut.size.stride, cut.size.running) == (1.0, 0.0, 0)
-    assert not cut.step.any()
-    assert not rejected.step.any()
-    kept = accepted(rejected._replace(step=np.array([0.05, 0.0])), np.array([-0.5, 0.0]))
-    assert kept.size.share == 1.0  # doubled once the energy has fallen
-    assert accepted(rejected, np.array([-0.5, 0.0])).size.share == 0.5  # not where edges stood
+def test_openings_may_be_wrong_by_more_far_from_balance_and_by_less_at_a_saddle():
+    field, model = np.array([1.0, 2.0]), np.array([1.004, 2.0])
+    nothing = np.zeros((2, 2))
+
+    def error(unbalance: list[float], forces: list[float]) -> float:
+        count = len(unbalance)
+        lengths = np.arange(1.0, 1 + count) / count
+        residuals = np.transpose([unbalance, np.ones(count)])
+        flow = ModelFlow(
+            model - field, model, residuals, lengths, residuals, np.array(forces), nothing
+        )
+        return float(model_error(flow, field, 1.0))
+
+    assert 0.5 < error([0.0], [1.0]) < 1
+    assert error([1.0], [1.0]) < 0.1
+    assert error([0.0, 1.0], [1.0, 0.9]) < 0.5  # the error was a quarter on the way
+    passed = error([0.5, 0.0, 0.5, 0.5], [1.0, 0.5, 0.01, 0.5])
+    rested = error([0.5, 0.2, 0.01, 0.0], [1.0, 0.5, 0.2, 0.01])
+    assert passed > 1 > rested
+    same = ModelFlow(field, field, nothing, np.ones(1), np.zeros((1, 2)), np.ones(1), nothing)
+    assert model_error(same, field, 1.0) == 0
 
 
 # ------------------------------------------------------------------ step size
 
 
-def test_steps_grow_while_edges_run_and_no_further():
-    for running, unchecked, longest in (
-        (1, UNCHECKED_ALONE, LONGEST_STRIDE_ALONE),
-        (3, 1.0, LONGEST_STRIDE),
-    ):
-        size = StepSize(1.0, 0.0, running, 0, 0)
-        reached = []
-        for _ in range(5):
-            size, lengths = next_lengths(size, 0.1)
-            assert lengths.unchecked == pytest.approx(0.1 * unchecked)
-            reached.append(lengths.reach)
-        assert np.all(np.diff(reached) >= 0)
-        assert reached[0] == pytest.approx(0.1 * unchecked)
-        assert reached[-1] == pytest.approx(0.1 * longest)
-    standing, lengths = next_lengths(StepSize(1.0, 4.0, 0, 0, 0), 0.1)
-    assert lengths.reach == pytest.approx(0.1)
-    assert next_lengths(StepSize(0.5, 0.0, 0, 0, 0), 0.1)[1].reach == pytest.approx(0.05)
-    assert not keeps_tangent(standing)
+def test_short_steps_halve_when_the_energy_rises_and_double_when_it_falls():
+    size = initial_size()
+    for _ in range(20):
+        size = after_short_step(size, False)
+    assert may_raise(size)
+    assert size.share < LEAST_STEP_SHARE
+    again = after_short_step(size, True)
+    assert again.share == 2 * size.share
+    for _ in range(20):
+        again = after_short_step(again, True)
+    assert again.share == 1
+    assert not may_raise(again)
 
 
-@pytest.mark.parametrize(("running", "steps"), [(1, REUSES_ALONE), (2, REUSES)])
-def test_a_tangent_serves_so_many_further_steps(running, steps):
-    size = StepSize(1.0, 0.0, running, 0, 0)
-    served = 0
-    while keeps_tangent(size):
-        size, _ = next_lengths(size, 0.1)
-        served += 1
-    assert served == steps
-    assert next_lengths(size, 0.1)[0].reuses == 0
-
-
-def test_an_edge_that_turns_to_and_fro_takes_shorter_steps():
-    size = StepSize(1.0, 0.0, 1, 0, 0)
-    for turn in range(1, TURNS + 100):
-        size = after_turn(size)._replace(running=1)
-        factor = max(TURNS_FACTOR ** max(turn - TURNS, 0), LEAST_STEP_SHARE)
-        assert next_lengths(size, 0.1)[1].longest == pytest.approx(0.1 * factor)
-    assert after_turn(StepSize(1.0, 0.0, 2, 0, 0)).turns == 0  # several edges may turn
-    last = np.array([0.1, -0.1])
-    assert turns_back(np.array([-0.1, -0.1]), last, 0.2)
-    assert not turns_back(np.array([-0.01, -0.1]), last, 0.2)  # a short way back
+def test_the_reach_of_long_steps_follows_the_root_of_their_error():
+    size = StepSize(1.0, 10.0)
+    rejected = after_long_step(size, 10.0, 4.0)
+    assert 0.3 * 10 < rejected.reach < 0.5 * 10  # at half of it the error is what is allowed
+    assert after_long_step(size, 10.0, np.inf).reach < 1e-3 * 10
+    assert after_long_step(size, 10.0, 0.0).reach == REACH_GROWTH * 10
+    assert after_long_step(size, 90.0, 0.0).reach == LONGEST_REACH
+    assert after_long_step(size, 1.0, 1e-4).reach == 10  # edges came to rest: no reason to shorten
+    assert after_short_step(StepSize(1.0, 1.0), True).reach > 1  # long steps are tried again
 
 
 # ------------------------------------------------------------------ trajectories
@@ -278,9 +427,7 @@ def test_a_descent_ends_at_its_limit_of_fields_and_where_there_is_no_field(wave)
 
 def test_a_descent_that_comes_back_to_another_trajectory_has_rejoined_it(wave):
     first = run(wave, NARROW, 0.5)
-    second = run(
-        wave, NARROW, 0.5, track=first.trajectory, has_left=True, equal_speeds=True
-    )
+    second = run(wave, NARROW, 0.5, track=first.trajectory, has_left=True, equal_speeds=True)
     assert second.event == REJOINED
     assert second.fields < first.fields
     never_away = run(wave, NARROW, 0.5, track=first.trajectory, equal_speeds=True)

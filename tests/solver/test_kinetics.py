@@ -175,9 +175,7 @@ def test_a_race_is_flagged_with_what_is_at_stake():
     [(0.5, 3, 20, 0.03, 11), (0.8, 2, 16, 0.01, 25)],
     ids=["a patch goes or stays", "contact is lost or stays on a crest"],
 )
-def test_a_jump_whose_end_the_length_of_the_steps_decides_is_flagged(
-    hurst, n0, ratio, gamma, seed
-):
+def test_a_jump_whose_end_the_length_of_the_steps_decides_is_flagged(hurst, n0, ratio, gamma, seed):
     """Equal speeds end where the long steps do; short ones pass a saddle on its other side."""
     profile = self_affine_profile(hurst, period=1e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6)
 
@@ -224,7 +222,7 @@ def test_a_descent_is_repeated_from_not_far_before_the_saddle(ran, begin):
     check = RaceCheck(SimpleNamespace(wave=1.0, critical=1.0))
     gaps, beyond = check.beyond_saddle(np.zeros((3, 2)), None, track)
     assert np.array_equal(gaps, way[begin].reshape(-1, 2))
-    assert beyond.short_fields == (6 - begin) * SHORT_WAY / SHORTENED_STEPS
+    assert beyond.short_fields == (6 - begin) * SHORT_WAY
 
 
 def test_steps_are_short_for_the_fields_that_a_track_asks_for(monkeypatch):

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from adhesis import Problem, self_affine_profile, single_wave
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.field.dense_solver import GapField, solve, solve_again
-from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
-from adhesis.solver.sharp.field.force_along_step import force_derivatives
 from adhesis.solver.sharp.field.opening_series import fine_opening, sum_modes, work_of_gaps
 from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
 from adhesis.solver.sharp.gap.chebyshev_moments import gap_moments
 from adhesis.solver.sharp.gap.conformal_map import map_gaps, theta_at
-from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource, half_plane_opening
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 from tests.support.scenes import HALF_SPACE
@@ -282,14 +281,26 @@ def test_gaps_that_stay_may_be_taken_over_from_another_field(source, separation)
     assert np.abs(again.opening / before.opening - 1).min() > 1e-9  # all feel it
 
 
-def test_forces_on_single_edges_are_rows_of_the_tangent(source, separation):
-    model = FieldModel(FIXED_SEPARATION, 25.0, GAUSS_RULES, source.panels)
-    orders = choose_orders(map_gaps(GAPS), model.digits, GAUSS_RULES.counts)
-    of = solve(GAPS, separation, orders, 2, model, NO_EXTERIOR)
-    tangent = derivatives(of, GAUSS_RULES)[0] * of.opening[:, None] * np.tile([1, -1], 5)
-    rows, known = np.full((10, 10), np.nan), np.zeros(10, dtype=np.int64)
-    known[4] = 1
-    force_derivatives(of, np.array([1, 4, 6]), GAUSS_RULES, rows, known)
-    np.testing.assert_array_equal(np.flatnonzero(known), [1, 4, 6])
-    np.testing.assert_allclose(rows[[1, 6]], tangent[[1, 6]], atol=1e-9 * np.abs(tangent).max())
-    assert np.isnan(rows[4]).all()  # was known
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_half_plane_crack_opens_by_the_integral_of_the_stress_on_its_faces(side):
+    """C = -(2/π) ∫ S(ρ)/sqrt(ρ) dρ by quadrature, ρ the distance from the edge into the gap."""
+    source = StressSource(self_affine_profile(0.8, period=1.0, n0=2, ratio=3, seed=1, h_rms=1e-4))
+    waves = np.fft.rfft(source.sample(np.arange(64) * 2 * np.pi / 64)[:, 0]) / 32
+
+    def integral(m: int, part: str, of) -> float:
+        near, _ = quad(lambda x: of(m * x), 0, 1, weight="alg", wvar=(-0.5, 0))
+        far, _ = quad(lambda x: x**-0.5, 1, np.inf, weight=part, wvar=m)
+        return near + far
+
+    into_gap = 1 - 2 * side
+    for theta in (0.37, 2.9):
+        total = 0.0
+        for m in range(2, 7):
+            wave = waves[m] * np.exp(1j * m * theta)
+            total += wave.real * integral(m, "cos", np.cos)
+            total -= into_gap * wave.imag * integral(m, "sin", np.sin)
+        value, slope = half_plane_opening(theta, side, source.panels)
+        assert value == pytest.approx(-2 / np.pi * total, rel=1e-5)
+        step = 1e-5
+        ends = [half_plane_opening(theta + d, side, source.panels)[0] for d in (-step, step)]
+        assert slope == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-5)

@@ -67,7 +67,7 @@ def model_about(gaps: Array, now: Forces, tangent: Array, panels: Panels) -> Edg
     """Make the model about solved edges from ``tangent`` = ∂(C_e - C_c)/∂n_f.
 
     Of ``tangent[e, f]`` over C_f and its transpose, which are equal, that with the larger opening
-    is taken.
+    is taken. The edges outside a window have none, and do not interact.
     """
     opening, drift = now.solution.opening, now.drift
     edges = opening.shape[0]
@@ -78,9 +78,10 @@ def model_about(gaps: Array, now: Forces, tangent: Array, panels: Panels) -> Edg
         _, slope = half_plane_opening(gaps[e // 2, e % 2], e % 2, panels)
         own[e] = tangent[e, e] + outwards * (drift[e] - slope)
         for f in range(e):
+            value = 0.0
             if abs(opening[f]) > abs(opening[e]):
                 value = tangent[e, f] / opening[f]
-            else:
+            elif opening[e] != 0:
                 value = tangent[f, e] / opening[e]
             coupling[e, f] = value
             coupling[f, e] = value
@@ -159,9 +160,7 @@ def model_hessian(state: ModelState, model: EdgeModel, matrix: Array) -> None:
 
 
 @compiled
-def model_tangent(
-    state: ModelState, model: EdgeModel, least: float
-) -> tuple[Array, Array, Array]:
+def model_tangent(state: ModelState, model: EdgeModel, least: float) -> tuple[Array, Array, Array]:
     """Scale ∂(C_e - C_c)/∂n_f to a symmetric matrix: scale factors, matrix, and C - C_c.
 
     Openings below ``least`` are scaled as if they were that.

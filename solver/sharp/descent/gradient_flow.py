@@ -156,9 +156,7 @@ def descend(
             tangents += 1
         if fields >= most_fields:
             break
-        step, tried = next_step(
-            gaps, prescribed, orders, now, tangent, size, equal_speeds, system
-        )
+        step, tried = next_step(gaps, prescribed, orders, now, tangent, size, equal_speeds, system)
         fields += tried
         is_long = step.flow.points.shape[0] > 0
         event = event_after(step, law)
@@ -225,12 +223,11 @@ def judged(
 ) -> tuple[bool, StepSize]:
     """Judge a step by the field at its end: whether it is accepted, and the next step size."""
     solved = np.isfinite(after.solution.pressure)
-    if step.flow.points.shape[0] > 0:
+    flow = step.flow
+    if flow.points.shape[0] > 0:
         error = np.inf
         if solved:
-            error = model_error(
-                step.flow.opening, after.solution.opening, after.residual, law.critical
-            )
+            error = model_error(flow, after.solution.opening, law.critical)
         return error <= 1, after_long_step(size, step.length / law.longest_step, error)
     rises = solved and energy_rises(before.slope, after.slope, step.motion)
     return solved and (not rises or may_raise(size)), after_short_step(size, not rises)

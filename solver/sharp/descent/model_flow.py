@@ -48,6 +48,10 @@ class ModelFlow(NamedTuple):
         C of the model at the end.
     points : array, shape (n, 2L)
         Edges after each step.
+    lengths : array, shape (n,)
+        Largest motion up to each step.
+    residuals : array, shape (n, 2L)
+        C - C_c of the model after each step.
     forces : array, shape (n,)
         Norm of dU/dn before each step.
     interaction : array, shape (2L, 2L)
@@ -57,6 +61,8 @@ class ModelFlow(NamedTuple):
     motion: Array
     opening: Array
     points: Array
+    lengths: Array
+    residuals: Array
     forces: Array
     interaction: Array
 
@@ -64,8 +70,8 @@ class ModelFlow(NamedTuple):
 @compiled
 def no_flow() -> ModelFlow:
     """Make a flow without points."""
-    none = np.empty((0, 0))
-    return ModelFlow(np.empty(0), np.empty(0), none, np.empty(0), none)
+    none, nothing = np.empty((0, 0)), np.empty(0)
+    return ModelFlow(nothing, nothing, none, nothing, none, nothing, none)
 
 
 @compiled
@@ -76,12 +82,13 @@ def flow_through(
     """Follow the flow until an edge is at its limit, or all are nearly at rest."""
     state = initial_state(gaps, opening, model, law, panels)
     edges = opening.shape[0]
-    points, norms = np.empty((MODEL_STEPS, edges)), np.empty(MODEL_STEPS)
+    points, residuals = np.empty((MODEL_STEPS, edges)), np.empty((MODEL_STEPS, edges))
+    norms, lengths = np.empty(MODEL_STEPS), np.empty(MODEL_STEPS)
     interaction, matrix = np.zeros((edges, edges)), np.empty((edges, edges))
     force, step = np.empty(edges), np.empty(edges)
     factor = np.empty((edges, padded(edges)))
     longest = MODEL_STEP * law.longest_step
-    count = 0
+    count, length = 0, 0.0
     while count < MODEL_STEPS:
         norms[count] = model_forces(state, force)
         model_hessian(state, model, matrix)
@@ -98,16 +105,20 @@ def flow_through(
         advance(state, step, model)
         evaluate(state, model, law, panels)
         points[count] = state.theta
+        residuals[count] = state.opening - state.critical
+        length = max(length, largest(state.motion))
+        lengths[count] = length
         count += 1
         if share < 1:
             break
-    return ModelFlow(state.motion, state.opening, points[:count], norms[:count], interaction)
+    return ModelFlow(
+        state.motion, state.opening, points[:count], lengths[:count], residuals[:count],
+        norms[:count], interaction,
+    )  # fmt: skip
 
 
 @compiled
-def implicit_step(
-    matrix: Array, force: Array, longest: float, factor: Array, step: Array
-) -> float:
+def implicit_step(matrix: Array, force: Array, longest: float, factor: Array, step: Array) -> float:
     """Take a linearly implicit Euler step of the flow; returns the largest motion.
 
     No edge moves further than ``longest``. The time Δτ is that in which the largest force alone

@@ -15,12 +15,15 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.descent.model_flow import ModelFlow
 from adhesis.solver.sharp.tolerances import (
     FIRST_REACH,
+    FORCES_GROW,
     LEAST_STEP_SHARE,
     LONGEST_REACH,
     MODEL_ERROR,
     MODEL_SHARE,
+    PASSING_ERROR,
     REACH_GROWTH,
     REACH_SAFETY,
     RECOVERY,
@@ -56,17 +59,25 @@ def after_short_step(size: StepSize, lowered: bool) -> StepSize:
 
 
 @compiled
-def model_error(model: Array, field: Array, residual: Array, critical: float) -> float:
+def model_error(flow: ModelFlow, field: Array, critical: float) -> float:
     """Measure by how much the openings of the model are wrong, in units of what is allowed.
 
-    ``residual`` are those of the field less the critical ones: far from balance more is allowed.
+    ``field`` are the openings of the field at the end. On the way the errors are taken to grow as
+    the square of its length. More is allowed far from balance, and less where the forces grow again
+    behind a point: next to a saddle little decides to which side edges run on.
     """
-    worst = 0.0
-    for e in range(field.shape[0]):
-        error = field[e] - model[e]
-        unbalance = max(abs(residual[e]) - abs(error), 0.0)
-        allowed = MODEL_ERROR * max(critical, abs(field[e])) + MODEL_SHARE * unbalance
-        worst = max(worst, abs(error) / allowed)
+    lengths, residuals, forces = flow.lengths, flow.residuals, flow.forces
+    last = lengths.shape[0] - 1
+    worst = later = 0.0
+    for i in range(last, -1, -1):
+        share = lengths[i] / lengths[last]
+        passes = i < last and later > FORCES_GROW * forces[i + 1]
+        balanced = (PASSING_ERROR if passes else MODEL_ERROR) * critical
+        for e in range(field.shape[0]):
+            error = share * share * abs(field[e] - flow.opening[e])
+            unbalance = max(abs(residuals[i, e]) - error, 0.0)
+            worst = max(worst, error / (balanced + MODEL_SHARE * unbalance))
+        later = max(later, forces[i])
     return worst
 
 

@@ -183,9 +183,7 @@ def _on_panels(a: NDArray[np.complex128], x: Array, count: int) -> Array:
     return out
 
 
-def _half_plane_openings(
-    stress: NDArray[np.complex128], x: Array, count: int
-) -> list[Array]:
+def _half_plane_openings(stress: NDArray[np.complex128], x: Array, count: int) -> list[Array]:
     """Evaluate the opening C of a half-plane crack that begins, and that ends, at panel nodes.
 
     A stress S on its faces opens the edge of a crack by C = -(2/π) ∫ S(ρ)/sqrt(ρ) dρ, ρ the
