@@ -130,7 +130,8 @@ MOST_NUCLEATIONS = 10_000
 RAN = 0.05
 """λ_min. An edge that moved further than this in a descent has run."""
 SADDLE_PASSED = 8.0
-"""Forces so many times larger before and after a point have passed a saddle there."""
+"""Forces so many times larger before a point have come near a saddle or minimum there, and if they
+are as large after it have passed a saddle."""
 SADDLE_REACH = 2.0
 """λ_min. Edges that run further until forces have grown so much passed the saddle at a seventh of
 this or more, 0.3 λ_min; trajectories of short and long steps were 0.1 λ_min apart, and where they
@@ -167,10 +168,9 @@ REACH_SAFETY = 0.8
 square."""
 MODEL_ERROR = 0.005
 """C_c on a flat piece. Error of an opening of the model that is allowed."""
-PASSING_ERROR = 5e-4
-"""C_c on a flat piece. The same where the forces grow again on the way behind: at a saddle."""
-FORCES_GROW = 2.0
-"""Times; forces that grow by as much grow again."""
+NEAR_BALANCE = 0.05
+"""C_c² on a flat piece. Where forces have fallen below this the model does not lead on: a minimum
+may be shallower than its error."""
 MODEL_SHARE = 0.1
 """Of the distance of an opening from its critical value: the error that is allowed in addition."""
 MODEL_STEP = 2.0

@@ -81,6 +81,15 @@ def forces_at(
 
 
 @compiled
+def norm(force: Array) -> float:
+    """Compute the Euclidean norm."""
+    square = 0.0
+    for e in range(force.shape[0]):
+        square += force[e] * force[e]
+    return float(np.sqrt(square))
+
+
+@compiled
 def energy_rises(before: Array, after: Array, step: Array) -> bool:
     """Whether the energy rises over a step, by more than rounding of the work done either way.
 

@@ -136,14 +136,11 @@ def advance(state: ModelState, step: Array, model: EdgeModel) -> None:
 
 
 @compiled
-def model_forces(state: ModelState, force: Array) -> float:
-    """Evaluate the forces C_c² - C |C| into ``force``; returns their norm."""
+def model_forces(state: ModelState, force: Array) -> None:
+    """Evaluate the forces C_c² - C |C| into ``force``."""
     opening, critical = state.opening, state.critical
-    square = 0.0
     for e in range(force.shape[0]):
         force[e] = critical[e] * critical[e] - opening[e] * abs(opening[e])
-        square += force[e] * force[e]
-    return float(np.sqrt(square))
 
 
 @compiled

@@ -19,9 +19,16 @@ from adhesis.solver.sharp.descent.edge_forces import (
     Forces,
     energy_rises,
     forces_at,
+    norm,
 )
 from adhesis.solver.sharp.descent.edge_model import model_about
-from adhesis.solver.sharp.descent.model_flow import ModelFlow, add_forces, flow_through, no_flow
+from adhesis.solver.sharp.descent.model_flow import (
+    ModelFlow,
+    add_forces,
+    flow_through,
+    near_balance,
+    no_flow,
+)
 from adhesis.solver.sharp.descent.short_step import short_step
 from adhesis.solver.sharp.descent.step_size import (
     StepSize,
@@ -37,7 +44,6 @@ from adhesis.solver.sharp.descent.trajectory import (
     begun,
     compared,
     extended,
-    note_force,
 )
 from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
@@ -142,11 +148,13 @@ def descend(
     now = forces_at(gaps, prescribed, orders, start, system)
     fields, tangents, size = 1, 0, initial_size()
     event = STEP_LIMIT if np.isfinite(now.solution.pressure) else NO_FIELD
-    accepted, is_long = True, False
+    accepted, is_long, strongest = True, False, 0.0
     last = now.solution
     while event == STEP_LIMIT:
         if accepted:
-            note_force(trajectory, now.slope)
+            force = norm(now.slope)
+            strongest = max(strongest, force)
+            trajectory.forces[trajectory.length - 1] = force
             if is_long or fields % 2 == 0:
                 comparison = compared(comparison, gaps, law.longest_step)
             if comparison.matches == COMPARISONS:
@@ -156,7 +164,9 @@ def descend(
             tangents += 1
         if fields >= most_fields:
             break
-        step, tried = next_step(gaps, prescribed, orders, now, tangent, size, equal_speeds, system)
+        step, tried = next_step(
+            gaps, prescribed, orders, now, tangent, size, strongest, equal_speeds, system
+        )
         fields += tried
         is_long = step.flow.points.shape[0] > 0
         event = event_after(step, law)
@@ -191,20 +201,20 @@ def least_orders(gaps: Array, model: FieldModel) -> Integers:
 @compiled
 def next_step(
     gaps: Array, prescribed: float, orders: Integers, now: Forces, tangent: Array, size: StepSize,
-    equal_speeds: bool, system: FlowProblem,
+    strongest: float, equal_speeds: bool, system: FlowProblem,
 ) -> tuple[Step, int]:  # fmt: skip
     """Choose the next step from solved edges; also returns the number of fields that took.
 
-    It is a long one where the edges run in the model, and a short one otherwise, and where surfaces
-    would overlap.
+    It is a long one where the edges run in the model, and a short one otherwise, and where forces
+    that were as large as ``strongest`` are nearly balanced.
     """
     law, panels = system.law, system.model.panels
     opening, table = now.solution.opening, now.solution.nodes.table
     none = np.empty((0, 0))
-    if size.reach >= LEAST_REACH:
+    if size.reach >= LEAST_REACH and not near_balance(norm(now.slope), strongest, law):
         limit = step_limits(table, size.reach * law.longest_step)
         model = model_about(gaps, now, tangent, panels)
-        flow = flow_through(gaps, opening, model, limit, equal_speeds, law, panels)
+        flow = flow_through(gaps, opening, model, limit, equal_speeds, strongest, law, panels)
         length = np.abs(flow.motion).max()
         if length > RUNNING_LENGTH * law.longest_step:
             end = flow.points[-1].copy().reshape(gaps.shape)

@@ -15,6 +15,7 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.bound_constrained_step import bound_constrained_step
+from adhesis.solver.sharp.descent.edge_forces import norm
 from adhesis.solver.sharp.descent.edge_model import (
     EdgeModel,
     ModelState,
@@ -31,8 +32,10 @@ from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
     MODEL_STEP,
     MODEL_STEPS,
+    NEAR_BALANCE,
     RATE_GROWTH,
     RUNNING_ENDS,
+    SADDLE_PASSED,
     TIME_TRIES,
 )
 
@@ -77,9 +80,12 @@ def no_flow() -> ModelFlow:
 @compiled
 def flow_through(
     gaps: Array, opening: Array, model: EdgeModel, limit: Array, equal_speeds: bool,
-    law: EdgeLaw, panels: Panels,
+    strongest: float, law: EdgeLaw, panels: Panels,
 ) -> ModelFlow:  # fmt: skip
-    """Follow the flow until an edge is at its limit, or all are nearly at rest."""
+    """Follow the flow until an edge is at its limit, or near balance.
+
+    ``strongest`` is the largest norm of the forces on the way so far.
+    """
     state = initial_state(gaps, opening, model, law, panels)
     edges = opening.shape[0]
     points, residuals = np.empty((MODEL_STEPS, edges)), np.empty((MODEL_STEPS, edges))
@@ -90,7 +96,11 @@ def flow_through(
     longest = MODEL_STEP * law.longest_step
     count, length = 0, 0.0
     while count < MODEL_STEPS:
-        norms[count] = model_forces(state, force)
+        model_forces(state, force)
+        norms[count] = norm(force)
+        strongest = max(strongest, norms[count])
+        if near_balance(norms[count], strongest, law):
+            break
         model_hessian(state, model, matrix)
         if equal_speeds:
             size = step_with_equal_speeds(state, model, longest, law.overlap_limit, step)
@@ -115,6 +125,13 @@ def flow_through(
         state.motion, state.opening, points[:count], lengths[:count], residuals[:count],
         norms[:count], interaction,
     )  # fmt: skip
+
+
+@compiled
+def near_balance(force: float, strongest: float, law: EdgeLaw) -> bool:
+    """Whether forces that were as large as ``strongest`` have come near a minimum or saddle."""
+    small = NEAR_BALANCE * law.critical * law.critical
+    return force < small and SADDLE_PASSED * force < strongest
 
 
 @compiled

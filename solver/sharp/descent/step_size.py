@@ -18,12 +18,10 @@ from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.model_flow import ModelFlow
 from adhesis.solver.sharp.tolerances import (
     FIRST_REACH,
-    FORCES_GROW,
     LEAST_STEP_SHARE,
     LONGEST_REACH,
     MODEL_ERROR,
     MODEL_SHARE,
-    PASSING_ERROR,
     REACH_GROWTH,
     REACH_SAFETY,
     RECOVERY,
@@ -63,21 +61,17 @@ def model_error(flow: ModelFlow, field: Array, critical: float) -> float:
     """Measure by how much the openings of the model are wrong, in units of what is allowed.
 
     ``field`` are the openings of the field at the end. On the way the errors are taken to grow as
-    the square of its length. More is allowed far from balance, and less where the forces grow again
-    behind a point: next to a saddle little decides to which side edges run on.
+    the square of its length, and far from balance more is allowed.
     """
-    lengths, residuals, forces = flow.lengths, flow.residuals, flow.forces
+    lengths, residuals = flow.lengths, flow.residuals
     last = lengths.shape[0] - 1
-    worst = later = 0.0
-    for i in range(last, -1, -1):
+    worst = 0.0
+    for i in range(last + 1):
         share = lengths[i] / lengths[last]
-        passes = i < last and later > FORCES_GROW * forces[i + 1]
-        balanced = (PASSING_ERROR if passes else MODEL_ERROR) * critical
         for e in range(field.shape[0]):
             error = share * share * abs(field[e] - flow.opening[e])
             unbalance = max(abs(residuals[i, e]) - error, 0.0)
-            worst = max(worst, error / (balanced + MODEL_SHARE * unbalance))
-        later = max(later, forces[i])
+            worst = max(worst, error / (MODEL_ERROR * critical + MODEL_SHARE * unbalance))
     return worst
 
 

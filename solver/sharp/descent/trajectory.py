@@ -78,15 +78,6 @@ def extended(trajectory: Trajectory, edges: Array) -> Trajectory:
 
 
 @compiled
-def note_force(trajectory: Trajectory, slope: Array) -> None:
-    """Note the norm of dU/dn at the last point of a trajectory."""
-    square = 0.0
-    for e in range(slope.shape[0]):
-        square += slope[e] * slope[e]
-    trajectory.forces[trajectory.length - 1] = np.sqrt(square)
-
-
-@compiled
 def compared(comparison: Comparison, gaps: Array, longest: float) -> Comparison:
     """Compare these gaps with the other trajectory; ``longest`` is the longest step."""
     if comparison.trajectory.shape[0] == 0:
