@@ -177,7 +177,7 @@ MODEL_STEP = 2.0
 """Longest steps (0.1 λ_min) of one step through the model."""
 MODEL_STEPS = 200
 """Steps through the model in one step of a descent."""
-RUNNING_ENDS = 0.1
+RUNNING_ENDS = 0.01
 """Longest steps; a shorter one ends the flow through the model."""
 RUNNING_LENGTH = 0.5
 """Longest steps; edges that move further in the model run."""

@@ -11,6 +11,7 @@ from adhesis.solver.sharp.descent.edge_forces import FlowProblem, Forces
 from adhesis.solver.sharp.descent.linear_kinetics import flow_step, hessian
 from adhesis.solver.sharp.descent.saddle import QuadraticModel, step_off_saddle
 from adhesis.solver.sharp.equilibrium.griffith import symmetrise
+from adhesis.solver.sharp.field.cholesky import cholesky, solve_column
 from adhesis.solver.sharp.gap.quadrature import Integers
 
 
@@ -31,6 +32,10 @@ def short_step(
         values, matrix = symmetrise(now.solution, tangent, law.overlap_limit)
         step = bound_constrained_step(matrix, values, -now.residual, limit)
     else:
+        step, is_within = newton_within(curvature, -now.slope, limit)
+        if is_within:
+            close_overlaps(step, opening, limit, law.overlap_limit)
+            return step, curvature, 0
         values, matrix = np.linalg.eigh(curvature)
         step = flow_step(values, matrix, -now.slope, limit, law.force_error)
     model = QuadraticModel(values, matrix, limit)
@@ -39,6 +44,20 @@ def short_step(
     if np.abs(step).max() <= law.field_error:
         step, tried = step_off_saddle(step, model, gaps, prescribed, orders, equal_speeds, system)
     return step, curvature, tried
+
+
+@compiled
+def newton_within(curvature: Array, force: Array, limit: Array) -> tuple[Array, bool]:
+    """Take Newton's step, at whose end the linear flow rests; also returns whether it may be taken.
+
+    It may where the curvature is positive and no edge goes beyond its limit.
+    """
+    factor, definite = cholesky(curvature)
+    step = force.copy()
+    if definite:
+        solve_column(factor, step)
+        definite = bool(np.all(np.abs(step) <= limit))
+    return step, definite
 
 
 @compiled
