@@ -26,7 +26,6 @@ from adhesis.solver.sharp.tolerances import (
     LAST_GAP,
     RESTS,
     SAME_REST,
-    SHORTENED_STEPS,
 )
 
 _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
@@ -199,19 +198,13 @@ class EdgeMechanics(EdgeProblem):
     ) -> Point | Array:
         """Descend with all gaps."""
         system, law = self.system(gaps), self.law
-        compare = equal_speeds or track.has_left
         left, orders, rests = DESCENT_LIMIT, _ANY, 0
         while left > 0 and rests <= 2 * RESTS:
-            most, longest = left, law.longest_step
-            if track.short_fields > 0:
-                most, longest = track.short_fields, SHORTENED_STEPS * longest
             end = system.descend(
-                gaps, prescribed, most, orders, law._replace(longest_step=longest), track,
-                equal_speeds=equal_speeds, compare=compare,
-            )  # fmt: skip
+                gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds
+            )
             gaps, orders = end.gaps, end.orders
             left -= end.fields
-            track.short_fields -= end.fields
             if end.event == REJOINED:
                 track.rejoined = True
                 return np.empty((0, 2))

@@ -129,23 +129,6 @@ MOST_NUCLEATIONS = 10_000
 """Nucleations in one jump; more are an endless loop."""
 RAN = 0.05
 """λ_min. An edge that moved further than this in a descent has run."""
-SADDLE_PASSED = 8.0
-"""Forces so many times larger before a point have come near a saddle or minimum there, and if they
-are as large after it have passed a saddle."""
-SADDLE_REACH = 2.0
-"""λ_min. Edges that run further until forces have grown so much passed the saddle at a seventh of
-this or more, 0.3 λ_min; trajectories of short and long steps were 0.1 λ_min apart, and where they
-parted at a saddle edges ran 0.2 to 1.2 λ_min."""
-SADDLE_FORCE = 0.1
-"""C_c². Smaller forces are those of the fold at which a jump begins."""
-SHORTENED_STEPS = 0.25
-"""Factor on the steps of a descent that is repeated beyond a saddle; a half did not do."""
-SADDLE_APPROACH = 24.0
-"""λ_min. A descent that is repeated begins at most so far before the saddle. One of the loop with
-γ = 0.04 of benchmarks/few_gaps.py ended elsewhere from further away and from 16, and not from 8."""
-SHORT_WAY = 2.0
-"""Times the fields that short steps need until forces have grown so much. Behind them steps are as
-usual: where the descent ends is decided."""
 HELD_BACK = 0.03
 """C_c². Runners that take less force than this from each other do not race."""
 OTHER_MINIMUM = 0.01
@@ -171,6 +154,8 @@ MODEL_ERROR = 0.005
 NEAR_BALANCE = 0.05
 """C_c² on a flat piece. Where forces have fallen below this the model does not lead on: a minimum
 may be shallower than its error."""
+FORCES_FELL = 8.0
+"""Times. Forces that have fallen by more on the way are near a saddle or minimum."""
 MODEL_SHARE = 0.1
 """Of the distance of an opening from its critical value: the error that is allowed in addition."""
 MODEL_STEP = 2.0

@@ -311,14 +311,14 @@ def test_openings_of_the_model_may_be_wrong_by_more_far_from_balance():
 
     def error(*unbalance: float) -> float:
         count = len(unbalance)
-        lengths, forces = np.arange(1.0, 1 + count) / count, np.ones(count)
+        lengths = np.arange(1.0, 1 + count) / count
         residuals = np.transpose([unbalance, np.ones(count)])
-        flow = ModelFlow(model - field, model, residuals, lengths, residuals, forces, nothing)
+        flow = ModelFlow(model - field, model, residuals, lengths, residuals, nothing)
         return float(model_error(flow, field, 1.0))
 
     assert error(0.0) > 1 > error(1.0)
     assert error(0.0, 1.0) == pytest.approx(error(0.0) / 4)  # balanced half way
-    same = ModelFlow(field, field, nothing, np.ones(1), nothing, np.ones(1), nothing)
+    same = ModelFlow(field, field, nothing, np.ones(1), nothing, nothing)
     assert model_error(same, field, 1.0) == 0
 
 
@@ -400,7 +400,6 @@ def test_edges_come_to_rest_in_the_equilibrium_that_newton_finds(wave):
     point = wave.edges.equilibrium(found.gaps, 0.5 * 2 * np.pi * 1e-3, 0.05 * wave.edges.wave)
     assert point is not None
     np.testing.assert_allclose(point.gaps, found.gaps, atol=2 * wave.edges.law.rest_step)
-    assert len(found.forces) == len(found.trajectory) - 1
     np.testing.assert_array_equal(found.trajectory[0], np.ravel(NARROW))
     np.testing.assert_array_equal(found.trajectory[-1], found.gaps.ravel())
 

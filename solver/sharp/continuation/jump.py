@@ -156,7 +156,7 @@ class Jumps:
         """Descend to the next minimum of the energy; None when no contact is left.
 
         Where edges may have raced, a minimum that equal speeds lead to instead is added to
-        ``rivals``, unless there is one, or one that short steps lead to past a saddle.
+        ``rivals``, unless there is one.
         """
         if touches:
             gaps = self.nucleation.seeded(gaps, touches)
@@ -168,13 +168,6 @@ class Jumps:
                 rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
                 if not track.rejoined and not self._alike(rival, point):
                     rivals.append(rival)
-                    return point
-                passed = self.races.beyond_saddle(gaps, point, track)
-                if passed is not None:
-                    begin, beyond = passed
-                    rival = self._relax(begin, at, track=beyond)
-                    if not beyond.rejoined and not self._alike(rival, point):
-                        rivals.append(rival)
             except FullContact as full:
                 rivals.append(full)
             except NoState:

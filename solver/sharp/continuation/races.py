@@ -13,12 +13,6 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
     HELD_BACK,
     RAN,
-    SADDLE_APPROACH,
-    SADDLE_FORCE,
-    SADDLE_PASSED,
-    SADDLE_REACH,
-    SHORT_WAY,
-    SHORTENED_STEPS,
 )
 
 
@@ -53,44 +47,6 @@ class RaceCheck:
         opening = end.field.solution.opening[runners]
         stiffness = opening[:, None] * self._edges.stiffness(end, runners)
         return self._hold_back(way[runners], (stiffness + stiffness.T) * way[runners])
-
-    def beyond_saddle(
-        self, start: Array, end: Point | None, track: Track
-    ) -> tuple[Array, Track] | None:
-        """Return the part of a descent after the last saddle that it passed, or None.
-
-        Next to a saddle the forces are small, and little decides to which side edges run on. That
-        counts where runners hold each other back, gaps or patches went, and the forces grow soon
-        after the saddle: the further edges run until then, the further away they passed it. Also
-        returns gaps before the saddle, at most as far away as counts.
-        """
-        same_gaps = end is not None and end.gaps.shape == start.shape
-        if same_gaps or not track.is_complete:
-            return None
-        stages = zip(track.ways, track.forces, track.stages, strict=True)
-        for way, forces, stage in reversed(list(stages)):
-            if not self._hold_back(stage.way, stage.taken):
-                continue
-            before = np.maximum.accumulate(forces)
-            after = np.maximum.accumulate(forces[::-1])[::-1]
-            ran = before > SADDLE_FORCE * self._edges.critical**2
-            saddles = np.flatnonzero(ran & (np.minimum(before, after) > SADDLE_PASSED * forces))
-            for saddle in saddles[::-1]:
-                left = saddle + np.flatnonzero(forces[saddle:] > SADDLE_PASSED * forces[saddle])[0]
-                if np.abs(way[left] - way[saddle]).max() > SADDLE_REACH * self._edges.wave:
-                    continue
-                # segments are compared that are no longer than those of short steps
-                points = way[left:]
-                places = np.arange(0, len(points) - 1 + 1e-9, SHORTENED_STEPS)
-                fine = [np.interp(places, np.arange(len(points)), edge) for edge in points.T]
-                ways = [np.ascontiguousarray(np.transpose(fine))]
-                apart = np.abs(way[:saddle] - way[saddle]).max(axis=1, initial=0.0)
-                far = np.flatnonzero(apart > SADDLE_APPROACH * self._edges.wave)
-                begin = int(far[-1]) if far.size else 0
-                fields = int(SHORT_WAY * (left - begin))
-                beyond = Track(ways, has_left=True, short_fields=fields)
-                return way[begin].reshape(-1, 2), beyond
-        return None
 
     def _runners(self, way: Array) -> NDArray[np.int64]:
         return np.flatnonzero(np.abs(way) > RAN * self._edges.wave)

@@ -81,8 +81,6 @@ class Descent(NamedTuple):
         Fields and tangents that were computed.
     trajectory : array, shape (n, 2L)
         Edges that it went through.
-    forces : array, shape (n - 1,)
-        Norm of dU/dn at each of them but the last.
     has_left : bool
         Whether it has been away from the trajectory that it is compared with.
     interaction : array, shape (2L, 2L)
@@ -95,7 +93,6 @@ class Descent(NamedTuple):
     fields: int
     tangents: int
     trajectory: Array
-    forces: Array
     has_left: bool
     interaction: Array
 
@@ -152,9 +149,7 @@ def descend(
     last = now.solution
     while event == STEP_LIMIT:
         if accepted:
-            force = norm(now.slope)
-            strongest = max(strongest, force)
-            trajectory.forces[trajectory.length - 1] = force
+            strongest = max(strongest, norm(now.slope))
             if is_long or fields % 2 == 0:
                 comparison = compared(comparison, gaps, law.longest_step)
             if comparison.matches == COMPARISONS:
@@ -186,9 +181,8 @@ def descend(
             take(step, interaction)
             gaps = step.gaps
     points = trajectory.points[: trajectory.length]
-    forces = trajectory.forces[: trajectory.length - 1]
     return Descent(
-        gaps, event, orders, fields, tangents, points, forces, comparison.has_left, interaction
+        gaps, event, orders, fields, tangents, points, comparison.has_left, interaction
     )
 
 
@@ -256,10 +250,8 @@ def event_after(step: Step, law: EdgeLaw) -> int:
 @compiled
 def followed(trajectory: Trajectory, step: Step) -> Trajectory:
     """Add the points of a step to a trajectory."""
-    points, forces = step.flow.points, step.flow.forces
+    points = step.flow.points
     for i in range(points.shape[0]):
-        if i > 0:
-            trajectory.forces[trajectory.length - 1] = forces[i]
         trajectory = extended(trajectory, points[i])
     if points.shape[0] == 0:
         trajectory = extended(trajectory, step.gaps.ravel())

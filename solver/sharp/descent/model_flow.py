@@ -30,12 +30,12 @@ from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.field.cholesky import factor_rows, padded, solve_column
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
+    FORCES_FELL,
     MODEL_STEP,
     MODEL_STEPS,
     NEAR_BALANCE,
     RATE_GROWTH,
     RUNNING_ENDS,
-    SADDLE_PASSED,
     TIME_TRIES,
 )
 
@@ -55,8 +55,6 @@ class ModelFlow(NamedTuple):
         Largest motion up to each step.
     residuals : array, shape (n, 2L)
         C - C_c of the model after each step.
-    forces : array, shape (n,)
-        Norm of dU/dn before each step.
     interaction : array, shape (2L, 2L)
         Force, as C², that the motion of each edge (columns) took from every edge (rows).
     """
@@ -66,7 +64,6 @@ class ModelFlow(NamedTuple):
     points: Array
     lengths: Array
     residuals: Array
-    forces: Array
     interaction: Array
 
 
@@ -74,7 +71,7 @@ class ModelFlow(NamedTuple):
 def no_flow() -> ModelFlow:
     """Make a flow without points."""
     none, nothing = np.empty((0, 0)), np.empty(0)
-    return ModelFlow(nothing, nothing, none, nothing, none, nothing, none)
+    return ModelFlow(nothing, nothing, none, nothing, none, none)
 
 
 @compiled
@@ -89,7 +86,7 @@ def flow_through(
     state = initial_state(gaps, opening, model, law, panels)
     edges = opening.shape[0]
     points, residuals = np.empty((MODEL_STEPS, edges)), np.empty((MODEL_STEPS, edges))
-    norms, lengths = np.empty(MODEL_STEPS), np.empty(MODEL_STEPS)
+    lengths = np.empty(MODEL_STEPS)
     interaction, matrix = np.zeros((edges, edges)), np.empty((edges, edges))
     force, step = np.empty(edges), np.empty(edges)
     factor = np.empty((edges, padded(edges)))
@@ -97,9 +94,9 @@ def flow_through(
     count, length = 0, 0.0
     while count < MODEL_STEPS:
         model_forces(state, force)
-        norms[count] = norm(force)
-        strongest = max(strongest, norms[count])
-        if near_balance(norms[count], strongest, law):
+        total = norm(force)
+        strongest = max(strongest, total)
+        if near_balance(total, strongest, law):
             break
         model_hessian(state, model, matrix)
         if equal_speeds:
@@ -123,7 +120,7 @@ def flow_through(
             break
     return ModelFlow(
         state.motion, state.opening, points[:count], lengths[:count], residuals[:count],
-        norms[:count], interaction,
+        interaction,
     )  # fmt: skip
 
 
@@ -131,7 +128,7 @@ def flow_through(
 def near_balance(force: float, strongest: float, law: EdgeLaw) -> bool:
     """Whether forces that were as large as ``strongest`` have come near a minimum or saddle."""
     small = NEAR_BALANCE * law.critical * law.critical
-    return force < small and SADDLE_PASSED * force < strongest
+    return force < small and FORCES_FELL * force < strongest
 
 
 @compiled

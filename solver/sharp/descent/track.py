@@ -35,14 +35,10 @@ class Track:
         One for every set of gaps on the way.
     has_left, rejoined : bool
         Whether the other descent has left the track, and come back to it.
-    short_fields : int
-        Fields of the other descent that are left with short steps.
     rest : array, optional
         Gaps of a window in which the descent first came to rest.
     stages : list of Stage
         What the edges did, one for every set of gaps on the way.
-    forces : list of array
-        Norm of the forces at the points of each of the ways but its last.
     is_complete : bool
         Whether the stages are known.
     """
@@ -50,10 +46,8 @@ class Track:
     ways: list[Array] = field(default_factory=list)
     has_left: bool = False
     rejoined: bool = False
-    short_fields: int = 0
     rest: Array | None = None
     stages: list[Stage] = field(default_factory=list)
-    forces: list[Array] = field(default_factory=list)
     is_complete: bool = True
 
     def of(self, edges: int) -> Array:

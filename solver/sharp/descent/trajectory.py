@@ -26,13 +26,10 @@ class Trajectory(NamedTuple):
     Attributes
     ----------
     points : array, shape (n, 2L)
-    forces : array, shape (n,)
-        Norm of dU/dn at each; not known at the last one until its field is solved.
     length : int
     """
 
     points: Array
-    forces: Array
     length: int
 
 
@@ -59,22 +56,19 @@ def begun(gaps: Array) -> Trajectory:
     """Begin a trajectory at these gaps."""
     points = np.empty((64, 2 * gaps.shape[0]))
     points[0] = gaps.ravel()
-    return Trajectory(points, np.zeros(64), 1)
+    return Trajectory(points, 1)
 
 
 @compiled
 def extended(trajectory: Trajectory, edges: Array) -> Trajectory:
     """Add a point to a trajectory."""
-    points, forces, length = trajectory.points, trajectory.forces, trajectory.length
+    points, length = trajectory.points, trajectory.length
     if length == points.shape[0]:
         longer = np.empty((2 * length, points.shape[1]))
         longer[:length] = points
         points = longer
-        more = np.zeros(2 * length)
-        more[:length] = forces
-        forces = more
     points[length] = edges
-    return Trajectory(points, forces, length + 1)
+    return Trajectory(points, length + 1)
 
 
 @compiled

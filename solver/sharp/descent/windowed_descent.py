@@ -165,7 +165,7 @@ def descend_many(
         else:
             half = min(2 * half, WINDOW_WIDEST)
     none = np.empty((0, 0))
-    return Descent(gaps, event, orders, fields, tangents, none, np.empty(0), False, none)
+    return Descent(gaps, event, orders, fields, tangents, none, False, none)
 
 
 @compiled
@@ -232,8 +232,8 @@ def descend_in_window(
     progress = np.abs(inside.gaps[: span.width] - window[: span.width]).max()
     return WindowDescent(
         Descent(
-            inside.gaps, event, inside.orders, fields, tangents, inside.trajectory, inside.forces,
-            False, inside.interaction,
+            inside.gaps, event, inside.orders, fields, tangents, inside.trajectory, False,
+            inside.interaction,
         ),
         motion,
         progress,

@@ -65,16 +65,14 @@ class DenseSystem(EdgeSystem):
         track: Track,
         *,
         equal_speeds: bool,
-        compare: bool,
     ) -> Descent:
         """Descend with all edges at once."""
         problem = FlowProblem(law, self._problem.model, NO_EXTERIOR)
-        comparison = Comparison(track.of(gaps.size if compare else 0), track.has_left, 0)
+        comparison = Comparison(track.of(gaps.size if equal_speeds else 0), track.has_left, 0)
         found = descend(gaps, prescribed, most, orders, equal_speeds, problem, comparison)
         track.has_left = found.has_left
-        if not compare:
+        if not equal_speeds:
             track.ways.append(found.trajectory)
-            track.forces.append(found.forces)
             motion = outward(gaps) * (found.gaps - gaps).ravel()
             track.stages.append(Stage(motion, found.interaction))
         self._problem.count.descent(found.fields, found.tangents)

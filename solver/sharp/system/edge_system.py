@@ -79,11 +79,10 @@ class EdgeSystem(ABC):
         track: Track,
         *,
         equal_speeds: bool,
-        compare: bool,
     ) -> Descent:
         """Descend in energy for at most ``most`` steps, by a ``law`` of this problem.
 
-        The track is extended or, to ``compare``, compared with.
+        The track is extended, or with equal speeds compared with.
         """
 
     @abstractmethod

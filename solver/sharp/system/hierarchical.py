@@ -71,7 +71,6 @@ class HierarchicalSystem(EdgeSystem):
         track: Track,
         *,
         equal_speeds: bool,
-        compare: bool,
     ) -> Descent:
         """Descend in windows, one after the other; the track is not known."""
         track.is_complete = False
