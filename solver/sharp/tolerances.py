@@ -166,6 +166,8 @@ RUNNING_ENDS = 0.01
 """Longest steps; a shorter one ends the flow through the model."""
 RUNNING_LENGTH = 0.5
 """Longest steps; edges that move further in the model run."""
+SLOWEST = 0.01
+"""Of the largest force. With equal speeds edges with less force than this are slower."""
 TIME_TRIES = 20
 """Times Δτ that are tried for one step in the model."""
 RATE_GROWTH = 4.0

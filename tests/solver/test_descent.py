@@ -270,21 +270,31 @@ def test_steps_through_the_model_converge_to_its_flow(rough):
     assert np.abs(taken).max() < 10 * np.abs(end**2 - opening**2).max()
 
 
+@pytest.mark.parametrize("equal_speeds", [False, True])
 @pytest.mark.parametrize("seed", range(5))
-def test_an_implicit_step_is_downhill_and_within_its_length(seed):
+def test_an_implicit_step_is_downhill_and_within_its_length(seed, equal_speeds):
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 7))
     root = rng.normal(size=(count, count))
     matrix = root + root.T + np.diag(10.0 ** rng.uniform(0, 1.5, count))  # stiff, some unstable
     force, step = rng.normal(size=count), np.empty(count)
     factor = np.empty((count, padded(count)))
-    size = implicit_step(matrix, force, 0.01, factor, step)
+    size = implicit_step(matrix, force, 0.01, equal_speeds, factor, step)
     assert size == pytest.approx(np.abs(step).max())
     assert 0 < size <= 0.01 * (1 + 1e-12)
     assert force @ step > 0
     definite = root @ root.T + np.eye(count)
-    implicit_step(definite, force, 1e9, factor, step)  # no limit in reach: Newton's step
+    # no limit in reach: Newton's step
+    implicit_step(definite, force, 1e9, equal_speeds, factor, step)
     np.testing.assert_allclose(step, np.linalg.solve(definite, force), rtol=1e-6)
+
+
+def test_with_equal_speeds_edges_move_alike_whatever_their_forces():
+    force, step = np.array([1.0, -0.3, 0.001]), np.empty(3)
+    for equal_speeds, wanted in ((True, [0.1, -0.1, 0.01]), (False, [0.1, -0.03, 0.0001])):
+        factor = np.empty((3, padded(3)))
+        implicit_step(np.zeros((3, 3)), force, 0.1, equal_speeds, factor, step)
+        np.testing.assert_allclose(step, wanted)
 
 
 # ------------------------------------------------------------------ judgement of a step

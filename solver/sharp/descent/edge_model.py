@@ -154,21 +154,3 @@ def model_hessian(state: ModelState, model: EdgeModel, matrix: Array) -> None:
         for f in range(edges):
             matrix[e, f] = twice * max(opening[f], 0.0) * coupling[e, f]
         matrix[e, e] = 2 * (abs(opening[e]) * rate[e] - critical[e] * critical_rate[e])
-
-
-@compiled
-def model_tangent(state: ModelState, model: EdgeModel, least: float) -> tuple[Array, Array, Array]:
-    """Scale ∂(C_e - C_c)/∂n_f to a symmetric matrix: scale factors, matrix, and C - C_c.
-
-    Openings below ``least`` are scaled as if they were that.
-    """
-    opening, coupling = state.opening, model.coupling
-    edges = opening.shape[0]
-    scale = np.sqrt(np.maximum(opening, least))
-    matrix = np.empty((edges, edges))
-    for e in range(edges):
-        for f in range(edges):
-            mean = opening[f] * scale[e] / scale[f] + opening[e] * scale[f] / scale[e]
-            matrix[e, f] = 0.5 * coupling[e, f] * mean
-        matrix[e, e] = state.rate[e] - state.critical_rate[e]
-    return scale, matrix, opening - state.critical

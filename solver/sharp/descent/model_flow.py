@@ -1,8 +1,8 @@
 """Gradient flow through the model of the openings, compiled: a long step with one field.
 
 The flow ṅ = C_c² - C² is integrated by linearly implicit Euler steps, (1/Δτ + H) Δn = force, each
-at most a longest step long; with equal speeds, for comparison, by steps of the bounded quadratic
-model. Fields are not solved on the way: how far the model leads is the step-size control's
+at most a longest step long; with equal speeds, for comparison, the time Δτ is each edge's own.
+Fields are not solved on the way: how far the model leads is the step-size control's
 (``step_size``), which compares its openings with those of the field at the end.
 """
 
@@ -14,17 +14,14 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.descent.bound_constrained_step import bound_constrained_step
 from adhesis.solver.sharp.descent.edge_forces import norm
 from adhesis.solver.sharp.descent.edge_model import (
     EdgeModel,
-    ModelState,
     advance,
     evaluate,
     initial_state,
     model_forces,
     model_hessian,
-    model_tangent,
 )
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.field.cholesky import factor_rows, padded, solve_column
@@ -36,6 +33,7 @@ from adhesis.solver.sharp.tolerances import (
     NEAR_BALANCE,
     RATE_GROWTH,
     RUNNING_ENDS,
+    SLOWEST,
     TIME_TRIES,
 )
 
@@ -99,10 +97,7 @@ def flow_through(
         if near_balance(total, strongest, law):
             break
         model_hessian(state, model, matrix)
-        if equal_speeds:
-            size = step_with_equal_speeds(state, model, longest, law.overlap_limit, step)
-        else:
-            size = implicit_step(matrix, force, longest, factor, step)
+        size = implicit_step(matrix, force, longest, equal_speeds, factor, step)
         if not size > RUNNING_ENDS * law.longest_step:
             break
         share = share_within(state.motion, step, limit)
@@ -132,23 +127,28 @@ def near_balance(force: float, strongest: float, law: EdgeLaw) -> bool:
 
 
 @compiled
-def implicit_step(matrix: Array, force: Array, longest: float, factor: Array, step: Array) -> float:
-    """Take a linearly implicit Euler step of the flow; returns the largest motion.
+def implicit_step(
+    matrix: Array, force: Array, longest: float, equal_speeds: bool, factor: Array, step: Array
+) -> float:
+    """Take a linearly implicit step, (1/Δτ + H) Δn = force; returns the largest motion.
 
     No edge moves further than ``longest``. The time Δτ is that in which the largest force alone
-    would move its edge so far, or less: where 1/Δτ + H is not positive definite the step would not
-    be downhill. ``factor`` and ``step`` are changed in place.
+    would move its edge so far; with equal speeds every edge has its own time, in which its own
+    force would. It is less where 1/Δτ + H is not positive definite: the step would not be downhill.
+    ``factor`` and ``step`` are changed in place.
     """
     edges = force.shape[0]
-    rate = largest(force) / longest
+    strongest = largest(force)
+    growth = 1 / longest
     size = 0.0
     for _ in range(TIME_TRIES):
         for e in range(edges):
             for f in range(e + 1):
                 factor[e, f] = matrix[e, f]
-            factor[e, e] += rate
+            own = max(abs(force[e]), SLOWEST * strongest) if equal_speeds else strongest
+            factor[e, e] += growth * own
         if not factor_rows(factor, 0.0):
-            rate *= RATE_GROWTH
+            growth *= RATE_GROWTH
             continue
         step[:] = force
         solve_column(factor, step)
@@ -156,7 +156,7 @@ def implicit_step(matrix: Array, force: Array, longest: float, factor: Array, st
         if size <= longest:
             break
         step *= longest / size
-        rate *= min(RATE_GROWTH, 1.1 * size / longest)
+        growth *= min(RATE_GROWTH, 1.1 * size / longest)
         size = longest
     return size
 
@@ -168,16 +168,6 @@ def largest(values: Array) -> float:
     for e in range(values.shape[0]):
         size = max(size, abs(values[e]))
     return size
-
-
-@compiled
-def step_with_equal_speeds(
-    state: ModelState, model: EdgeModel, longest: float, least_opening: float, step: Array
-) -> float:
-    """Take a step with equal speeds, in place, at most ``longest``; returns the largest motion."""
-    scale, matrix, residual = model_tangent(state, model, least_opening)
-    step[:] = bound_constrained_step(matrix, scale, -residual, np.full(step.shape[0], longest))
-    return largest(step)
 
 
 @compiled
