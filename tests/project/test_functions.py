@@ -20,9 +20,8 @@ MOST_PARAMETERS = 8
 MATHEMATICAL = {
     "gap/chebyshev_moments.py": {"_LARGEST", "_SAFE"},  # range of a series; its bound
     "gap/conformal_map.py": {"_COLUMNS"},
-    "gap/full_contact_stress.py": {  # sizes of Gauss rules
-        "_TILT_NODES", "_PIECES_BY_SLOPE", "_HALF_PLANE_NODES",
-    },  # fmt: skip
+    # sizes of Gauss rules
+    "gap/full_contact_stress.py": {"_TILT_NODES", "_PIECES_BY_SLOPE", "_HALF_PLANE_NODES"},
     "gap/sine_transform.py": {"_ROTATIONS"},
     "descent/gradient_flow.py": {"AT_REST", "VANISHED", "STEP_LIMIT", "NO_FIELD", "REJOINED"},
     "output/grid_fields.py": {"_FIELD_NODES", "_FINER"},  # nodes of an output, not of a loop
