@@ -30,7 +30,7 @@ class EdgeLaw(NamedTuple):
     rest_step : float
         A descent whose steps are shorter than this is left to Newton's iteration.
     longest_step : float
-        Longest step of a running edge.
+        Longest short step of an edge in a descent.
     smallest : float
         Narrower patches and gaps are gone.
     overlap_limit : float
