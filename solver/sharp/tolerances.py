@@ -140,9 +140,11 @@ FIRST_REACH = 12.0
 LEAST_REACH = 2.0
 """Longest steps (0.1 λ_min); where the model is wrong sooner the next step is a short one."""
 LONGEST_REACH = 100.0
-"""Longest steps (5 λ_min). Longer ones lead no further in one field: their error ends them."""
+"""Longest steps (5 λ_min)."""
 REACH_GROWTH = 3.0
 """Largest growth of the reach from one step to the next."""
+REACH_CUT = 0.1
+"""Least factor on the reach, also where there is no field at the end."""
 RECOVERY = 1.5
 """Growth of the reach with every short step."""
 REACH_SAFETY = 0.8
@@ -216,7 +218,7 @@ contact 0.32 and 0.60 in tests/solver/test_kinetics.py."""
 COMPARISONS = 3
 """In a row, after which a descent has rejoined the trajectory."""
 SEGMENT_MARGIN = 1.2
-"""Longest steps; a longer segment lies between two descents."""
+"""Steps through the model; a longer segment lies between two descents."""
 SEGMENT_SHARE = 0.25
 """Of an edge's distance from a point, in segments: further away is far."""
 

@@ -90,7 +90,7 @@ def test_a_fold_moves_with_the_openings_of_its_edges(control, turning_point, mon
 
 
 def test_an_edge_that_leaps_to_and_fro_over_a_minimum_comes_to_rest():
-    """A lone edge, whose minimum a cubic and the energy's trapezium both miss."""
+    """A lone edge, whose minimum the energy's trapezium misses."""
     scene = draw(308, 90)
     problem = scene.problem()
     loops = [

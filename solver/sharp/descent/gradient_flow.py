@@ -1,9 +1,9 @@
 """Descent in energy along a jump: integration of the edges' gradient flow, compiled.
 
 Where edges run, a step follows the flow through a model of the openings (``model_flow``), over
-several shortest waves. Near equilibria, saddles and overlaps it follows the linear flow
-(``short_step``). Either is judged by the field at its end (``step_size``). For comparison edges
-move with equal speeds. A descent ends with an event.
+several shortest waves. Near equilibria and saddles, and where a gap closes or a patch vanishes, it
+follows the linear flow (``short_step``). Either is judged by the field at its end (``step_size``).
+For comparison edges move with equal speeds. A descent ends with an event.
 """
 
 from __future__ import annotations
@@ -199,8 +199,9 @@ def next_step(
 ) -> tuple[Step, int]:  # fmt: skip
     """Choose the next step from solved edges; also returns the number of fields that took.
 
-    It is a long one where the edges run in the model, and a short one otherwise, and where forces
-    that were as large as ``strongest`` are nearly balanced.
+    It is a long one where the edges run in the model, and a short one otherwise, where forces that
+    were as large as ``strongest`` are nearly balanced, and where a gap or patch would be gone: no
+    field could judge that.
     """
     law, panels = system.law, system.model.panels
     opening, table = now.solution.opening, now.solution.nodes.table
@@ -212,7 +213,8 @@ def next_step(
         length = np.abs(flow.motion).max()
         if length > RUNNING_LENGTH * law.longest_step:
             end = flow.points[-1].copy().reshape(gaps.shape)
-            return Step(end, flow.motion, length, flow, none), 0
+            if not shortest_length(end) < law.smallest:
+                return Step(end, flow.motion, length, flow, none), 0
     limit = step_limits(table, size.share * law.longest_step)
     motion, curvature, tried = short_step(
         gaps, prescribed, orders, now, tangent, limit, equal_speeds, system

@@ -22,6 +22,7 @@ from adhesis.solver.sharp.tolerances import (
     LONGEST_REACH,
     MODEL_ERROR,
     MODEL_SHARE,
+    REACH_CUT,
     REACH_GROWTH,
     REACH_SAFETY,
     RECOVERY,
@@ -78,7 +79,7 @@ def model_error(flow: ModelFlow, field: Array, critical: float) -> float:
 @compiled
 def after_long_step(size: StepSize, length: float, error: float) -> StepSize:
     """Choose the next reach after a long step of this length, in longest steps, and error."""
-    factor = min(REACH_GROWTH, REACH_SAFETY / np.sqrt(max(error, 1e-9)))
+    factor = min(REACH_GROWTH, max(REACH_CUT, REACH_SAFETY / np.sqrt(max(error, 1e-9))))
     reach = length * factor
     if error <= 1:
         reach = max(reach, size.reach if factor >= 1 else 0.0)
