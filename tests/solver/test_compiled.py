@@ -304,3 +304,42 @@ def test_only_what_python_calls_can_be_called_from_python(places):
     assert called(1.5) == 3.0
     both = module.compiled_for_both(double)
     assert both.inner is both
+
+
+# ------------------------------------------------------------------------------- references
+
+
+def sum_of_squares(a):
+    total = 0.0
+    for i in range(a.shape[0]):
+        row = a[i, 1:].reshape(a.shape[1] - 1)
+        for j in range(row.shape[0]):
+            total += row[j] * row[j]
+    return total
+
+
+def last_row(a):
+    return a[-1]
+
+
+def sum_of_chosen(a):
+    return a[a[:, 0] > 0].sum()
+
+
+def sum_of_doubled(a):
+    return (2 * a).sum()
+
+
+@pytest.mark.parametrize(
+    ("function", "counts"),
+    [(sum_of_squares, False), (last_row, True), (sum_of_chosen, True), (sum_of_doubled, True)],
+)
+def test_references_are_counted_where_arrays_are_made_or_returned(places, function, counts):
+    compiled = module.compiled(function)
+    given = np.arange(6.0).reshape(3, 2)
+    wanted = np.array(function(given))
+    result = compiled(given)
+    del given
+    np.testing.assert_array_equal(result, wanted)
+    (code,) = compiled.inspect_llvm().values()
+    assert ("NRT_decref" in code) == counts

@@ -26,6 +26,7 @@ from adhesis.solver.sharp.field.hierarchical_solver import (
 from adhesis.solver.sharp.field.solution import (
     FieldModel,
     LoadingDevice,
+    Nodes,
     Solution,
     edge_openings,
     subtract_end_terms,
@@ -117,30 +118,33 @@ class _MovingEnds(NamedTuple):
 
 @compiled
 def _end_charges(
-    state: Solution, e: int, rules: GaussRules
-) -> tuple[Array, Array, float]:
-    """Compute load on the own gap, charges and area of the singular opening of edge e."""
-    nodes = state.nodes
+    nodes: Nodes, matrix: Array, e: int, rules: GaussRules, work: Array, load: Array, charge: Array
+) -> float:
+    """Compute load on the own gap, charges and area of the singular opening of edge e.
+
+    ``matrix`` are the diagonal blocks, ``work`` has space for the nodes of a gap.
+    """
     k, side = e // 2, e % 2
-    density, strength, area = end_singularity(nodes, e, rules)
-    m = density.shape[0]
-    block = state.equations.matrix[nodes.offset[k] : nodes.offset[k + 1], :m]
-    load = own_singular_load(nodes, e, block, density, strength, rules)
+    m = load.shape[0]
+    density = work[:m]
+    strength, area = end_singularity(nodes, e, rules, density)
+    block = matrix[nodes.offset[k] : nodes.offset[k + 1], :m]
+    own_singular_load(nodes, e, block, density, strength, rules, load)
     start = rules.vector_start[nodes.orders[k]]
     point = np.pi / (m + 1)
-    charge = np.empty(m)
     for j in range(m):
         ends = point * rules.end_values[side, start + j]
         charge[j] = rules.weights[start + j] * density[j] + ends
-    return load, charge, area
+    return area
 
 
 @compiled
 def _moving_ends(state: Solution, system: HierarchicalSystem, rules: GaussRules) -> _MovingEnds:
     """Compute the singular openings of all edges, and the translation of all together."""
-    nodes = state.nodes
+    nodes, matrix = state.nodes, state.equations.matrix
     edges = state.opening.shape[0]
     n = nodes.theta.shape[0]
+    work = np.empty(n)
     load = np.empty((n, 2))
     charge = np.empty((n, 2))
     strength = np.empty(edges)
@@ -152,7 +156,9 @@ def _moving_ends(state: Solution, system: HierarchicalSystem, rules: GaussRules)
     for e in range(edges):
         k, side = e // 2, e % 2
         own = slice(nodes.offset[k], nodes.offset[k + 1])
-        load[own, side], charge[own, side], area_of_end = _end_charges(state, e, rules)
+        area_of_end = _end_charges(
+            nodes, matrix, e, rules, work, load[own, side], charge[own, side]
+        )
         strength[e] = -state.opening[e] * np.sqrt(nodes.slope[k, side] / 8)
         to_right = (1 - 2 * side) * strength[e]
         area += area_of_end * to_right
@@ -327,15 +333,18 @@ def openings_between_edges(
 ) -> Array:
     """Compute ∂C_e/∂θ_f between the edges ``wanted`` of many gaps; 0 for e = f."""
     state, system = solve_many(gaps, prescribed, orders, 1, model)
-    offset = state.nodes.offset
-    count = wanted.shape[0]
-    load = np.zeros((state.nodes.theta.shape[0], count))
-    charge = np.zeros((state.nodes.theta.shape[0], count))
+    offset, matrix = state.nodes.offset, state.equations.matrix
+    n, count = state.nodes.theta.shape[0], wanted.shape[0]
+    work = np.empty(n)
+    load = np.zeros((n, count))
+    charge = np.zeros((n, count))
     area = np.zeros(count)
     for c in range(count):
         k = wanted[c] // 2
         own = slice(offset[k], offset[k + 1])
-        load[own, c], charge[own, c], area[c] = _end_charges(state, wanted[c], model.rules)
+        area[c] = _end_charges(
+            state.nodes, matrix, wanted[c], model.rules, work, load[own, c], charge[own, c]
+        )
     regular = solve_loads(system, offset, load, charge)
     by_edge, _ = openings_by_edges(state, wanted, regular, area, model.rules)
     out = by_edge[wanted]

@@ -96,10 +96,9 @@ class TreeFactor(NamedTuple):
 
 
 @compiled
-def _part(flat: Array, start: Integers, run: int) -> Array:
-    """Return the part of a flat array that belongs to a run."""
-    part: Array = flat[start[run] : start[run + 1]]
-    return part
+def _span(start: Integers, run: int) -> slice:
+    """Return where a flat array holds what belongs to a run."""
+    return slice(start[run], start[run + 1])
 
 
 @compiled
@@ -310,10 +309,10 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
         n = tree.rank[one]
         m = tree.rank[two]
         r = tree.rank[run]
-        first = _part(responses, tree.response_start, one).reshape(n, n)
-        second = _part(responses, tree.response_start, two).reshape(m, m)
-        kernel = _part(tree.kernel, tree.kernel_start, run).reshape(n, m)
-        w = _part(pair, tree.pair_start, run).reshape(n, n)
+        first = responses[_span(tree.response_start, one)].reshape(n, n)
+        second = responses[_span(tree.response_start, two)].reshape(m, m)
+        kernel = tree.kernel[_span(tree.kernel_start, run)].reshape(n, m)
+        w = pair[_span(tree.pair_start, run)].reshape(n, n)
         # W = (R1⁻¹ - H)⁻¹ = (1 - R1 H)⁻¹ R1, H = K12 R2 K21
         half = np.dot(kernel, second)
         reflected = np.dot(half, kernel.T)
@@ -330,8 +329,8 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
         negative[run] = count
         if r == 0:
             continue
-        interpolation = _part(tree.interpolation, tree.interpolation_start, run).reshape(n + m, r)
-        charges = _part(charge, tree.interpolation_start, run).reshape(n + m, r)
+        interpolation = tree.interpolation[_span(tree.interpolation_start, run)].reshape(n + m, r)
+        charges = charge[_span(tree.interpolation_start, run)].reshape(n + m, r)
         # q1 = W (E1 + K12 R2 E2), q2 = R2 (E2 + K21 q1)
         drive = np.dot(half, interpolation[n:])
         for i in range(n):
@@ -343,7 +342,7 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
             for j in range(r):
                 more[i, j] += interpolation[n + i, j]
         np.dot(second, more, charges[n:])
-        response = _part(responses, tree.response_start, run).reshape(r, r)
+        response = responses[_span(tree.response_start, run)].reshape(r, r)
         np.dot(interpolation.T, charges, response)
         for i in range(r):
             for j in range(i):
@@ -389,6 +388,41 @@ def _add_transposed(a: Array, x: Array, out: Array) -> None:
 
 
 @compiled
+def _charge_run(tree: Tree, factor: TreeFactor, run: int, charge: Array, work: Array) -> None:
+    """Compute the charges of a run from those of its two parts, which they change."""
+    one = tree.children[run, 0]
+    two = tree.children[run, 1]
+    n = tree.rank[one]
+    m = tree.rank[two]
+    first = factor.response[_span(tree.response_start, one)]
+    second = factor.response[_span(tree.response_start, two)]
+    kernel = tree.kernel[_span(tree.kernel_start, run)]
+    w = factor.pair[_span(tree.pair_start, run)]
+    up = tree.interpolation[_span(tree.interpolation_start, run)]
+    split = n * tree.rank[run]
+    a = work[0, :n]
+    b = work[1, :m]
+    for column in range(charge.shape[0]):
+        q1 = charge[column][_span(tree.node_start, one)]
+        q2 = charge[column][_span(tree.node_start, two)]
+        # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
+        _apply(kernel, q2, a)
+        _add_apply(first, a, q1)
+        b[:] = 0.0
+        _add_transposed(kernel, q1, b)
+        c = work[0, :m]
+        _apply(second, b, c)
+        _apply(kernel, c, work[1, :n])
+        _add_apply(w, work[1, :n], q1)
+        b[:] = 0.0
+        _add_transposed(kernel, q1, b)
+        _add_apply(second, b, q2)
+        q = charge[column][_span(tree.node_start, run)]
+        _add_transposed(up[:split], q1, q)
+        _add_transposed(up[split:], q2, q)
+
+
+@compiled
 def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Array:
     """Compute the charges of all runs, without potentials from outside a run's parent.
 
@@ -400,37 +434,46 @@ def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Array:
     charge[:, : isolated.shape[0]] = isolated.T
     work = np.empty((2, tree.rank.max()))
     for run in range(gaps, runs):
-        one = tree.children[run, 0]
-        two = tree.children[run, 1]
-        n = tree.rank[one]
-        m = tree.rank[two]
-        first = _part(factor.response, tree.response_start, one)
-        second = _part(factor.response, tree.response_start, two)
-        kernel = _part(tree.kernel, tree.kernel_start, run)
-        w = _part(factor.pair, tree.pair_start, run)
-        up = _part(tree.interpolation, tree.interpolation_start, run)
-        split = n * tree.rank[run]
-        a = work[0, :n]
-        b = work[1, :m]
-        for column in range(charge.shape[0]):
-            q1 = _part(charge[column], tree.node_start, one)
-            q2 = _part(charge[column], tree.node_start, two)
-            # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
-            _apply(kernel, q2, a)
-            _add_apply(first, a, q1)
-            b[:] = 0.0
-            _add_transposed(kernel, q1, b)
-            c = work[0, :m]
-            _apply(second, b, c)
-            _apply(kernel, c, work[1, :n])
-            _add_apply(w, work[1, :n], q1)
-            b[:] = 0.0
-            _add_transposed(kernel, q1, b)
-            _add_apply(second, b, q2)
-            q = _part(charge[column], tree.node_start, run)
-            _add_transposed(up[:split], q1, q)
-            _add_transposed(up[split:], q2, q)
+        _charge_run(tree, factor, run, charge, work)
     return np.ascontiguousarray(charge.T)
+
+
+@compiled
+def _pass_potential(
+    tree: Tree, factor: TreeFactor, run: int, charges: Array, potential: Array, work: Array
+) -> None:
+    """Compute potentials of the two parts of a run from its own, and change their charges."""
+    one = tree.children[run, 0]
+    two = tree.children[run, 1]
+    n = tree.rank[one]
+    m = tree.rank[two]
+    kernel = tree.kernel[_span(tree.kernel_start, run)]
+    up = tree.interpolation[_span(tree.interpolation_start, run)]
+    by_potential = factor.charge[_span(tree.interpolation_start, run)]
+    split = n * tree.rank[run]
+    for column in range(charges.shape[0]):
+        q1 = charges[column][_span(tree.node_start, one)]
+        q2 = charges[column][_span(tree.node_start, two)]
+        g1 = potential[column][_span(tree.node_start, one)]
+        g2 = potential[column][_span(tree.node_start, two)]
+        g = potential[column][_span(tree.node_start, run)]
+        a = work[:n]
+        _apply(by_potential[:split], g, a)
+        for i in range(n):
+            q1[i] -= a[i]
+        b = work[:m]
+        _apply(by_potential[split:], g, b)
+        for i in range(m):
+            q2[i] -= b[i]
+        _apply(kernel, q2, a)
+        _apply(up[:split], g, g1)
+        for i in range(n):
+            g1[i] -= a[i]
+        b[:] = 0.0
+        _add_transposed(kernel, q1, b)
+        _apply(up[split:], g, g2)
+        for i in range(m):
+            g2[i] -= b[i]
 
 
 @compiled
@@ -447,36 +490,6 @@ def downward_pass(tree: Tree, factor: TreeFactor, charge: Array, outside: Array)
     potential[:, tree.node_start[runs - 1] : tree.node_start[runs]] = outside.T
     work = np.empty(tree.rank.max())
     for run in range(runs - 1, gaps - 1, -1):
-        one = tree.children[run, 0]
-        two = tree.children[run, 1]
-        n = tree.rank[one]
-        m = tree.rank[two]
-        kernel = _part(tree.kernel, tree.kernel_start, run)
-        up = _part(tree.interpolation, tree.interpolation_start, run)
-        by_potential = _part(factor.charge, tree.interpolation_start, run)
-        split = n * tree.rank[run]
-        for column in range(charges.shape[0]):
-            q1 = _part(charges[column], tree.node_start, one)
-            q2 = _part(charges[column], tree.node_start, two)
-            g1 = _part(potential[column], tree.node_start, one)
-            g2 = _part(potential[column], tree.node_start, two)
-            g = _part(potential[column], tree.node_start, run)
-            a = work[:n]
-            _apply(by_potential[:split], g, a)
-            for i in range(n):
-                q1[i] -= a[i]
-            b = work[:m]
-            _apply(by_potential[split:], g, b)
-            for i in range(m):
-                q2[i] -= b[i]
-            _apply(kernel, q2, a)
-            _apply(up[:split], g, g1)
-            for i in range(n):
-                g1[i] -= a[i]
-            b[:] = 0.0
-            _add_transposed(kernel, q1, b)
-            _apply(up[split:], g, g2)
-            for i in range(m):
-                g2[i] -= b[i]
+        _pass_potential(tree, factor, run, charges, potential, work)
     charge[:] = charges.T
     return np.ascontiguousarray(potential[:, : tree.node_start[gaps]].T)

@@ -89,12 +89,13 @@ def exterior_kernel(theta: Array, weight: Array, exterior: Exterior) -> tuple[Ar
     """Evaluate w K at some places, shape (places, r), and its derivative by θ."""
     value = np.empty((theta.shape[0], exterior.theta.shape[0]))
     slope = np.empty((theta.shape[0], exterior.theta.shape[0]))
+    sine, cosine = np.sin(0.5 * exterior.theta), np.cos(0.5 * exterior.theta)
     for i in range(theta.shape[0]):
+        own_sine, own_cosine = np.sin(0.5 * theta[i]), np.cos(0.5 * theta[i])
         for a in range(exterior.theta.shape[0]):
-            x = 0.5 * (theta[i] - exterior.theta[a])
-            sine = np.sin(x)
-            value[i, a] = weight[i] * exterior.stretch[a] / (4 * np.pi * sine * sine)
-            slope[i, a] = -value[i, a] * np.cos(x) / sine
+            half = own_sine * cosine[a] - own_cosine * sine[a]
+            value[i, a] = weight[i] * exterior.stretch[a] / (4 * np.pi * half * half)
+            slope[i, a] = -value[i, a] * (own_cosine * cosine[a] + own_sine * sine[a]) / half
     return value, slope
 
 

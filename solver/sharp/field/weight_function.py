@@ -26,27 +26,35 @@ from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 
 @compiled
-def end_singularity(nodes: Nodes, e: int, rules: GaussRules) -> tuple[Array, float, float]:
-    """Compute the singular opening of edge e: density at its nodes, weight at the edge, area."""
+def end_singularity(
+    nodes: Nodes, e: int, rules: GaussRules, density: Array
+) -> tuple[float, float]:
+    """Compute the singular opening of edge e: weight at the edge, and area.
+
+    ``density`` is filled with that at the nodes of its gap.
+    """
     k, side = e // 2, e % 2
     offset, weight, eta = nodes.offset, nodes.weight, rules.eta
     base, m = offset[k], offset[k + 1] - offset[k]
     start = rules.vector_start[nodes.orders[k]]
     strength = np.pi / (m + 1) / nodes.slope[k, side]
     area = strength
-    density = np.empty(m)
     for j in range(m):
         x = eta[start + j]
         density[j] = 1 / (1 + x) if side == 0 else 1 / (1 - x)
         area += weight[base + j] * density[j]
-    return density, strength, area
+    return strength, area
 
 
 @compiled
 def own_singular_load(
-    nodes: Nodes, e: int, block: Array, density: Array, strength: float, rules: GaussRules
-) -> Array:
-    """Load the gap of edge e, whose diagonal block is ``block``, by the edge's singular opening."""
+    nodes: Nodes, e: int, block: Array, density: Array, strength: float, rules: GaussRules,
+    out: Array,
+) -> None:  # fmt: skip
+    """Load the gap of edge e by the edge's singular opening, into ``out``.
+
+    ``block`` is the gap's diagonal block.
+    """
     k, side = e // 2, e % 2
     order = nodes.orders[k]
     base, m = nodes.offset[k], density.shape[0]
@@ -56,7 +64,6 @@ def own_singular_load(
     alpha, edge = nodes.table[k, ALPHA], nodes.table[k, LEFT + side]
     theta, weight, eta, weights = nodes.theta, nodes.weight, rules.eta, rules.weights
     start = rules.vector_start[order]
-    out = np.empty(m)
     for i in range(m):
         total = 0.0
         for j in range(m):
@@ -66,7 +73,6 @@ def own_singular_load(
         near = weights[start + i] * point * mapped
         far = weight[base + i] * strength * images
         out[i] = total + (near + far) / (4 * np.pi)
-    return out
 
 
 @compiled
@@ -84,19 +90,20 @@ def singular_loads(
     load = np.zeros((n, columns))
     area = np.zeros(edges.shape[0])
     sine, cosine = nodes.sine, nodes.cosine
-    column = np.empty(n)
+    column, work = np.empty(n), np.empty(n)
     for c in range(edges.shape[0]):
         e = edges[c]
         k = e // 2
         first, behind = offset[k], offset[k + 1]
         if first == behind:
             continue
-        density, strength, area[c] = end_singularity(nodes, e, rules)
+        density = work[: behind - first]
+        strength, area[c] = end_singularity(nodes, e, rules, density)
         rows = matrix[first:behind]
         edge = table[k, LEFT + e % 2]
         _load_by_edge(rows, density, strength, edge, sine, cosine, weight, column)
-        column[first:behind] = own_singular_load(
-            nodes, e, rows[:, first:behind], density, strength, rules
+        own_singular_load(
+            nodes, e, rows[:, first:behind], density, strength, rules, column[first:behind]
         )
         load[:, c] = column
     return load, area
@@ -185,22 +192,20 @@ def exterior_singular_terms(
     nodes: Nodes, rules: GaussRules, coupling: ExteriorCoupling, exterior: Exterior
 ) -> tuple[Array, Array]:
     """Compute the terms of an exterior in loads and areas of a window's singular openings."""
-    kernel = coupling.kernel
     gaps = nodes.table.shape[0]
-    load = np.zeros((kernel.shape[0], 2 * gaps))
+    place, strength = np.zeros(2 * gaps), np.zeros(2 * gaps)
     area = np.zeros(2 * gaps)
-    place, strength = np.empty(1), np.empty(1)
-    for k in range(gaps - 1):
-        for side in range(2):
-            e = 2 * k + side
-            density, strength[0], _ = end_singularity(nodes, e, rules)
-            place[0] = nodes.table[k, LEFT + side]
-            at_edge, _ = exterior_kernel(place, strength, exterior)
-            for a in range(kernel.shape[1]):
-                area[e] += at_edge[0, a] * exterior.charge[a, 1]
-                for i in range(kernel.shape[0]):
-                    load[i, e] += coupling.response[i, a] * at_edge[0, a]
-            for j in range(density.shape[0]):
-                for a in range(kernel.shape[1]):
-                    area[e] += density[j] * kernel[nodes.offset[k] + j, a] * exterior.charge[a, 1]
+    by_node = coupling.kernel @ np.ascontiguousarray(exterior.charge[:, 1])
+    work = np.empty(by_node.shape[0])
+    for e in range(2 * gaps - 2):
+        k = e // 2
+        first, behind = nodes.offset[k], nodes.offset[k + 1]
+        density = work[: behind - first]
+        strength[e], _ = end_singularity(nodes, e, rules, density)
+        place[e] = nodes.table[k, LEFT + e % 2]
+        for j in range(first, behind):
+            area[e] += density[j - first] * by_node[j]
+    at_edge, _ = exterior_kernel(place, strength, exterior)
+    area += at_edge @ np.ascontiguousarray(exterior.charge[:, 1])
+    load = coupling.response @ np.ascontiguousarray(at_edge.T)
     return load, area

@@ -219,10 +219,9 @@ def _panel_nodes(
 
 
 @compiled
-def _short_gap(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Array, int]:
+def _fill_short_gap(gap: Array, panels: Panels, nodes: Array) -> None:
     """Put Gauss-Chebyshev nodes of the first kind in η: they serve s_n and s^± alike."""
-    count = max(3 * panels.x.shape[0] + 6, 2 * modes)
-    nodes = np.empty((2 + fields, count))
+    count = nodes.shape[1]
     for i in range(count):
         t = (i + 0.5) * np.pi / count
         theta, stretch = theta_at(gap, np.cos(t))
@@ -232,7 +231,6 @@ def _short_gap(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Arr
         nodes[_STRESS, i] = weight * value_at(panels.stress, theta / panels.width)
         if nodes.shape[0] > _SLOPE:
             nodes[_SLOPE, i] = weight * value_at(panels.slope, theta / panels.width)
-    return nodes, count
 
 
 @compiled
@@ -242,7 +240,9 @@ def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Arra
     right = gap[RIGHT]
     width = panels.width
     if right - left <= SHORT_GAP_PANELS * width:
-        return _short_gap(gap, modes, panels, fields)
+        nodes = np.empty((2 + fields, max(3 * panels.x.shape[0] + 6, 2 * modes)))
+        _fill_short_gap(gap, panels, nodes)
+        return nodes, nodes.shape[1]
     first = int(np.floor(left / width)) + 2  # an end piece is one to two finest panels long
     last = int(np.ceil(right / width)) - 2
     levels = panels.level_start.shape[0]
