@@ -22,12 +22,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.profile import Array
 from adhesis.solver.views import Shown
 
-Patches = list[list[float]]
-Indices = list[int]
+Integers = NDArray[np.int64]
+
 
 Branch = Literal["loading", "unloading"]
 BRANCHES: tuple[Branch, ...] = get_args(Branch)
@@ -143,22 +146,22 @@ def classify(before: Array, after: Array, period: float) -> tuple[JumpKind, floa
     period : float
         λ in m.
     """
-    touched_by, touching, length = _compare(before.tolist(), after.tolist(), period)
-    if not touching:
+    touched_by, touching, length = _compare(before, after, period)
+    if len(after) == 0:
         return "pull-off", length
-    if min(touching) == 0:
+    if touching.min() == 0:
         return "snap-in", length
-    if max(touching) > 1:
+    if touching.max() > 1:
         return "merging", length
-    if min(touched_by) == 0:
+    if touched_by.min() == 0:
         return "vanishing", length
-    if max(touched_by) > 1:
+    if touched_by.max() > 1:
         return "splitting", length
     grown = (after[:, 1] - after[:, 0]).sum() - (before[:, 1] - before[:, 0]).sum()
     return ("spreading" if grown >= 0 else "receding"), length
 
 
-def _compare(before: Patches, after: Patches, period: float) -> tuple[Indices, Indices, float]:
+def _compare(before: Array, after: Array, period: float) -> tuple[Integers, Integers, float]:
     """Count the overlaps of each patch before with those after, and the reverse.
 
     Also returns the length of the largest patch, before or after, that is not the same in both.
@@ -172,34 +175,26 @@ def _compare(before: Patches, after: Patches, period: float) -> tuple[Indices, I
     return touched_by, touching, length
 
 
-def _overlapping(patches: Patches, others: Patches, period: float) -> tuple[Indices, Indices]:
+def _overlapping(patches: Array, others: Array, period: float) -> tuple[Integers, Integers]:
     """Count, for each patch, the ``others`` that overlap it on the circle; returns the first too.
 
     Patches of one state do not overlap, so their left and right edges have the same order.
     """
-    turns = [[turn * period + edge for edge in other] for turn in (-1, 0, 1) for other in others]
-    hits, firsts = [], []
-    begin = behind = 0
-    for left, right in patches:
-        while begin < len(turns) and turns[begin][1] <= left:
-            begin += 1
-        while behind < len(turns) and turns[behind][0] < right:
-            behind += 1
-        hits.append(min(max(behind - begin, 0), len(others)))
-        firsts.append(begin % max(len(others), 1))
-    return hits, firsts
+    turns = np.concatenate([others - period, others, others + period])
+    begin = np.searchsorted(turns[:, 1], patches[:, 0], side="right")
+    behind = np.searchsorted(turns[:, 0], patches[:, 1])
+    return np.clip(behind - begin, 0, len(others)), begin % max(len(others), 1)
 
 
 def _longest_changed(
-    patches: Patches, others: Patches, hits: Indices, firsts: Indices, period: float
+    patches: Array, others: Array, hits: Integers, firsts: Integers, period: float
 ) -> float:
     """Measure the longest of the patches that are not one of the ``others``."""
-    longest = 0.0
-    for (left, right), count, first in zip(patches, hits, firsts, strict=True):
-        if count == 1:
-            offset = (left - others[first][0] + period / 2) % period - period / 2
-            change = (right - left) - (others[first][1] - others[first][0])
-            if max(abs(offset), abs(change)) < 1e-12 * period:
-                continue
-        longest = max(longest, right - left)
-    return longest
+    length = patches[:, 1] - patches[:, 0]
+    single = np.flatnonzero(hits == 1)
+    other = others[firsts[single]]
+    offset = (patches[single, 0] - other[:, 0] + period / 2) % period - period / 2
+    change = length[single] - (other[:, 1] - other[:, 0])
+    changed = np.ones(len(patches), dtype=np.bool_)
+    changed[single] = np.maximum(np.abs(offset), np.abs(change)) >= 1e-12 * period
+    return float(length[changed].max(initial=0.0))
