@@ -54,11 +54,16 @@ class EdgeMechanics(EdgeProblem):
         """Whether these gaps are followed in windows."""
         return self.system(gaps).uses_windows
 
-    def field(self, gaps: Array, prescribed: float, *, share: float = 1.0) -> GapField:
-        """Solve the field of these gaps, to a ``share`` of the tolerance."""
+    def field(self, gaps: Array, prescribed: float) -> GapField:
+        """Solve the field of these gaps."""
         self.count.fields += 1
-        solution = self.system(gaps).solution(gaps, prescribed, share)
-        return self.solved(gaps, prescribed, solution, share)
+        return self.solved(gaps, prescribed, self.system(gaps).solution(gaps, prescribed, 1.0, 2))
+
+    def finer_openings(self, gaps: Array, prescribed: float, share: float) -> Array:
+        """Solve these gaps to a ``share`` of the tolerance; returns C at their edges, (L, 2)."""
+        self.count.fields += 1
+        opening = self.system(gaps).solution(gaps, prescribed, share, 1).opening
+        return opening.reshape(gaps.shape)
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).

@@ -315,8 +315,8 @@ class Follower:
 
         The error of the openings is their difference from those of a more accurate field.
         """
-        finer = self.edges.field(point.gaps, point.at, share=FINER_FIELD)
-        return abs(point.fold_displacement(finer.opening - point.field.opening))
+        finer = self.edges.finer_openings(point.gaps, point.at, FINER_FIELD)
+        return abs(point.fold_displacement(finer - point.field.opening))
 
     def _is_near(self, point: Point, after: Point | None, share: float) -> bool:
         """Whether no edge moved by as much as this ``share`` of λ_min in a descent."""

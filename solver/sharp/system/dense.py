@@ -30,12 +30,12 @@ class DenseSystem(EdgeSystem):
     uses_windows: ClassVar[bool] = False
     closing_factor: ClassVar[float] = FASTEST_CLOSING
 
-    def solution(self, gaps: Array, prescribed: float, share: float) -> Solution:
-        """Solve the field of these gaps to a ``share`` of the tolerance."""
+    def solution(self, gaps: Array, prescribed: float, share: float, fields: int) -> Solution:
+        """Solve these gaps to a ``share`` of the tolerance, with S or (two fields) S and S'."""
         problem = self._problem
         model = problem.model._replace(digits=float(-np.log(share * problem.tolerance)))
         orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-        solution: Solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
+        solution: Solution = solve(gaps, prescribed, orders, fields, model, NO_EXTERIOR)
         return solution
 
     def stiffness(self, point: Point, edges: Integers) -> Array:

@@ -42,8 +42,8 @@ class EdgeSystem(ABC):
         self._problem = problem
 
     @abstractmethod
-    def solution(self, gaps: Array, prescribed: float, share: float) -> Solution:
-        """Solve the field of these gaps to a ``share`` of the tolerance."""
+    def solution(self, gaps: Array, prescribed: float, share: float, fields: int) -> Solution:
+        """Solve these gaps to a ``share`` of the tolerance, with S or (two fields) S and S'."""
 
     @abstractmethod
     def stiffness(self, point: Point, edges: Integers) -> Array:

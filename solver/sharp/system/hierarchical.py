@@ -31,12 +31,12 @@ class HierarchicalSystem(EdgeSystem):
     uses_windows: ClassVar[bool] = True
     closing_factor: ClassVar[float] = CLOSING_OF_MANY
 
-    def solution(self, gaps: Array, prescribed: float, share: float) -> Solution:
-        """Solve the field of these gaps to a ``share`` of the tolerance."""
+    def solution(self, gaps: Array, prescribed: float, share: float, fields: int) -> Solution:
+        """Solve these gaps to a ``share`` of the tolerance, with S or (two fields) S and S'."""
         problem = self._problem
         model = problem.model._replace(digits=problem.model.digits - math.log(share))
         orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-        solution: Solution = solve_many(gaps, prescribed, orders, 2, model)[0]
+        solution: Solution = solve_many(gaps, prescribed, orders, fields, model)[0]
         return solution
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
