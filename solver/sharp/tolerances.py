@@ -162,6 +162,8 @@ MODEL_SHARE = 0.1
 """Of the distance of an opening from its critical value: the error that is allowed in addition."""
 MODEL_STEP = 2.0
 """Longest steps (0.1 λ_min) of one step through the model: longer ones leap over pinned minima."""
+LONG_CLOSING = 0.45
+"""Share of a gap or patch by which each of its edges may shorten it in a long step."""
 MODEL_STEPS = 200
 """Steps through the model in one step of a descent."""
 RUNNING_ENDS = 0.01

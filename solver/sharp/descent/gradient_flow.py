@@ -56,7 +56,7 @@ from adhesis.solver.sharp.equilibrium.griffith import (
 from adhesis.solver.sharp.field.solution import FieldModel, no_solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
-from adhesis.solver.sharp.tolerances import COMPARISONS, LEAST_REACH, RUNNING_LENGTH
+from adhesis.solver.sharp.tolerances import COMPARISONS, LEAST_REACH, LONG_CLOSING, RUNNING_LENGTH
 
 # Events that end a descent.
 AT_REST = 0  # the steps have become short: Newton's iteration finds the equilibrium
@@ -204,14 +204,14 @@ def next_step(
     field could judge that.
     """
     law, panels = system.law, system.model.panels
-    opening, table = now.solution.opening, now.solution.nodes.table
+    table = now.solution.nodes.table
     none = np.empty((0, 0))
     if size.reach >= LEAST_REACH and not near_balance(norm(now.slope), strongest, law):
-        limit = step_limits(table, size.reach * law.longest_step)
-        model = model_about(gaps, now, tangent, panels)
-        flow = flow_through(gaps, opening, model, limit, equal_speeds, strongest, law, panels)
+        limit = step_limits(table, size.reach * law.longest_step, LONG_CLOSING)
+        model = model_about(gaps, now, tangent, law, panels)
+        flow = flow_through(model, limit, equal_speeds, strongest, law, panels)
         length = np.abs(flow.motion).max()
-        if length > RUNNING_LENGTH * law.longest_step:
+        if flow.is_at_limit or length > RUNNING_LENGTH * law.longest_step:
             end = flow.points[-1].copy().reshape(gaps.shape)
             if not shortest_length(end) < law.smallest:
                 return Step(end, flow.motion, length, flow, none), 0

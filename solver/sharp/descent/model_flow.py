@@ -19,7 +19,6 @@ from adhesis.solver.sharp.descent.edge_model import (
     EdgeModel,
     advance,
     evaluate,
-    initial_state,
     model_forces,
     model_hessian,
 )
@@ -55,6 +54,8 @@ class ModelFlow(NamedTuple):
         C - C_c of the model after each step.
     interaction : array, shape (2L, 2L)
         Force, as C², that the motion of each edge (columns) took from every edge (rows).
+    is_at_limit : bool
+        Whether an edge came to its limit.
     """
 
     motion: Array
@@ -63,59 +64,58 @@ class ModelFlow(NamedTuple):
     lengths: Array
     residuals: Array
     interaction: Array
+    is_at_limit: bool
 
 
 @compiled
 def no_flow() -> ModelFlow:
     """Make a flow without points."""
     none, nothing = np.empty((0, 0)), np.empty(0)
-    return ModelFlow(nothing, nothing, none, nothing, none, none)
+    return ModelFlow(nothing, nothing, none, nothing, none, none, False)
 
 
 @compiled
 def flow_through(
-    gaps: Array, opening: Array, model: EdgeModel, limit: Array, equal_speeds: bool,
-    strongest: float, law: EdgeLaw, panels: Panels,
+    model: EdgeModel, limit: Array, equal_speeds: bool, strongest: float, law: EdgeLaw,
+    panels: Panels,
 ) -> ModelFlow:  # fmt: skip
     """Follow the flow until an edge is at its limit, or near balance.
 
-    ``strongest`` is the largest norm of the forces on the way so far.
+    ``model`` goes along with the edges. ``strongest`` is the largest norm of the forces on the way
+    so far.
     """
-    state = initial_state(gaps, opening, model, law, panels)
-    edges = opening.shape[0]
+    edges = model.opening.shape[0]
     points, residuals = np.empty((MODEL_STEPS, edges)), np.empty((MODEL_STEPS, edges))
     lengths = np.empty(MODEL_STEPS)
     interaction, matrix = np.zeros((edges, edges)), np.empty((edges, edges))
     force, step = np.empty(edges), np.empty(edges)
     factor = np.empty((edges, padded(edges)))
     longest = MODEL_STEP * law.longest_step
-    count, length = 0, 0.0
-    while count < MODEL_STEPS:
-        model_forces(state, force)
+    count, length, share = 0, 0.0, 1.0
+    while count < MODEL_STEPS and share == 1:
+        model_forces(model, force)
         total = norm(force)
         strongest = max(strongest, total)
         if near_balance(total, strongest, law):
             break
-        model_hessian(state, model, matrix)
+        model_hessian(model, matrix)
         size = implicit_step(matrix, force, longest, equal_speeds, factor, step)
         if not size > RUNNING_ENDS * law.longest_step:
             break
-        share = share_within(state.motion, step, limit)
+        share = share_within(model.motion, step, limit)
         if share < 1:
             step *= share
         add_forces(matrix, step, interaction)
-        advance(state, step, model)
-        evaluate(state, model, law, panels)
-        points[count] = state.theta
-        residuals[count] = state.opening - state.critical
-        length = max(length, largest(state.motion))
+        advance(model, step)
+        evaluate(model, law, panels)
+        points[count] = model.theta
+        residuals[count] = model.opening - model.critical
+        length = max(length, largest(model.motion))
         lengths[count] = length
         count += 1
-        if share < 1:
-            break
     return ModelFlow(
-        state.motion, state.opening, points[:count], lengths[:count], residuals[:count],
-        interaction,
+        model.motion, model.opening, points[:count], lengths[:count], residuals[:count],
+        interaction, share < 1,
     )  # fmt: skip
 
 

@@ -167,12 +167,12 @@ def raise_orders(orders: Integers, least: Integers) -> Integers:
 
 
 @compiled
-def step_limits(table: Array, longest: float) -> Array:
+def step_limits(table: Array, longest: float, share: float = CLOSING_SHARE) -> Array:
     """Limit the step of each edge: ``longest``, or a share of the gap or patch it may close."""
     limit = np.empty(2 * table.shape[0])
     for k in range(table.shape[0]):
         length = table[k, RIGHT] - table[k, LEFT]
         for side in range(2):
-            closing = CLOSING_SHARE * min(length, table[k, LEFT_PATCH + side])
+            closing = share * min(length, table[k, LEFT_PATCH + side])
             limit[2 * k + side] = min(longest, closing)
     return limit
