@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.descent.edge_forces import (
     FlowProblem,
     Forces,
@@ -121,7 +121,7 @@ class Step(NamedTuple):
     curvature: Array
 
 
-@compiled
+@compiled_for_both
 def descend(
     gaps: Array,
     prescribed: float,

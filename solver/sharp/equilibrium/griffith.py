@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import LEFT, LEFT_PATCH, RIGHT
@@ -52,7 +52,7 @@ class EdgeLaw(NamedTuple):
     origin: float
 
 
-@compiled
+@compiled_for_both
 def shortest_length(gaps: Array) -> float:
     """Find the length of the shortest gap or patch."""
     count = gaps.shape[0]

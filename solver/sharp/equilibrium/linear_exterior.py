@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.equilibrium.edge_elimination import EliminatedEdges, eliminate_edges
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening, imbalance
 from adhesis.solver.sharp.field.cluster_tree import (
@@ -119,7 +119,7 @@ def rotate_gaps(rows: Array, first: int) -> Array:
     return out
 
 
-@compiled
+@compiled_for_both
 def open_window(
     linearisation: Linearisation,
     first: int,
@@ -244,7 +244,7 @@ def _reduce_exterior(
     )
 
 
-@compiled
+@compiled_for_both
 def exterior_motion(
     window: Array,
     prescribed: float,

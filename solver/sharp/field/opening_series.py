@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.conformal_map import (
@@ -51,7 +51,7 @@ class GapOpening:
     modes: Array
 
 
-@compiled
+@compiled_for_both
 def count_sine_nodes(gap: Array, top: int, per_wave: float) -> int:
     """Count the sine nodes of a gap of which the shortest wave holds ``per_wave``."""
     widest = 0.0
@@ -61,7 +61,7 @@ def count_sine_nodes(gap: Array, top: int, per_wave: float) -> int:
     return fast_size(int(np.ceil(0.5 * per_wave * widest * top)) + FEWEST_SINE_NODES)
 
 
-@compiled
+@compiled_for_both
 def fast_size(fewest: int) -> int:
     """Round up a number N of nodes to one that many gaps share, with a fast transform.
 
@@ -78,7 +78,7 @@ def fast_size(fewest: int) -> int:
     return 32 * eighth - 1
 
 
-@compiled
+@compiled_for_both
 def _fine_nodes(gap: Array, circle: Circle, theta: Array, span: Array) -> None:
     """Place the sine nodes of a gap, as many as ``theta`` holds: θ, falling, and dθ/dt.
 
@@ -148,7 +148,7 @@ def work_of_gaps(field: GapField) -> float:
     )
 
 
-@compiled
+@compiled_for_both
 def open_gap(
     nodes: Nodes, k: int, f: Array, circle: Circle, rules: GaussRules, panels: Panels
 ) -> tuple[Array, Array, Array, Array]:
@@ -195,7 +195,7 @@ def refine_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]
     return theta[::-1], opening[::-1]
 
 
-@compiled
+@compiled_for_both
 def sum_modes(gap: Array, theta: Array, modes: Array) -> Array:
     """Sum b_n sin((n+1)t), cos t = η(θ), over n by Clenshaw's recurrence."""
     out = np.empty(theta.shape[0])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
@@ -188,7 +188,7 @@ def no_solution(table: Array, orders: Integers, device: LoadingDevice) -> Soluti
     )
 
 
-@compiled
+@compiled_for_both
 def edge_openings(f: Array, nodes: Nodes, rules: GaussRules) -> Array:
     """Evaluate sqrt(2 dη/dθ) f(±1) at every gap end for each column of f, shape (2L, columns)."""
     slope, offset, orders = nodes.slope, nodes.offset, nodes.orders

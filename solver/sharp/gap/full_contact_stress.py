@@ -285,7 +285,7 @@ def half_plane_opening(theta: float, side: int, panels: Panels) -> tuple[float, 
     return total, rate * 2 / panels.width
 
 
-@compiled
+@compiled_for_both
 def _lengths(panel: NDArray[np.int64], share: Array, tilt: Array, nodes: Array, w: Array) -> Array:
     """Integrate sqrt(1 + h'²) over the first ``share`` of each panel, in panel widths."""
     out = np.empty(panel.shape[0])

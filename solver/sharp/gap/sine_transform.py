@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 
 _ROTATIONS = 64  # before a cosine is computed anew, so that rounding does not grow
 _THIRD = float(np.sqrt(0.75))
@@ -35,7 +35,7 @@ class Parts(NamedTuple):
     im: Array
 
 
-@compiled
+@compiled_for_both
 def tabulate_circle(count: int) -> Circle:
     """Tabulate the circle of N = ``count``, even."""
     cosine = np.empty(2 * count)
@@ -226,7 +226,7 @@ def _fourier(x: Parts, circle: Circle) -> Parts:
     return x
 
 
-@compiled
+@compiled_for_both
 def sine_sums(x: Array, circle: Circle, out: Array) -> None:
     """Set out_k to Σ_j x_j sin(π (j+1)(k+1)/N), N - 1 = len(x), with the circle of N."""
     cosine, sine = circle.cosine, circle.sine

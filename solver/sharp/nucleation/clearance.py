@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 from adhesis.solver.sharp.tolerances import (
@@ -85,7 +85,7 @@ def _low_opening(f: float, kind: int, node: int, rules: GaussRules) -> float:
     return opening
 
 
-@compiled
+@compiled_for_both
 def clearance_left(
     gaps: Array,
     nodes: Nodes,

@@ -18,7 +18,7 @@ import numpy as np
 
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import EQUAL_CRESTS, Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
@@ -79,7 +79,7 @@ class TrackedGaps(NamedTuple):
     values: Callable[[GapField], Array]
 
 
-@compiled
+@compiled_for_both
 def seed_width(curvature: float, lengths: Lengths) -> float:
     """Width of the patch that is put where surfaces with the energy Γ touch with this curvature."""
     first = (16 * lengths.surface / (np.pi * curvature**2)) ** (1 / 3)
@@ -87,7 +87,7 @@ def seed_width(curvature: float, lengths: Lengths) -> float:
     return width
 
 
-@compiled
+@compiled_for_both
 def clearances(opening: Array, curvature: Array, lengths: Lengths) -> Array:
     """As :meth:`Nucleation.clearance`."""
     out = np.empty(opening.shape[0])
@@ -101,7 +101,7 @@ def clearances(opening: Array, curvature: Array, lengths: Lengths) -> Array:
     return out
 
 
-@compiled
+@compiled_for_both
 def look_at(
     gaps: Integers, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
     out: Array,
