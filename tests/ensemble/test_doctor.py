@@ -100,7 +100,11 @@ def test_within_a_rank_it_does_not_take_itself_for_one(findings: dict[str, Any])
     nested = run_doctor(
         "--json", OMPI_COMM_WORLD_SIZE="4", OMPI_MCA_ess="pmi", PMIX_RANK="0", PMI_RANK="0"
     )
-    assert json.loads(nested.stdout)["checks"] == findings["checks"]
+    alone, within = findings["checks"], json.loads(nested.stdout)["checks"]
+    assert [check["name"] for check in within] == [check["name"] for check in alone]
+    for one, other in zip(alone, within, strict=True):
+        # code that other tests compile meanwhile is found by the second
+        assert one == other or one["name"] == "compiled code"
 
 
 def test_unwritable_folder_is_one_sentence() -> None:
