@@ -32,7 +32,7 @@ from adhesis.solver.sharp.method import SharpMethod
 COMPILED_METHODS = ("sharp", "grid")
 # Number of functions that each part compiles, numba's own included, for the progress of a
 # compilation. The code of ``sharp`` for many gaps is a part of its own: most loops never call it.
-_FUNCTIONS = {"sharp": 286, "many": 70, "grid": 12}
+_FUNCTIONS = {"sharp": 286, "many": 112, "grid": 12}
 
 __all__ = [
     "COMPILED_METHODS",

@@ -12,7 +12,6 @@ from adhesis.solver.sharp.descent.local_descent import KnownState
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
-from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation, linearise_equilibrium
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.ends import outward, widths, without_small
@@ -20,6 +19,7 @@ from adhesis.solver.sharp.system.dense import DenseSystem
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
 from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
+from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import (
     DESCENT_LIMIT,
     HIERARCHICAL_FROM,
@@ -43,7 +43,7 @@ class EdgeMechanics(EdgeProblem):
     many = HIERARCHICAL_FROM
 
     @cached_property
-    def _systems(self) -> tuple[EdgeSystem, EdgeSystem]:
+    def _systems(self) -> tuple[DenseSystem, HierarchicalSystem]:
         return DenseSystem(self), HierarchicalSystem(self)
 
     def system(self, gaps: Array) -> EdgeSystem:
@@ -59,11 +59,10 @@ class EdgeMechanics(EdgeProblem):
         self.count.fields += 1
         return self.solved(gaps, prescribed, self.system(gaps).solution(gaps, prescribed, 1.0, 2))
 
-    def finer_openings(self, gaps: Array, prescribed: float, share: float) -> Array:
-        """Solve these gaps to a ``share`` of the tolerance; returns C at their edges, (L, 2)."""
+    def finer_openings(self, field: GapField) -> Array:
+        """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
         self.count.fields += 1
-        opening = self.system(gaps).solution(gaps, prescribed, share, 1).opening
-        return opening.reshape(gaps.shape)
+        return self.system(field.gaps).finer_openings(field)
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
@@ -112,23 +111,21 @@ class EdgeMechanics(EdgeProblem):
         except np.linalg.LinAlgError:
             return None, -1
 
-    def linearisation(self, point: Point) -> Linearisation:
-        """Linearise a point of many gaps, for the windows that are set up on it."""
-        if point.linearisation is not None:
-            return point.linearisation
-        self.count.fields += 1
-        self.count.derivatives += 1
-        known: Linearisation = linearise_equilibrium(
-            point.gaps, point.at, point.field.solution.nodes.orders, self.law, self.model
-        )
-        return known
+    @property
+    def responses(self) -> KeptResponses:
+        """Linear responses of many gaps."""
+        return self._systems[1].responses
 
     def start(self, point: Point | None) -> KnownState | None:
         """Return ``point`` as the start of a descent in a window; None for few gaps."""
         if point is None or not self.uses_windows(point.gaps):
             return None
         leads = int(np.argmax(np.abs(point.rate))) // 2
-        return KnownState(point.gaps, self.linearisation(point), leads)
+        return KnownState(self.responses, point.gaps, point.at, leads)
+
+    def forget(self) -> None:
+        """Forget what results would depend on within the error of the field."""
+        self.responses.forget()
 
     def relax(
         self,
@@ -204,6 +201,7 @@ class EdgeMechanics(EdgeProblem):
         """Descend with all gaps."""
         system, law = self.system(gaps), self.law
         left, orders, rests = DESCENT_LIMIT, _ANY, 0
+        rested = np.empty((0, 2))
         while left > 0 and rests <= 2 * RESTS:
             end = system.descend(
                 gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds
@@ -224,6 +222,9 @@ class EdgeMechanics(EdgeProblem):
                 # Next to a fold the field's error may hide whether there is a minimum; whatever
                 # is taken for it, the next step in s decides.
                 rests += 1
+                if gaps.shape == rested.shape and np.abs(gaps - rested).max() < self.settled:
+                    rests = max(rests, RESTS + 1)  # no patience changes anything
+                rested = gaps
                 patient = rests <= RESTS
                 point = self.equilibrium(gaps, prescribed, reach, orders, patient=patient)
                 if point is not None:

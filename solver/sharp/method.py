@@ -244,6 +244,7 @@ class SharpMethod(Method):
     def _history(self, state: ContactState, target: Target) -> History:
         """States and jumps from ``state`` to the target."""
         history = History()
+        self.edges.forget()
         control = self.problem.control
         at = self.states.place(state)
         # the separation of a state at the target, where it is known without rounding

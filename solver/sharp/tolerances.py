@@ -9,10 +9,11 @@ from __future__ import annotations
 
 # ---------------------------------------------------------------- field of given edges
 
-HIERARCHICAL_FROM = 30
+HIERARCHICAL_FROM = 24
 """Number of gaps from which on the tree of clusters and windows replace dense matrices.
 
-Measured: a loop of 20 gaps is 8 to 45 % slower with the tree (benchmarks/windows.py).
+Measured at the paper's scale: with 14, 18, 24 and 30, loops take 1.94, 1.98, 1.85 and 1.97 s
+of CPU at γ = 0.01 (25 patches) and 5.0, 4.9, 5.4 and 5.5 s at 0.0025 (65).
 """
 
 SHORT_GAP_PANELS = 4
@@ -88,29 +89,37 @@ it."""
 CLOSING_SHARE = 0.25
 """Share of a gap or patch by which one step of one edge may shorten it."""
 
-SHORT_SPAN = 0.3
-"""Share of the distance in d to an earlier point of a branch. A point nearer than that gives the
-edges' earlier rates with too large an error."""
+# ---------------------------------------------------------------- linear response of many gaps
 
-CHANGED_RATE = 0.3
-"""Relative change of an edge's rate in a jump above which its earlier rate no longer counts."""
-
-# ---------------------------------------------------------------- windows of few gaps among many
-
-BRANCH_WINDOW_HALF_WIDTH = 3
-"""Gaps of a window on each side of the edge that it is set up around."""
-WINDOW_LEAD_MOTION = 0.15
-"""λ_min. A motion of this length ends the stretch of an edge as a fold does."""
-EXTERIOR_MOTION = 0.05
-"""λ_min. Motion of the exterior edges up to which their response is taken as linear."""
-EXTERIOR_BEFORE_FOLD = 0.5
-"""Share of the distance to its own fold that an exterior edge may cover."""
-EXTERIOR_LEAST_SPAN = 0.1
-"""Least share of the span that the motion of the exterior allows, whatever its folds."""
-EXTERIOR_BEND = 0.5
-"""Share of its straight motion by which an exterior edge is predicted to bend at most."""
-EXTERIOR_MISSED = 0.02
-"""λ_min. An exterior edge found further than this from its prediction has lost the branch."""
+REFERENCE_SHARE = 0.05
+"""Share of a gap, or of the patch beside it, by which an edge may leave the reference of its gap's
+linear response."""
+REFERENCE_SCALE = 10.0
+"""Length, in longest steps (``LONGEST_STEP``), over which the response changes in gaps and patches
+that are longer; its error is the motion squared over it. With one longest step 352 gaps took 17 %
+more CPU time, with the same losses to 2e-5."""
+SOFT_RATE = 2.0
+"""Mean rate of all edges. Faster edges are next to a fold, where their tangent changes fast, too:
+they may leave their reference by less. Without this, descents next to folds went to and fro between
+windows and all gaps, and took half of a loop's time."""
+REFERENCE_BALANCE = 0.01
+"""C_c. Edges further out of balance in the reference of their gap, in the potentials that it had,
+follow otherwise than its response has it. Without this rates were wrong by 2e-3 after some gaps had
+been moved by 0.1 λ_min and back, and by 0.3 λ_min no equilibrium was found."""
+REFERENCE_FAR = 0.1
+"""Share of a gap or patch beyond which the potential in the old gap is not taken for that in the
+new one. At 0.3, 53 of 857 failures of Newton's iteration were of states that dense matrices find
+(γ = 0.0025 at the paper's scale), at 0.1 eight."""
+REFERENCE_MOST_FAR = 0.25
+"""Share of all gaps that may move so far before all are solved anew."""
+REFERENCE_PATCH = 0.2
+"""Share of a patch by which it may change before the nodes beside it are placed anew."""
+FURTHER_ORDERS = 2
+"""Orders by which the rule of a gap that has changed is raised beyond what it needs."""
+RESPONSES_KEPT = 3
+"""Responses that are kept, each of another number of gaps."""
+RESPONSE_TRIALS = 4
+"""Times that a response is set up for one equilibrium, where gaps need more and more nodes."""
 
 # ---------------------------------------------------------------- descent in energy
 
@@ -324,9 +333,6 @@ TRAPEZOID_FAR = 4.0
 """Of the allowed error of the trapezoidal rule: a step with more is halved."""
 QUIET_STRESS = 0.05
 """σ~. Smaller mean stresses do not tighten the trapezoidal rule."""
-FOLD_BELIEVED = 4.0
-"""A fold of an exterior edge is not trusted beyond so many times the distance of the two rates that
-predict it."""
 
 # ---------------------------------------------------------------- error of the loss
 

@@ -23,7 +23,14 @@ MATHEMATICAL = {
     # sizes of Gauss rules
     "gap/full_contact_stress.py": {"_TILT_NODES", "_PIECES_BY_SLOPE", "_HALF_PLANE_NODES"},
     "gap/sine_transform.py": {"_ROTATIONS"},
-    "descent/gradient_flow.py": {"AT_REST", "VANISHED", "STEP_LIMIT", "NO_FIELD", "REJOINED"},
+    "descent/gradient_flow.py": {
+        "AT_REST",
+        "VANISHED",
+        "STEP_LIMIT",
+        "NO_FIELD",
+        "MORE_NODES",
+        "REJOINED",
+    },
     "output/grid_fields.py": {"_FIELD_NODES", "_FINER"},  # nodes of an output, not of a loop
     # nodes and numbers of trials of a diagnosis, which no loss depends on
     "field/patch_tension.py": {"_COARSE", "_POINTS", "_MOVES"},

@@ -15,9 +15,8 @@ import pytest
 
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.sharp.continuation.branch import Branch, Target
-from adhesis.solver.sharp.continuation.events import Accepted, Fold, LostTrack
+from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
-from adhesis.solver.sharp.continuation.local_branch import LocalPoint
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
@@ -154,8 +153,6 @@ def test_a_fold_that_is_seen_is_crossed_by_one_step():
 
 def test_an_accepted_step_may_grow_twofold_and_a_bend_halves_it():
     steps, predictor = StepSize(1e-3), fixed_predictor(reach=10.0)
-    steps.restart(0.01)
-    assert steps.next(predictor, 0.0, 0.1) == -0.01
     steps.accept(-0.01, predictor)
     assert steps.next(predictor, 0.0, 0.1) == -0.02
     steps.halve(-0.02)
@@ -234,42 +231,15 @@ def test_a_vanished_patch_is_an_event():
 # ---------------------------------------------------------------------- trail and history
 
 
-def local_point(at: float, solved: Point | None) -> LocalPoint:
-    """Return a point of a window whose solution with all gaps is known, or lost."""
-    window = SimpleNamespace(
-        inside=np.array([0]),
-        edges=SimpleNamespace(wave=WAVE, correct=lambda *_: (solved, -1 if solved else 3)),
-        expected=lambda local, at: Curve().point(at).gaps,
-        continued_at=lambda point: point,
-    )
-    gaps = Curve().point(at).gaps
-    return LocalPoint(cast(Any, window), at, gaps, gaps, np.zeros(2), 0.0, 0.0, at)
-
-
-def test_a_trail_returns_to_its_last_solved_point():
+def test_a_trail_begins_anew_at_its_last_point():
     curve = Curve()
     trail = Trail(curve.point(0.9, clearance=0.5))
-    trail.add(curve.point(0.8), 0.1, None)
-    trail.add(local_point(0.7, None), 0.1, None)
-    trail.add(local_point(0.6, None), 0.1, None)
+    trail.add(curve.point(0.8), 0.1)
+    trail.add(curve.point(0.7), 0.2)
+    assert ([p.at for p in trail.points], trail.clearance) == ([0.9, 0.8, 0.7], 0.5)
     assert trail.closed == pytest.approx(0.3)
-    with pytest.raises(LostTrack) as lost:
-        trail.confirm()
-    assert (lost.value.edge, lost.value.at) == (3, 0.6)
-    point, window = trail.return_to_solved()
-    assert (point.at, window) == (0.8, None)
-    assert [p.at for p in trail.points] == [0.9, 0.8]
-    assert trail.closed == pytest.approx(0.1)
     trail.restart(0.4)
-    assert ([p.at for p in trail.points], trail.clearance, trail.closed) == ([0.8], 0.4, 0.0)
-
-
-def test_a_point_of_a_window_is_confirmed_in_its_place():
-    curve = Curve()
-    trail = Trail(curve.point(0.9))
-    trail.add(local_point(0.8, curve.point(0.8)), 0.1, None)
-    assert not isinstance(trail.confirm(), LocalPoint)
-    assert trail.return_to_solved()[0].at == 0.8
+    assert ([p.at for p in trail.points], trail.clearance, trail.closed) == ([0.7], 0.4, 0.0)
 
 
 def test_a_jump_is_written_once_and_whole():

@@ -10,15 +10,17 @@ import pytest
 from adhesis import HalfSpace, Problem, self_affine_profile
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.equilibrium.branch_point import Point
-from adhesis.solver.sharp.equilibrium.edge_elimination import eliminate_edges, newton_step
 from adhesis.solver.sharp.equilibrium.griffith import (
     edge_tangent,
     imbalance,
     move_edges,
     symmetrise,
 )
-from adhesis.solver.sharp.equilibrium.last_correction import correct_gaps
-from adhesis.solver.sharp.equilibrium.linear_exterior import linearise_equilibrium, open_window
+from adhesis.solver.sharp.equilibrium.linear_exterior import open_window
+from adhesis.solver.sharp.equilibrium.linear_response import (
+    respond,
+    solve_response,
+)
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.field.cluster_tree import build_tree
@@ -26,6 +28,7 @@ from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
+from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import with_patches
@@ -33,6 +36,7 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import CORRECTED
 from tests.support import next_to_a_fold
 
@@ -116,14 +120,14 @@ def test_newton_step_and_stability_equal_the_dense_ones(profile):
     verdicts = set()
     for seed in range(12):
         gaps = random_gaps(6, 0.1 + 0.06 * seed, 0.1, seed)
-        of, orders, residual, drift, tangent = opened(gaps, edges, separation)
+        of, orders, residual, _, tangent = opened(gaps, edges, separation)
         assert of.opening.min() > 0
         step = np.linalg.solve(tangent, -residual)
         stable = is_definite(symmetrise(of, tangent, edges.law.overlap_limit)[1])
-        tree, system = solve_many(gaps, separation, orders, 2, edges.model)
-        eliminated = eliminate_edges(tree, system, residual, drift, GAUSS_RULES)
-        found = newton_step(tree, system, eliminated, FIXED_SEPARATION)
-        assert np.abs(found.step - step).max() < 1e-3 * np.abs(step).max()
+        response, has_field = respond(gaps, separation, orders, edges.law, edges.model)
+        assert has_field
+        found = solve_response(response, separation, FIXED_SEPARATION)
+        assert np.abs(found.motion - step).max() < 1e-3 * np.abs(step).max()
         assert found.stable == stable
         verdicts.add(stable)
     assert False in verdicts
@@ -142,27 +146,106 @@ def loaded(profile):
 def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded):
     """Openings and pressure after Newton's step against those of all gaps solved anew."""
     method, state = loaded
-    edges = method.edges
+    edges, gaps = method.edges, state.internal.gaps
     law, model = edges.law, edges.model
-    orders = choose_orders(map_gaps(state.internal.gaps), model.digits, GAUSS_RULES.counts)
+    orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
     wrong, moved = [], []
     for way in (4e-3, 2e-3):
         at = state.separation * method.q0 * (1 - way)
-        of, system = solve_many(state.internal.gaps, at, orders, 2, model)
-        residual, drift = imbalance(of, law, model.panels)
-        eliminated = eliminate_edges(of, system, residual, drift, GAUSS_RULES)
-        newton = newton_step(of, system, eliminated, model.device)
+        response, _ = respond(gaps, at, orders, law, model)
+        newton = solve_response(response, at, model.device)
         assert newton.stable
-        ends = move_edges(state.internal.gaps, newton.step)
-        after, _ = correct_gaps(ends, at, of, system, newton.change, model)
+        ends = move_edges(gaps, newton.motion)
+        potential = response.potential[:, : len(response.nodes.theta)]
+        after = solve_separately(
+            ends, map_gaps(gaps), orders, potential[0] + newton.pressure * potential[1],
+            newton.pressure, at, model,
+        )  # fmt: skip
         anew, _ = solve_many(ends, at, orders, 2, model)
+        before, _ = solve_many(gaps, at, orders, 2, model)
         scale = np.abs(anew.opening).max()
         wrong.append(np.abs(after.opening - anew.opening).max() / scale)
-        moved.append(np.abs(of.opening - anew.opening).max() / scale)
+        moved.append(np.abs(before.opening - anew.opening).max() / scale)
         assert after.nodes.weight @ after.scaled_opening == pytest.approx(2 * np.pi * at, rel=1e-12)
         assert after.pressure == pytest.approx(anew.pressure, rel=1e-2 * moved[-1])
     assert wrong[0] < 1e-2 * moved[0]
     assert wrong[1] < 0.3 * wrong[0]
+
+
+@pytest.fixture
+def hierarchical(loaded):
+    """Edges of many gaps, and a point of theirs."""
+    method, state = loaded
+    edges, before = method.edges, method.edges.many
+    edges.many = 6
+    yield edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)
+    edges.many = before
+
+
+def relaxed(edges, gaps, at):
+    """Return the minimum that a descent from these gaps leads to."""
+    found = edges.relax(gaps, at, edges.wave)
+    while not isinstance(found, Point):
+        found = edges.relax(found, at, edges.wave)
+    return found
+
+
+@pytest.mark.parametrize("motion", [1e-5, 1e-3, 1e-2, 0.1, 0.3])
+def test_an_equilibrium_does_not_depend_on_the_response_that_was_known(hierarchical, motion):
+    """References move with edges that go near and far, are passed on, and come back: one state.
+
+    Openings, rates and pressure are those of a response set up there from nothing.
+    """
+    edges, point = hierarchical
+    at = point.at
+    edges.forget()
+    anew = edges.equilibrium(point.gaps, at, edges.wave)
+    moved = point.gaps.copy()
+    moved[2::5] += motion * edges.wave * np.array([-0.5, 1.0])
+    edges.responses.at(moved, at)
+    assert edges.responses.at(moved, at).settled is moved
+    back = edges.equilibrium(point.gaps, at, edges.wave)
+    assert np.abs(back.gaps - anew.gaps).max() < 0.1 * edges.coarse
+    assert np.abs(back.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
+    assert back.pressure == pytest.approx(anew.pressure, rel=1e-6)
+    scale = np.abs(anew.field.opening).max()
+    assert np.abs(back.field.opening - anew.field.opening).max() < 1e-5 * scale
+
+
+def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(hierarchical):
+    """A patch less, and one more: that of the other gaps is taken over, with the same result."""
+    edges, point = hierarchical
+    gaps, at = point.gaps, point.at
+    fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
+    end = relaxed(edges, fewer, at)
+    assert len(end.gaps) < len(gaps)
+    for known, wanted in ((gaps, end.gaps), (end.gaps, gaps)):
+        edges.forget()
+        anew = edges.equilibrium(wanted, at, edges.wave)
+        edges.forget()
+        edges.responses.at(known, at)
+        again = edges.equilibrium(wanted, at, edges.wave)
+        assert np.abs(again.gaps - anew.gaps).max() < 0.1 * edges.coarse
+        assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
+
+
+def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
+    """A jump and its rival need two in turn; what is forgotten is set up anew."""
+    method, state = loaded
+    edges, gaps = method.edges, state.internal.gaps
+    at = state.separation * method.q0
+    kept = KeptResponses(edges)
+    first = kept.at(gaps, at)
+    assert kept.at(gaps, at) is first
+    fewer = np.concatenate([gaps[:4], [[gaps[4, 0], gaps[5, 1]]], gaps[6:]])
+    assert kept.near(fewer, at, np.empty(0, dtype=np.int64)) is not first
+    version = first.version
+    assert kept.at(gaps, at) is first
+    assert first.version == version
+    assert kept.at(gaps.copy(), at) is first  # equal gaps, but not those that it was solved for
+    assert first.version > version
+    kept.forget()
+    assert kept.at(gaps, at) is not first
 
 
 @pytest.mark.parametrize("follow", [False, True])
@@ -180,16 +263,13 @@ def test_a_window_responds_to_all_other_gaps(loaded, follow):
     first = count - 2
     inside = (first + np.arange(4)) % count  # across the end of the period
     model, panels = edges.model, edges.model.panels
-    linear = linearise_equilibrium(gaps, separation, orders, edges.law, model)
-    window, exterior, _ = open_window(
-        linear, first, 4, np.inf if follow else 0.0, edges.law, model
-    )
-    tree, system = solve_many(gaps, separation, orders, 2, model)
-    balance = imbalance(tree, edges.law, panels)
-    eliminated = eliminate_edges(tree, system, *balance, GAUSS_RULES)
-    newton = newton_step(tree, system, eliminated, model.device)
+    response, _ = respond(gaps, separation, orders, edges.law, model)
+    newton = solve_response(response, separation, model.device)
     assert newton.stable
-    assert np.abs(newton.step).max() < 1e-3 * edges.wave  # an equilibrium for the tree, too
+    assert np.abs(newton.motion).max() < 1e-3 * edges.wave  # an equilibrium for the tree, too
+    window, exterior, _ = open_window(
+        response, gaps, first, 4, np.inf if follow else 0.0, edges.law, model
+    )
     if not follow:
         # exact for whatever the window's edges do
         motion = 0.02 * edges.wave * np.random.default_rng(0).standard_normal((4, 2))
@@ -322,28 +402,17 @@ def test_a_window_that_comes_to_where_it_has_no_field_is_left():
     assert np.abs(ends[0] - ends[1]).max() < 1e-3 * edges.wave
 
 
-@pytest.fixture
-def in_windows(loaded):
-    """Edges that are moved in windows, and a point of theirs with what windows need."""
-    method, state = loaded
-    edges, before = method.edges, method.edges.many
-    edges.many = 6
-    yield edges, edges.equilibrium(state.internal.gaps, state.separation * method.q0, edges.wave)
-    edges.many = before
-
-
-def test_outside_a_window_gaps_follow_to_second_order(in_windows):
+def test_outside_a_window_gaps_follow_to_second_order(hierarchical):
     """Where the window is solved, the others are expected where they are: error as step squared."""
-    edges, point = in_windows
+    edges, point = hierarchical
     lead = int(np.argmax(np.abs(point.rate))) // 2
     count = len(point.gaps)
-    window = Window(
-        point.gaps, point.linearisation, lead - 2, count - 3, edges.law, edges.model
-    )
     errors = []
     for share in (0.0, 1.0, 0.5):
         at = point.at - share * 0.02 * edges.wave / np.abs(point.rate).max()
         full = edges.equilibrium(point.extrapolate(at), at, edges.wave)
+        response = edges.responses.at(point.gaps, point.at).response
+        window = Window(point.gaps, response, lead - 2, count - 3, edges.law, edges.model)
         local = window.gaps.copy()
         local[:-1] += (full.gaps - point.gaps)[(lead - 2 + np.arange(count - 3)) % count]
         expected = window.extend(local, window.orders, at)
@@ -353,9 +422,9 @@ def test_outside_a_window_gaps_follow_to_second_order(in_windows):
     assert errors[1] < 2e-3
 
 
-def test_a_descent_begun_in_a_window_ends_where_one_of_all_gaps_does(in_windows):
+def test_a_descent_begun_in_a_window_ends_where_one_of_all_gaps_does(hierarchical):
     """From a seed in the widest gap, and from edges pushed out of balance."""
-    edges, point = in_windows
+    edges, point = hierarchical
     widest = int(np.argmax(np.diff(point.gaps, axis=1)))
     seeded = with_patches(
         point.gaps, point.gaps[widest].mean(keepdims=True), np.array([0.3 * edges.wave])
@@ -366,8 +435,8 @@ def test_a_descent_begun_in_a_window_ends_where_one_of_all_gaps_does(in_windows)
         ends = []
         for start in (None, edges.start(point)):
             found = edges.relax(gaps, point.at, edges.wave, start=start)
-            while not isinstance(found, Point):
-                found = edges.relax(found, point.at, edges.wave)
+            if not isinstance(found, Point):
+                found = relaxed(edges, found, point.at)
             ends.append(found.gaps)
         assert ends[0].shape == ends[1].shape
         assert np.abs(ends[0] - ends[1]).max() < 0.01 * edges.wave

@@ -7,14 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from adhesis.solver.model.jump import Branch as BranchName
-from adhesis.solver.sharp.continuation.corrector import correct, correct_in_window
-from adhesis.solver.sharp.continuation.events import Accepted, Fold, LostTrack
-from adhesis.solver.sharp.continuation.local_branch import (
-    LocalBranch,
-    LocalPoint,
-    around_edge,
-    confirmed,
-)
+from adhesis.solver.sharp.continuation.corrector import correct
+from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
@@ -66,8 +60,6 @@ class Branch:
     trail : Trail
         Accepted points since the last search for touches.
     steps : StepSize
-    in_windows : bool
-        Whether the next steps are taken in windows.
     """
 
     def __init__(
@@ -90,9 +82,6 @@ class Branch:
         self.steps = StepSize(resolution.jump)
         # straight after a jump or turn: short steps there keep the integral exact
         self._predictor = Predictor(point)
-        self.in_windows = edges.uses_windows(point.gaps)
-        self._window: LocalBranch | None = None  # of the point that is predicted from
-        self._returned_to: Point | None = None
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
 
     def advance(self) -> Accepted | Fold:
@@ -101,33 +90,23 @@ class Branch:
             step = self._next_step()
             left = self._target.at - self.point.at
             at = self._target.at if step == left else self.point.at + step
-            try:
-                reached, window = self._correct(step, at)
-                if reached is None:
-                    if self.in_windows and self.steps.is_smallest(step):
-                        self.point = self.trail.confirm()
-                    if self.steps.reject(step, self._predictor):
-                        continue
-                    return Fold(self.point, at)
-                examined = self._examine(reached, step)
-            except LostTrack as lost:
-                self._return_to_solved(lost)
-                continue
+            reached = self._correct(step, at)
+            if reached is None:
+                if self.steps.reject(step, self._predictor):
+                    continue
+                return Fold(self.point, at)
+            examined = self._examine(reached, step)
             if examined is None:
                 self.steps.halve(step)
                 continue
             event, closed = examined
-            self._accept(event, closed, step, window)
+            self._accept(event, closed, step)
             return event
-
-    def solve_all_gaps(self) -> None:
-        """Take the next step with all gaps, not in a window."""
-        self.in_windows, self._predictor = False, Predictor(self.point)
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
-        self.trail.add(point, self._closing.over(self.point, point, self._target.branch), None)
-        self.point, self._predictor, self._window = point, Predictor(point), None
+        self.trail.add(point, self._closing.over(self.point, point, self._target.branch))
+        self.point, self._predictor = point, Predictor(point)
         self.steps.forget_failures()
 
     def _next_step(self) -> float:
@@ -137,30 +116,18 @@ class Branch:
         motion = FIRST_MOTION if short else PREDICTED_MOTION
         return self.steps.next(predictor, self._target.at, motion * edges.wave)
 
-    def _correct(self, step: float, at: float) -> tuple[Point | None, LocalBranch | None]:
-        """Return the equilibrium at d = ``at``, if it is within reach, and the window it is in."""
+    def _correct(self, step: float, at: float) -> Point | None:
+        """Return the equilibrium at d = ``at``, if it is within reach."""
         predictor = self._predictor
         no_fold = math.isinf(predictor.fold_distance)
         if no_fold and predictor.fastest * abs(step) > 2 * PREDICTED_MOTION * self._edges.wave:
-            return None, None
-        if not (self.in_windows and self._edges.uses_windows(predictor.point.gaps)):
-            return correct(self._edges, predictor, at), None
-        reached, window = correct_in_window(self._edges, predictor, at, self._window)
-        if not isinstance(predictor.point, LocalPoint) and window is not self._window:
-            self._window = window
-            if predictor.point is self.trail.points[-1]:
-                self.trail.open_window(window)
-        return reached, window
+            return None
+        return correct(self._edges, predictor, at)
 
     def _examine(self, reached: Point, step: float) -> tuple[Accepted, float] | None:
         """Return a point as an accepted one, and how far a gap may have closed on the way.
 
         None if the step to it is too long for the integral.
-
-        Raises
-        ------
-        LostTrack
-            If its state is needed, and it is no equilibrium of all edges.
         """
         error = max(
             self._trapezoid_error(self._output, reached), self._work_error(self._output, reached)
@@ -174,16 +141,12 @@ class Branch:
         can_halve = abs(step) > 2 * self._resolution.finest and not self.steps.crosses_fold
         if error > TRAPEZOID_FAR and can_halve:
             return None
-        if is_output or may_touch:
-            reached = confirmed(reached)
         previous = PreviousPoint(self.point.at, self.point.rate, self.point.gaps)
         return Accepted(reached.with_previous(previous), is_output, may_touch, remaining), closed
 
-    def _accept(
-        self, event: Accepted, closed: float, step: float, window: LocalBranch | None
-    ) -> None:
-        self.trail.add(event.point, closed, window)
-        self.point, self._window = event.point, window
+    def _accept(self, event: Accepted, closed: float, step: float) -> None:
+        self.trail.add(event.point, closed)
+        self.point = event.point
         self._work_before = (0.0, math.inf)
         if event.is_output:
             self._output = event.point
@@ -191,21 +154,6 @@ class Branch:
             return  # no further step is taken
         self._predictor = Predictor(event.point)
         self.steps.accept(step, self._predictor)
-        self.in_windows = self._edges.uses_windows(event.point.gaps)
-
-    def _return_to_solved(self, lost: LostTrack) -> None:
-        """Go back to the last solved point; a lost edge of the exterior gets a window."""
-        self.point, self._window = self.trail.return_to_solved()
-        window = None
-        if self.point is not self._returned_to:
-            window = around_edge(self._edges, self.point, lost.edge, self._window)
-        if window is not None:
-            self._window = window
-            self.trail.open_window(window)
-        self.in_windows = window is not None
-        self._returned_to = self.point
-        self._predictor = Predictor(self.point)
-        self.steps.restart(0.5 * abs(lost.at - self.point.at))
 
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed."""
@@ -220,14 +168,14 @@ class Branch:
     def _work_error(self, output: Point, point: Point) -> float:
         """Difference of work and energy since the last output, in units of what is allowed.
 
-        Not known where the field is not that of all edges. Not asked for in steps much shorter than
+        Not asked for in steps much shorter than
         the resolution of jumps. One that a shorter step has not made smaller is no error of the
         step: energies differ by it where the number of modes of a gap changes. It is put between
         two states, and halves no further step.
         """
         span = abs(point.at - output.at)
         short = span < WORK_RESOLVED * self._resolution.jump
-        if self._imbalance is None or short or isinstance(point, LocalPoint):
+        if self._imbalance is None or short:
             return 0.0
         error = abs(self._imbalance(output, point)) / self._resolution.work
         if math.isnan(error):

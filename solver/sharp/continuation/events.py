@@ -44,19 +44,3 @@ class Fold:
 
     point: Point
     at: float
-
-
-class LostTrack(Exception):
-    """A window led to where no equilibrium of all edges is.
-
-    Attributes
-    ----------
-    edge : int
-        The edge outside the window that lost its equilibrium; -1 if it is unknown.
-    at : float
-        d of the point.
-    """
-
-    def __init__(self, edge: int, at: float) -> None:
-        super().__init__()
-        self.edge, self.at = edge, at

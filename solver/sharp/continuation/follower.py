@@ -23,11 +23,9 @@ from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import Memory, States
 from adhesis.solver.sharp.tolerances import (
-    FINER_FIELD,
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
     MOST_OPENINGS,
-    PREDICTED_MOTION,
     SAME_BRANCH,
 )
 from adhesis.solver.values import with_values
@@ -163,16 +161,11 @@ class Follower:
         last = history.states[-1] if history.states else None
         jump, refined = self._fold_jump(last, fold, target, branch.steps.finest)
         after = None if jump is None else jump.point
-        if branch.in_windows and self._is_near(fold.point, after, PREDICTED_MOTION):
-            # A window's verdict that this is a fold is not taken for that of all edges: where the
-            # descent ends nearby, the step is taken once more with all of them.
-            branch.solve_all_gaps()
-            return None
         if refined < branch.steps.finest:
             branch.steps.refine(refined)
             return None
-        goes_on = fold.at != target.at and not branch.in_windows
-        if goes_on and after is not None and self._is_near(fold.point, after, SAME_BRANCH):
+        goes_on = fold.at != target.at and self._is_near(fold.point, after, SAME_BRANCH)
+        if goes_on and after is not None:
             # Newton's iteration failed where there was no fold: the branch goes on.
             branch.continue_from(after)
             return None
@@ -195,8 +188,7 @@ class Follower:
             opened, _ = locate(self.openings, self.edges, points, self.resolution.finest, 0.0)
             start = points[0].at
             if opened is not None and (
-                touched is None
-                or abs(opened.point.at - start) < abs(touched.point.at - start)
+                touched is None or abs(opened.point.at - start) < abs(touched.point.at - start)
             ):
                 jump = self._opening_jump(opened, target)
                 if jump is not None:
@@ -315,7 +307,7 @@ class Follower:
 
         The error of the openings is their difference from those of a more accurate field.
         """
-        finer = self.edges.finer_openings(point.gaps, point.at, FINER_FIELD)
+        finer = self.edges.finer_openings(point.field)
         return abs(point.fold_displacement(finer - point.field.opening))
 
     def _is_near(self, point: Point, after: Point | None, share: float) -> bool:

@@ -77,8 +77,6 @@ class Jumps:
                 if not self._alike(rival, point):
                     other = self._after(before, rival, at)
         jump = self.states.jump(before, after, branch, other, barrier)
-        if known is not None and point is not None and self.edges.uses_windows(point.gaps):
-            point = point.carry_rates(known, CORRECTED * self.edges.wave)
         return ComputedJump(at, (after,), jump, point)
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:

@@ -74,10 +74,6 @@ class StepSize:
         sees_fold = math.isfinite(ahead.fold_distance)
         self._failed = self._failed - abs(step) if sees_fold else math.inf
 
-    def restart(self, largest: float) -> None:
-        """Begin again from an earlier point, with a step of ``largest`` at most."""
-        self._largest, self._failed = largest, math.inf
-
     def forget_failures(self) -> None:
         """Go on from where a fold turned out to be none."""
         self.crosses_fold, self._failed = False, math.inf

@@ -9,6 +9,7 @@ vanishing patches inside it. Where it comes to rest all gaps are solved once mor
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from adhesis.solver.sharp.descent.edge_forces import FlowProblem
 from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD, VANISHED, Descent, descend
 from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
-from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation
+from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.ends import without_small
@@ -39,21 +40,41 @@ class LocalDescent:
     event: int
 
 
+class Response(Protocol):
+    """Linear response about gaps, until its version changes."""
+
+    response: LinearResponse
+    version: int
+
+
+class Responses(Protocol):
+    """Linear responses of the gaps of one problem."""
+
+    def at(self, gaps: Array, prescribed: float) -> Response | None:
+        """Return the response about these gaps; None if they have no field."""
+        ...
+
+
 class KnownState:
     """A solved equilibrium from which gaps differ in one place only.
 
     Parameters
     ----------
+    responses : Responses
     gaps : array, shape (L, 2)
         Gaps of the equilibrium.
-    about : Linearisation
+    prescribed : float
+        d.
     leading_gap : int
         Middle of the window where no gap differs.
     """
 
-    def __init__(self, gaps: Array, about: Linearisation, leading_gap: int) -> None:
-        self._gaps, self._about, self._leading_gap = gaps, about, leading_gap
-        self._windows: dict[tuple[int, int], Window] = {}  # two descents begin in one
+    def __init__(
+        self, responses: Responses, gaps: Array, prescribed: float, leading_gap: int
+    ) -> None:
+        self._responses, self._gaps, self._prescribed = responses, gaps, prescribed
+        self._leading_gap = leading_gap
+        self._windows: dict[tuple[int, int, int], Window] = {}  # two descents begin in one
 
     def window(self, gaps: Array, law: EdgeLaw, model: FieldModel) -> Window | None:
         """Open a window around the gaps that differ; None if they lie in many places."""
@@ -75,9 +96,13 @@ class KnownState:
         if width > min(LOCAL_WINDOW_WIDEST, count - 2):
             return None
         span = (begin - LOCAL_WINDOW_MARGIN) % count, width
-        if span not in self._windows:
-            self._windows[span] = Window(known, self._about, *span, law, model)
-        return self._windows[span]
+        about = self._responses.at(known, self._prescribed)
+        if about is None:
+            return None
+        place = *span, about.version
+        if place not in self._windows:
+            self._windows[place] = Window(known, about.response, *span, law, model)
+        return self._windows[place]
 
     def descend(
         self,

@@ -3,8 +3,9 @@
 In a jump a few edges run at a time. The gaps around them are a window whose edges descend as those
 of few gaps do (``gradient_flow``); all other gaps act on it as a linear exterior, their edges
 following by their tangent. After some steps, or when the window has come to rest, the others are
-put where their tangent leads, everything is solved anew, and the next window is chosen: around the
-edge that is furthest from its balance or, once all are near it, that Newton's step moves most.
+put where their tangent leads, the response of what has moved is renewed, and the next window is
+chosen: around the edge that is furthest from its balance or, once all are near it, that Newton's
+step moves most.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.edge_forces import FlowProblem
 from adhesis.solver.sharp.descent.gradient_flow import (
     AT_REST,
+    MORE_NODES,
     NO_FIELD,
     STEP_LIMIT,
     VANISHED,
@@ -25,24 +27,22 @@ from adhesis.solver.sharp.descent.gradient_flow import (
     descend,
 )
 from adhesis.solver.sharp.descent.trajectory import Comparison
-from adhesis.solver.sharp.equilibrium.edge_elimination import eliminate_edges, newton_step
 from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
-    imbalance,
     move_edges,
-    raise_orders,
     shortest_length,
     step_limits,
 )
-from adhesis.solver.sharp.equilibrium.linear_exterior import (
-    Linearisation,
-    exterior_motion,
-    open_window,
+from adhesis.solver.sharp.equilibrium.linear_exterior import extend_window, open_window
+from adhesis.solver.sharp.equilibrium.linear_response import (
+    LinearResponse,
+    motion_to,
+    move_references,
+    pressure_at,
+    renew_held,
+    solve_response,
 )
-from adhesis.solver.sharp.field.hierarchical_solver import HierarchicalSystem, solve_many
-from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
 from adhesis.solver.sharp.tolerances import (
     FAR_FROM_BALANCE,
     FOLLOWING_SHARE,
@@ -51,26 +51,6 @@ from adhesis.solver.sharp.tolerances import (
     WINDOW_HALF_WIDTH,
     WINDOW_WIDEST,
 )
-
-
-class Linearised(NamedTuple):
-    """Field of all gaps, linearised for a window, and Newton's step of all edges.
-
-    Attributes
-    ----------
-    about : Linearisation
-    residual : array, shape (2L,)
-        C - C_c.
-    step : array, shape (2L,)
-        Outward motion of the contact at every edge.
-    stable : bool
-        Whether the energy is stable in all edges.
-    """
-
-    about: Linearisation
-    residual: Array
-    step: Array
-    stable: bool
 
 
 class Span(NamedTuple):
@@ -87,8 +67,8 @@ class WindowDescent(NamedTuple):
     ----------
     inside : Descent
         Of the window's gaps.
-    outside : array
-        Outward motion of the edges outside, in the order of their gaps.
+    outside : array, shape (2L,)
+        Outward motion of the edges outside; 0 for those of the window.
     progress : float
         Longest motion of an edge inside.
     """
@@ -100,50 +80,54 @@ class WindowDescent(NamedTuple):
 
 @compiled
 def descend_many(
+    response: LinearResponse,
     gaps: Array,
     prescribed: float,
     most_fields: int,
-    least: Integers,
     equal_speeds: bool,
     system: FlowProblem,
 ) -> Descent:
-    """Descend as ``gradient_flow.descend`` does, with many gaps.
+    """Descend as ``gradient_flow.descend`` does, with many gaps, on a response about such gaps.
 
-    Trajectory and interaction are not known, and left empty.
+    Trajectory and interaction are not known, and left empty. The event is MORE_NODES where the
+    response must be set up anew for the gaps that were reached.
     """
-    law = system.law
+    law, model = system.law, system.model
     fields, tangents, event = 0, 0, STEP_LIMIT
     count = gaps.shape[0]
     half = WINDOW_HALF_WIDTH
     newton_steps = 0
-    orders = least
+    orders = response.nodes.orders.copy()
+    pressure = pressure_at(response, prescribed, model.device)
     while fields < most_fields:
-        table = map_gaps(gaps)
-        model = system.model
-        orders = raise_orders(choose_orders(table, model.digits, model.rules.counts), orders)
-        of, parts = solve_many(gaps, prescribed, orders, 2, model)
+        renew_held(response, np.zeros(count, dtype=np.bool_), law, model)
+        if not move_references(response, gaps, pressure, prescribed, law, model):
+            event = MORE_NODES
+            break
+        now = solve_response(response, prescribed, model.device)
+        pressure = now.pressure
         fields += 1
         tangents += 1
-        if not np.isfinite(of.pressure):
+        if not np.isfinite(pressure):
             event = NO_FIELD
             break
-        now = linearised(of, parts, system)
-        if now.stable and np.abs(now.step).max() < law.rest_step:
-            gaps = move_edges(gaps, now.step)
+        step = now.motion - motion_to(response, gaps)
+        if now.stable and np.abs(step).max() < law.rest_step:
+            gaps = move_edges(gaps, step)
             event = AT_REST
             break
-        limit = step_limits(table, law.longest_step)
-        inside = np.all(np.abs(now.step) <= limit)
+        limit = step_limits(map_gaps(gaps), law.longest_step)
+        inside = np.all(np.abs(step) <= limit)
         if now.stable and newton_steps < NEWTON_STEPS_IN_A_ROW and inside:
             newton_steps += 1
-            gaps = move_edges(gaps, now.step)
+            gaps = move_edges(gaps, step)
             continue
         newton_steps = 0
         width = min(2 * half + 1, count - 2)
-        leading = leading_gap(now.residual, now.step, law)
+        leading = leading_gap(response.residual, step, law)
         span = Span((leading - width // 2) % count, width)
         found = descend_in_window(
-            now.about, span, prescribed, most_fields - fields, limit, equal_speeds, system
+            response, gaps, span, prescribed, most_fields - fields, limit, equal_speeds, system
         )
         fields += found.inside.fields
         tangents += found.inside.tangents
@@ -159,23 +143,20 @@ def descend_many(
             break
         if found.progress > law.rest_step:
             half = WINDOW_HALF_WIDTH
-        elif 2 * half + 1 >= count - 2 or half >= WINDOW_WIDEST:
+        elif (
+            2 * half + 1 >= count - 2
+            or half >= WINDOW_WIDEST
+            or (
+                np.abs(step).max() < law.rest_step  # next to a fold
+            )
+        ):
             event = AT_REST
             break
         else:
             half = min(2 * half, WINDOW_WIDEST)
+    renew_held(response, np.zeros(count, dtype=np.bool_), law, model)
     none = np.empty((0, 0))
     return Descent(gaps, event, orders, fields, tangents, none, False, none)
-
-
-@compiled
-def linearised(of: Solution, parts: HierarchicalSystem, system: FlowProblem) -> Linearised:
-    """Linearise the solved field of all gaps about their edges."""
-    residual, drift = imbalance(of, system.law, system.model.panels)
-    edges = eliminate_edges(of, parts, residual, drift, system.model.rules)
-    about = Linearisation(of, parts.inverse, parts.weights, edges)
-    step, _, _, stable, _ = newton_step(of, parts, edges, system.model.device)
-    return Linearised(about, residual, step, stable)
 
 
 @compiled
@@ -188,7 +169,8 @@ def leading_gap(residual: Array, step: Array, law: EdgeLaw) -> int:
 
 @compiled
 def descend_in_window(
-    about: Linearisation,
+    response: LinearResponse,
+    gaps: Array,
     span: Span,
     prescribed: float,
     most_fields: int,
@@ -198,18 +180,22 @@ def descend_in_window(
 ) -> WindowDescent:
     """Descend in a window; with all edges outside held if there is no field where they follow."""
     law, model = system.law, system.model
-    known = about.solution.nodes.orders
+    known = response.nodes.orders
     count = known.shape[0]
     orders = np.zeros(span.width + 1, dtype=np.int64)
     for i in range(span.width):
         orders[i] = known[(span.first + i) % count]
     follow = FOLLOWING_SHARE * law.longest_step
-    window, exterior, outside = open_window(about, span.first, span.width, follow, law, model)
-    held = outside.factor.negative != 0
+    window, exterior, outside = open_window(
+        response, gaps, span.first, span.width, follow, law, model
+    )
+    held = outside.factor.negative[-1] != 0
     fields, tangents = 0, 0
     while True:
         if held:
-            window, exterior, outside = open_window(about, span.first, span.width, 0.0, law, model)
+            window, exterior, outside = open_window(
+                response, gaps, span.first, span.width, 0.0, law, model
+            )
         inside_system = FlowProblem(law, model, exterior)
         alone = Comparison(np.empty((0, window.size)), False, 0)
         inside = descend(
@@ -221,9 +207,9 @@ def descend_in_window(
         event = inside.event
         motion = np.empty(0)
         if event != NO_FIELD:
-            motion = exterior_motion(
-                inside.gaps, prescribed, inside.orders, exterior, outside, about, limit, model
-            )
+            motion = extend_window(
+                inside.gaps, prescribed, inside.orders, exterior, outside, response, limit, model
+            )  # fmt: skip
             if not np.all(np.isfinite(motion)):  # the window came to edges without a field
                 event = NO_FIELD
         if event != NO_FIELD or held:
@@ -244,15 +230,8 @@ def descend_in_window(
 def all_gaps(gaps: Array, span: Span, found: WindowDescent) -> Array:
     """Put together the gaps of the whole period after a descent in a window on ``gaps``."""
     count = gaps.shape[0]
-    result = np.empty(gaps.shape)
-    for i in range(count):
-        k = (span.first + i) % count
+    result = move_edges(gaps, found.outside)
+    for i in range(span.width):
         turn = 2 * np.pi if span.first + i >= count else 0.0
-        for side in range(2):
-            if i < span.width:
-                result[k, side] = found.inside.gaps[i, side] - turn
-            else:
-                sign = 1 - 2 * side
-                motion = found.outside[2 * (i - span.width) + side]
-                result[k, side] = gaps[k, side] + sign * motion
+        result[(span.first + i) % count] = found.inside.gaps[i] - turn
     return result

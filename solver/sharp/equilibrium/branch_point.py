@@ -5,20 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
-import numpy as np
-
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.ends import outward
-from adhesis.solver.sharp.tolerances import CHANGED_RATE, SHORT_SPAN
-
-
-class EarlierRates(NamedTuple):
-    """Earlier rate of every edge of a branch, and d there; NaN if not known."""
-
-    at: Array
-    rate: Array
 
 
 class PreviousPoint(NamedTuple):
@@ -46,10 +35,6 @@ class Point:
         Opening that is left inside the gaps, at least, before surfaces touch; 0 if not known.
     previous : PreviousPoint, optional
         The point before it on its branch.
-    linearisation : Linearisation, optional
-        Of many gaps: for windows on it.
-    earlier : EarlierRates, optional
-        Of many gaps: rates of its edges at an earlier point.
     """
 
     at: float
@@ -58,8 +43,6 @@ class Point:
     slope: float
     clearance: float = 0.0
     previous: PreviousPoint | None = None
-    linearisation: Linearisation | None = None
-    earlier: EarlierRates | None = None
 
     @property
     def gaps(self) -> Array:
@@ -105,33 +88,6 @@ class Point:
         left = self.field.opening.ravel() * self.rate
         by_prescribed = self.field.opening_by_prescribed.ravel()
         return -float(left @ change.ravel() / (left @ by_prescribed))
-
-    def with_earlier(self, point: Point) -> Point:
-        """Return this point with the rates of its edges at ``point``, earlier on its branch."""
-        at, rate = np.full(point.rate.shape, point.at), point.rate
-        if point.earlier is not None:
-            # rates of too near a point have too large an error
-            near = np.abs(self.at - at) < SHORT_SPAN * np.abs(self.at - point.earlier.at)
-            at = np.where(near, point.earlier.at, at)
-            rate = np.where(near, point.earlier.rate, rate)
-        return self._with("earlier", EarlierRates(at, rate))
-
-    def carry_rates(self, point: Point, reach: float) -> Point:
-        """Carry the earlier rates of edges across a jump from ``point`` to this one.
-
-        They count for edges that moved by less than ``reach``, and whose rate is much the same.
-        """
-        earlier = EarlierRates(np.full(self.rate.shape, np.nan), np.full(self.rate.shape, np.nan))
-        if point.earlier is not None:
-            place = np.searchsorted(point.gaps[:, 0], self.gaps[:, 0] - reach)
-            place = np.minimum(place, len(point.gaps) - 1)
-            edge = (2 * place[:, None] + [0, 1]).ravel()
-            moved = np.abs(point.gaps[place] - self.gaps).ravel()
-            other = np.abs(point.rate[edge] - self.rate) > CHANGED_RATE * np.abs(self.rate)
-            same = (moved < reach) & ~other
-            earlier.at[same] = point.earlier.at[edge[same]]
-            earlier.rate[same] = point.earlier.rate[edge[same]]
-        return self._with("earlier", earlier)
 
     def interpolate(self, other: Point, at: float) -> Array:
         """Interpolate the gaps at d = ``at`` between two points of one branch, by a cubic."""

@@ -1,4 +1,4 @@
-"""Equilibrium of many gaps by Newton's iteration on the tree of gaps, compiled."""
+"""Equilibrium of many gaps by Newton's iteration on their linear response, compiled."""
 
 from __future__ import annotations
 
@@ -7,94 +7,124 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.equilibrium.edge_elimination import eliminate_edges, newton_step
-from adhesis.solver.sharp.equilibrium.griffith import (
-    EdgeLaw,
-    accept_correction,
-    imbalance,
-    raise_orders,
+from adhesis.solver.runtime.jit import compiled_for_both
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, shortest_length
+from adhesis.solver.sharp.equilibrium.linear_response import (
+    LinearResponse,
+    departed,
+    motion_to,
+    move_references,
+    moved_gaps,
+    no_motion,
+    pressure_at,
+    renew_held,
+    solve_response,
 )
-from adhesis.solver.sharp.equilibrium.last_correction import correct_gaps
-from adhesis.solver.sharp.equilibrium.linear_exterior import Linearisation, linearise
-from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
-from adhesis.solver.sharp.tolerances import HIERARCHICAL_NEWTON_GROWTH, MOST_CORRECTIONS
+from adhesis.solver.sharp.tolerances import (
+    HIERARCHICAL_NEWTON_GROWTH,
+    MOST_CORRECTIONS,
+    STALLED_SHARE,
+)
+
+FOUND, NOT_FOUND, MORE_NODES = 0, 1, 2
 
 
 class EquilibriumOfMany(NamedTuple):
-    """Result of Newton's iteration on many gaps; otherwise as ``newton.Equilibrium``.
+    """Result of Newton's iteration on many gaps.
 
     Attributes
     ----------
-    linearisation : Linearisation
-        For windows on it, with the solution.
+    event : int
+        FOUND if a stable equilibrium was found within reach; MORE_NODES if a gap or run needs more
+        than the response has, which is then of no further use.
+    gaps : array, shape (L, 2)
+    potential : array, shape (N,)
+        Of the other gaps at the reference nodes, as G.
     rate : array, shape (2L,)
-        If no equilibrium was found, the last correction.
+        dn/dd of every edge along the branch; if no equilibrium was found, the last correction.
+    pressure, separation : float
+    slope : float
+        dY/dd along the branch: Y is p, under a load q0 s.
+    corrections : int
     """
 
-    found: bool
+    event: int
     gaps: Array
-    linearisation: Linearisation
+    potential: Array
     rate: Array
+    pressure: float
+    separation: float
     slope: float
     corrections: int
 
 
-@compiled
+@compiled_for_both
 def equilibrium_many(
+    response: LinearResponse,
     gaps: Array,
     prescribed: float,
     reach: float,
-    least: Integers,
     strict: bool,
     law: EdgeLaw,
     model: FieldModel,
 ) -> EquilibriumOfMany:
-    """Find the equilibrium in work that grows as the number of gaps, as ``newton.equilibrium``.
+    """Find the equilibrium next to ``gaps`` on the linear response of about these gaps.
 
-    Where the edges are not stable on the way, or the corrections hardly shrink, the iteration ends:
-    of some 1,300 that came to a minimum four had not been stable, and one in a hundred had a
-    correction half as large as the one before.
+    The references of gaps follow where they move by more than that to which the response is
+    accurate. Where the edges are not stable on the way, or the corrections hardly shrink, the
+    iteration ends: of some 1,300 that came to a minimum four had not been stable, and one in a
+    hundred had a correction half as large as the one before.
     """
-    orders = raise_orders(choose_orders(map_gaps(gaps), model.digits, model.rules.counts), least)
     travelled = np.zeros(gaps.size)
     last = np.inf
-    found = False
+    judged_again = False
+    event = NOT_FOUND
     steps = 0
+    pressure = pressure_at(response, prescribed, model.device)
+    renew_held(response, np.zeros(gaps.shape[0], dtype=np.bool_), law, model)
+    now = no_motion(gaps.shape[0])
+    step = now.motion
     while True:
         steps += 1
-        state, system = solve_many(gaps, prescribed, orders, 2, model)
-        residual, drift = imbalance(state, law, model.panels)
-        edges = eliminate_edges(state, system, residual, drift, model.rules)
-        newton = newton_step(state, system, edges, model.device)
-        size = np.abs(newton.step).max()
-        if not np.isfinite(state.pressure):
+        if not move_references(response, gaps, pressure, prescribed, law, model):
+            event = MORE_NODES
             break
-        if size <= law.field_error:
-            found = newton.stable or not strict
+        now = solve_response(response, prescribed, model.device)
+        pressure = now.pressure
+        step = now.motion - motion_to(response, gaps)
+        size = np.abs(step).max()
+        if not np.isfinite(pressure):
             break
-        if not strict and size <= law.rest_step:
-            found = True
-            break
-        largest = HIERARCHICAL_NEWTON_GROWTH * last
-        accepted, moved = accept_correction(gaps, newton.step, travelled, reach, largest)
-        if not accepted or (strict and not newton.stable) or steps == MOST_CORRECTIONS:
+        if strict and not now.stable:
+            if judged_again or not departed(response, map_gaps(gaps), law)[0].any():
+                break
+            judged_again = True  # before, by a tangent of other edges
+            continue
+        travelled += step
+        # as in ``newton.equilibrium``
+        stalled = size <= law.field_error and size > STALLED_SHARE * last
+        # not written as > : a size that is no number is a failure, too
+        most = max(HIERARCHICAL_NEWTON_GROWTH * last, law.rest_step)
+        within = size <= min(reach, most)
+        moved = moved_gaps(response, now.motion)
+        if not (within and np.abs(travelled).max() <= reach and shortest_length(moved) > 0):
             break
         gaps = moved
-        # The iteration converges quadratically. A correction that is expected to be no larger than
-        # the error of the field is left out: it would cost as much as this one.
-        expected = size * size / law.longest_step
-        if last < np.inf:
-            expected = size * (size / last) ** 2
-        if newton.stable and expected <= law.field_error:
-            steps += 1
-            state, system = correct_gaps(gaps, prescribed, state, system, newton.change, model)
-            found = np.isfinite(state.pressure)
+        at_rest = stalled or (not strict and size <= law.rest_step)
+        if at_rest or not departed(response, map_gaps(gaps), law)[0].any():
+            event = FOUND
+            break
+        if steps == MOST_CORRECTIONS:
             break
         last = size
-    rate = newton.rate if found else newton.step
-    linearisation = linearise(state, system, edges)
-    return EquilibriumOfMany(found, gaps, linearisation, rate, newton.slope, steps)
+    potential = np.empty(response.nodes.theta.shape[0])
+    rate = step
+    if event == FOUND:
+        rate = now.rate
+        for i in range(potential.shape[0]):
+            potential[i] = response.potential[0, i] + pressure * response.potential[1, i]
+    return EquilibriumOfMany(
+        event, gaps, potential, rate, pressure, now.separation, now.slope, steps
+    )

@@ -1,4 +1,4 @@
-"""A window of few gaps on a solved state of many, as Python uses it."""
+"""A window of few gaps on an equilibrium of many, as Python uses it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, step_limits
-from adhesis.solver.sharp.equilibrium.linear_exterior import (
-    Linearisation,
-    exterior_motion,
-    open_window,
-)
+from adhesis.solver.sharp.equilibrium.linear_exterior import extend_window, open_window
+from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.field.exterior import Exterior
 from adhesis.solver.sharp.field.solution import FieldModel
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import Integers
 
 
@@ -23,8 +21,8 @@ class Window:
     ----------
     gaps : array, shape (L, 2)
         All gaps of the state.
-    linearisation : Linearisation
-        Of the state.
+    response : LinearResponse
+        About the state; it must not change.
     first, width : int
         First gap of the window, and how many.
     law : EdgeLaw
@@ -44,21 +42,21 @@ class Window:
     def __init__(
         self,
         gaps: Array,
-        linearisation: Linearisation,
+        response: LinearResponse,
         first: int,
         width: int,
         law: EdgeLaw,
         model: FieldModel,
     ) -> None:
-        self._all, self._linearisation, self._law, self._model = gaps, linearisation, law, model
+        self._all, self._response, self._law, self._model = gaps, response, law, model
         self.gaps: Array
         self.exterior: Exterior
         self.gaps, self.exterior, self._outside = open_window(
-            linearisation, first, width, np.inf, law, model
+            response, gaps, first, width, np.inf, law, model
         )
         inside = (first + np.arange(width)) % len(gaps)
-        self.orders: Integers = np.append(linearisation.solution.nodes.orders[inside], 0)
-        self.exterior_is_stable = bool(self._outside.factor.negative == 0)
+        self.orders: Integers = np.append(response.nodes.orders[inside], 0)
+        self.exterior_is_stable = bool(self._outside.factor.negative[-1] == 0)
         # beyond the middle of the patch in which the period ends
         self._end = 0.5 * (gaps[-1, 1] + gaps[0, 0] + 2 * np.pi)
 
@@ -71,13 +69,13 @@ class Window:
 
     def extend(self, local: Array, orders: Integers, prescribed: float) -> Array:
         """Extend gaps of the window to all gaps, the others following."""
-        limit = step_limits(self._linearisation.solution.nodes.table, self._law.longest_step)
-        motion = exterior_motion(
-            local, prescribed, orders, self.exterior, self._outside, self._linearisation, limit,
+        limit = step_limits(map_gaps(self._all), self._law.longest_step)
+        motion = extend_window(
+            local, prescribed, orders, self.exterior, self._outside, self._response, limit,
             self._model,
         )  # fmt: skip
-        outside = self._all[self._outside.indices] + motion.reshape(-1, 2) * [1.0, -1.0]
+        outside = self._all + motion.reshape(-1, 2) * [1.0, -1.0]
         inside = local[:-1].copy()
         inside[inside.mean(axis=1) > self._end] -= 2 * np.pi
-        gaps = np.concatenate([inside, outside])
+        gaps = np.concatenate([inside, outside[self._outside.gaps]])
         return np.asarray(gaps[np.argsort(gaps[:, 0], kind="stable")])

@@ -44,7 +44,7 @@ def assemble_dense(
         gaps -= 1
         nodes.slope[gaps] = 1.0
         equations.end_terms[gaps] = 0.0
-    _fill_gaps(np.arange(gaps), nodes, equations, offset, model)
+    fill_gaps(np.arange(gaps), nodes, equations, offset, model)
     for k in range(gaps):
         _fill_rows(k, nodes, equations.matrix)
     return nodes, equations
@@ -69,7 +69,7 @@ def assemble_changed(
             if table[k, column] != known_table[k, column]:
                 differs[k] = True
     changed: Integers = np.flatnonzero(differs)
-    _fill_gaps(changed, nodes, equations, offset, model)
+    fill_gaps(changed, nodes, equations, offset, model)
     matrix = equations.matrix
     for gap in changed:
         _fill_rows(gap, nodes, matrix)
@@ -90,16 +90,58 @@ def assemble_blocks(
     The block of gap k is ``matrix[offset[k] : offset[k + 1], :m]``, m its number of nodes.
     """
     gaps = table.shape[0]
-    offset = np.zeros(gaps + 1, dtype=np.int64)
-    widest = 0
-    for k in range(gaps):
-        m = model.rules.counts[orders[k]]
-        offset[k + 1] = offset[k] + m
-        widest = max(widest, m)
+    offset, widest = _block_offsets(orders, model.rules)
     nodes, equations = _allocate(table, orders, offset, widest, fields)
     equations.matrix[:] = 0.0
-    _fill_gaps(np.arange(gaps), nodes, equations, np.zeros(gaps, dtype=np.int64), model)
+    fill_gaps(np.arange(gaps), nodes, equations, np.zeros(gaps, dtype=np.int64), model)
     return nodes, equations
+
+
+@compiled
+def assemble_some(
+    table: Array,
+    orders: Integers,
+    source: Integers,
+    known: Nodes,
+    before: Equations,
+    model: FieldModel,
+) -> tuple[Nodes, Equations]:
+    """Assemble diagonal blocks with S and S', taking over those of gaps from a known ``source``.
+
+    That is -1 for the others.
+    """
+    offset, widest = _block_offsets(orders, model.rules)
+    nodes, equations = _allocate(table, orders, offset, widest, 2)
+    equations.matrix[:] = 0.0
+    for k in range(source.shape[0]):
+        j = source[k]
+        if j >= 0:
+            own = slice(offset[k], offset[k + 1])
+            theirs = slice(known.offset[j], known.offset[j + 1])
+            m = offset[k + 1] - offset[k]
+            nodes.theta[own] = known.theta[theirs]
+            nodes.weight[own] = known.weight[theirs]
+            nodes.sine[own] = known.sine[theirs]
+            nodes.cosine[own] = known.cosine[theirs]
+            nodes.slope[k] = known.slope[j]
+            equations.matrix[own, :m] = before.matrix[theirs, :m]
+            equations.load[own] = before.load[theirs]
+            equations.end_terms[k] = before.end_terms[j]
+    column = np.zeros(orders.shape[0], dtype=np.int64)
+    fill_gaps(np.flatnonzero(source < 0), nodes, equations, column, model)
+    return nodes, equations
+
+
+@compiled
+def _block_offsets(orders: Integers, rules: GaussRules) -> tuple[Integers, int]:
+    """Number the first node of each gap, and all; and find the most nodes of a gap."""
+    offset = np.zeros(orders.shape[0] + 1, dtype=np.int64)
+    widest = 0
+    for k in range(orders.shape[0]):
+        m = rules.counts[orders[k]]
+        offset[k + 1] = offset[k] + m
+        widest = max(widest, m)
+    return offset, widest
 
 
 @compiled
@@ -121,7 +163,7 @@ def _allocate(
 
 
 @compiled
-def _fill_gaps(
+def fill_gaps(
     gaps: Integers, nodes: Nodes, equations: Equations, column: Integers, model: FieldModel
 ) -> None:
     """Fill in the own parts of some gaps; their blocks begin in these columns of the matrix."""

@@ -24,6 +24,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
@@ -46,8 +47,10 @@ class Tree(NamedTuple):
 
     Attributes
     ----------
-    children : int array, shape (runs, 2)
-        Both halves of a run; -1 for a gap.
+    children, span : int array, shape (runs, 2)
+        Both halves of a run, -1 for a gap; and its first and last gap.
+    rows : array, shape (runs, 5)
+        Its ends and patches, as in the table of gaps; of a whole period none.
     rank : int array, shape (runs,)
         Number of charges.
     node_start, response_start, pair_start, kernel_start, interpolation_start : int array
@@ -62,6 +65,8 @@ class Tree(NamedTuple):
     """
 
     children: Integers
+    span: Integers
+    rows: Array
     rank: Integers
     node_start: Integers
     response_start: Integers
@@ -85,14 +90,29 @@ class TreeFactor(NamedTuple):
         W = (R1⁻¹ - K12 R2 K21)⁻¹ of every pair.
     charge : array
         Charges of both halves of a pair by the potentials at its nodes.
-    negative : int
-        Number of negative eigenvalues of the whole.
+    negative : int array, shape (runs,)
+        Number of negative eigenvalues of every run; the whole is the last one.
     """
 
     response: Array
     pair: Array
     charge: Array
-    negative: int
+    negative: Integers
+
+
+class Charges(NamedTuple):
+    """Charges of all runs, one row a column of loads, shape (columns, nodes of all runs).
+
+    Attributes
+    ----------
+    isolated : array
+        Without potentials from outside the run.
+    coupled : array
+        Without potentials from outside the run's parent.
+    """
+
+    isolated: Array
+    coupled: Array
 
 
 @compiled
@@ -113,10 +133,17 @@ def _interval(table: Array, first: int, last: int) -> Array:
 
 
 @compiled
+def _wanted_rank(row: Array, digits: float) -> int:
+    """Return how many charges a run needs."""
+    wanted = int(np.ceil((digits + CHARGE_MARGIN) / convergence_rate(row)))
+    return min(max(wanted, FEWEST_CHARGES), MOST_CHARGES)
+
+
+@compiled
 def _pair_runs(
     table: Array, rank: Integers, digits: float, closed: bool
-) -> tuple[Integers, Array]:
-    """Pair neighbouring runs, level by level: children and row of each; fills in their ``rank``."""
+) -> tuple[Integers, Integers, Array]:
+    """Pair neighbouring runs, level by level: children, span and row of each; fills in ``rank``."""
     gaps, runs = table.shape[0], rank.shape[0]
     children = np.full((runs, 2), -1)
     span = np.empty((runs, 2), dtype=np.int64)
@@ -135,14 +162,13 @@ def _pair_runs(
             span[made, 1] = span[level[2 * i + 1], 1]
             if made < runs - 1 or not closed:
                 rows[made] = _interval(table, span[made, 0], span[made, 1])
-                wanted = int(np.ceil((digits + CHARGE_MARGIN) / convergence_rate(rows[made])))
-                rank[made] = min(max(wanted, FEWEST_CHARGES), MOST_CHARGES)
+                rank[made] = _wanted_rank(rows[made], digits)
             above[i] = made
             made += 1
         if level.shape[0] % 2 == 1:
             above[-1] = level[-1]
         level = above
-    return children, rows
+    return children, span, rows
 
 
 @compiled
@@ -159,7 +185,7 @@ def build_tree(
     rank = np.zeros(runs, dtype=np.int64)
     for k in range(gaps):
         rank[k] = offset[k + 1] - offset[k]
-    children, rows = _pair_runs(table, rank, digits, closed)
+    children, span, rows = _pair_runs(table, rank, digits, closed)
     at = np.zeros(runs + 1, dtype=np.int64)
     square = np.zeros(runs + 1, dtype=np.int64)
     inner = np.zeros(runs + 1, dtype=np.int64)
@@ -181,29 +207,48 @@ def build_tree(
     stretches = np.empty(at[runs])
     places[: theta.shape[0]] = theta
     stretches[: theta.shape[0]] = stretch
-    kernel = np.empty(mixed[runs])
-    interpolation = np.empty(lift[runs])
+    tree = Tree(
+        children, span, rows, rank, at, square, inner, mixed, lift, places, stretches,
+        np.empty(mixed[runs]), np.empty(lift[runs]),
+    )  # fmt: skip
     for run in range(gaps, runs):
-        r = rank[run]
-        for i in range(r):
-            t = np.pi * (r - i - 0.5) / r
-            places[at[run] + i], stretches[at[run] + i] = theta_at(rows[run], np.cos(t))
-        begin = lift[run]
-        for half in range(2):
-            child = children[run, half]
-            own = slice(at[child], at[child + 1])
-            end = begin + rank[child] * r
-            _interpolate(rows[run], places[own], stretches[own], r, interpolation[begin:end])
-            begin = end
-        own = slice(at[children[run, 0]], at[children[run, 0] + 1])
-        other = slice(at[children[run, 1]], at[children[run, 1] + 1])
-        _kernel(
-            places[own], stretches[own], places[other], stretches[other],
-            kernel[mixed[run] : mixed[run + 1]],
-        )  # fmt: skip
-    return Tree(
-        children, rank, at, square, inner, mixed, lift, places, stretches, kernel, interpolation
-    )
+        _place_charges(tree, run)
+    return tree
+
+
+@compiled
+def _place_charges(tree: Tree, run: int) -> None:
+    """Place the charges of a run, and compute its interpolation and kernel."""
+    at, r, row = tree.node_start, tree.rank[run], tree.rows[run]
+    places, stretches = tree.theta, tree.stretch
+    for i in range(r):
+        t = np.pi * (r - i - 0.5) / r
+        places[at[run] + i], stretches[at[run] + i] = theta_at(row, np.cos(t))
+    begin = tree.interpolation_start[run]
+    for half in range(2):
+        child = tree.children[run, half]
+        own = slice(at[child], at[child + 1])
+        end = begin + tree.rank[child] * r
+        _interpolate(row, places[own], stretches[own], r, tree.interpolation[begin:end])
+        begin = end
+    own = slice(at[tree.children[run, 0]], at[tree.children[run, 0] + 1])
+    other = slice(at[tree.children[run, 1]], at[tree.children[run, 1] + 1])
+    kernel = tree.kernel[_span(tree.kernel_start, run)]
+    _kernel(places[own], stretches[own], places[other], stretches[other], kernel)
+
+
+@compiled
+def replace_run(tree: Tree, run: int, table: Array, digits: float) -> bool:
+    """Place the charges of a run anew; returns whether it has enough.
+
+    One less than it needs is enough: the margin covers it.
+    """
+    if tree.rank[run] > 0:
+        tree.rows[run] = _interval(table, tree.span[run, 0], tree.span[run, 1])
+        if _wanted_rank(tree.rows[run], digits) > tree.rank[run] + 1:
+            return False
+    _place_charges(tree, run)
+    return True
 
 
 @compiled_sums
@@ -288,68 +333,87 @@ def _eliminate(a: Array, x: Array) -> bool:
 
 
 @compiled
+def empty_factor(tree: Tree) -> TreeFactor:
+    """Make space for the factor of a tree."""
+    runs = tree.rank.shape[0]
+    return TreeFactor(
+        response=np.empty(tree.response_start[runs]),
+        pair=np.empty(tree.pair_start[runs]),
+        charge=np.empty(tree.interpolation_start[runs]),
+        negative=np.zeros(runs, dtype=np.int64),
+    )
+
+
+@compiled
 def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> TreeFactor:
     """Compute the responses of all runs from those of the gaps (flat, one after the other).
 
-    ``gap_negative`` are the gaps' numbers of negative eigenvalues. A whole has no fewer than each
-    of its halves; the sign of a pair's determinant gives whether their number is even. Two that
-    appear together in one pair go unseen: two places whose forces are equal to rounding.
+    ``gap_negative`` are the gaps' numbers of negative eigenvalues.
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    responses = np.empty(tree.response_start[runs])
-    responses[: tree.response_start[gaps]] = gap_response
-    negative = np.zeros(runs, dtype=np.int64)
-    negative[:gaps] = gap_negative
-    pair = np.empty(tree.pair_start[runs])
-    charge = np.empty(tree.interpolation_start[runs])
+    factor = empty_factor(tree)
+    factor.response[: tree.response_start[gaps]] = gap_response
+    factor.negative[:gaps] = gap_negative
     for run in range(gaps, runs):
-        one = tree.children[run, 0]
-        two = tree.children[run, 1]
-        n = tree.rank[one]
-        m = tree.rank[two]
-        r = tree.rank[run]
-        first = responses[_span(tree.response_start, one)].reshape(n, n)
-        second = responses[_span(tree.response_start, two)].reshape(m, m)
-        kernel = tree.kernel[_span(tree.kernel_start, run)].reshape(n, m)
-        w = pair[_span(tree.pair_start, run)].reshape(n, n)
-        # W = (R1⁻¹ - H)⁻¹ = (1 - R1 H)⁻¹ R1, H = K12 R2 K21
-        half = np.dot(kernel, second)
-        reflected = np.dot(half, kernel.T)
-        matrix = np.dot(first, reflected)
-        for i in range(n):
-            for j in range(n):
-                w[i, j] = first[i, j]
-                matrix[i, j] = -matrix[i, j]
-            matrix[i, i] += 1.0
-        odd = _eliminate(matrix, w)
-        count = max(negative[one], negative[two])
-        if (negative[one] + negative[two] + count + (1 if odd else 0)) % 2 == 1:
-            count += 1
-        negative[run] = count
-        if r == 0:
-            continue
-        interpolation = tree.interpolation[_span(tree.interpolation_start, run)].reshape(n + m, r)
-        charges = charge[_span(tree.interpolation_start, run)].reshape(n + m, r)
-        # q1 = W (E1 + K12 R2 E2), q2 = R2 (E2 + K21 q1)
-        drive = np.dot(half, interpolation[n:])
-        for i in range(n):
-            for j in range(r):
-                drive[i, j] += interpolation[i, j]
-        np.dot(w, drive, charges[:n])
-        more = np.dot(kernel.T, charges[:n])
-        for i in range(m):
-            for j in range(r):
-                more[i, j] += interpolation[n + i, j]
-        np.dot(second, more, charges[n:])
-        response = responses[_span(tree.response_start, run)].reshape(r, r)
-        np.dot(interpolation.T, charges, response)
-        for i in range(r):
-            for j in range(i):
-                mean = 0.5 * (response[i, j] + response[j, i])
-                response[i, j] = mean
-                response[j, i] = mean
-    return TreeFactor(responses, pair, charge, negative[runs - 1])
+        factor_run(tree, factor, run)
+    return factor
+
+
+@compiled
+def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
+    """Compute the response of a run from those of its halves.
+
+    A whole has no fewer negative eigenvalues than each of its halves; the sign of a pair's
+    determinant gives whether their number is even. Two that appear together in one pair go unseen:
+    two places whose forces are equal to rounding.
+    """
+    responses, negative = factor.response, factor.negative
+    one = tree.children[run, 0]
+    two = tree.children[run, 1]
+    n = tree.rank[one]
+    m = tree.rank[two]
+    r = tree.rank[run]
+    first = responses[_span(tree.response_start, one)].reshape(n, n)
+    second = responses[_span(tree.response_start, two)].reshape(m, m)
+    kernel = tree.kernel[_span(tree.kernel_start, run)].reshape(n, m)
+    w = factor.pair[_span(tree.pair_start, run)].reshape(n, n)
+    # W = (R1⁻¹ - H)⁻¹ = (1 - R1 H)⁻¹ R1, H = K12 R2 K21
+    half = np.dot(kernel, second)
+    reflected = np.dot(half, kernel.T)
+    matrix = np.dot(first, reflected)
+    for i in range(n):
+        for j in range(n):
+            w[i, j] = first[i, j]
+            matrix[i, j] = -matrix[i, j]
+        matrix[i, i] += 1.0
+    odd = _eliminate(matrix, w)
+    count = max(negative[one], negative[two])
+    if (negative[one] + negative[two] + count + (1 if odd else 0)) % 2 == 1:
+        count += 1
+    negative[run] = count
+    if r == 0:
+        return
+    interpolation = tree.interpolation[_span(tree.interpolation_start, run)].reshape(n + m, r)
+    charges = factor.charge[_span(tree.interpolation_start, run)].reshape(n + m, r)
+    # q1 = W (E1 + K12 R2 E2), q2 = R2 (E2 + K21 q1)
+    drive = np.dot(half, interpolation[n:])
+    for i in range(n):
+        for j in range(r):
+            drive[i, j] += interpolation[i, j]
+    np.dot(w, drive, charges[:n])
+    more = np.dot(kernel.T, charges[:n])
+    for i in range(m):
+        for j in range(r):
+            more[i, j] += interpolation[n + i, j]
+    np.dot(second, more, charges[n:])
+    response = responses[_span(tree.response_start, run)].reshape(r, r)
+    np.dot(interpolation.T, charges, response)
+    for i in range(r):
+        for j in range(i):
+            mean = 0.5 * (response[i, j] + response[j, i])
+            response[i, j] = mean
+            response[j, i] = mean
 
 
 @compiled_sums
@@ -388,8 +452,8 @@ def _add_transposed(a: Array, x: Array, out: Array) -> None:
 
 
 @compiled
-def _charge_run(tree: Tree, factor: TreeFactor, run: int, charge: Array, work: Array) -> None:
-    """Compute the charges of a run from those of its two parts, which they change."""
+def charge_run(tree: Tree, factor: TreeFactor, run: int, charges: Charges, work: Array) -> None:
+    """Compute the charges of a run from those of its two parts, and couple these."""
     one = tree.children[run, 0]
     two = tree.children[run, 1]
     n = tree.rank[one]
@@ -402,9 +466,12 @@ def _charge_run(tree: Tree, factor: TreeFactor, run: int, charge: Array, work: A
     split = n * tree.rank[run]
     a = work[0, :n]
     b = work[1, :m]
-    for column in range(charge.shape[0]):
-        q1 = charge[column][_span(tree.node_start, one)]
-        q2 = charge[column][_span(tree.node_start, two)]
+    isolated, coupled = charges.isolated, charges.coupled
+    for column in range(coupled.shape[0]):
+        q1 = coupled[column][_span(tree.node_start, one)]
+        q2 = coupled[column][_span(tree.node_start, two)]
+        q1[:] = isolated[column][_span(tree.node_start, one)]
+        q2[:] = isolated[column][_span(tree.node_start, two)]
         # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
         _apply(kernel, q2, a)
         _add_apply(first, a, q1)
@@ -417,25 +484,27 @@ def _charge_run(tree: Tree, factor: TreeFactor, run: int, charge: Array, work: A
         b[:] = 0.0
         _add_transposed(kernel, q1, b)
         _add_apply(second, b, q2)
-        q = charge[column][_span(tree.node_start, run)]
+        q = isolated[column][_span(tree.node_start, run)]
+        q[:] = 0.0
         _add_transposed(up[:split], q1, q)
         _add_transposed(up[split:], q2, q)
 
 
 @compiled
-def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Array:
-    """Compute the charges of all runs, without potentials from outside a run's parent.
+def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Charges:
+    """Compute the charges of all runs.
 
     ``isolated``, shape (N, columns), are the charges that each gap would have by itself.
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    charge = np.zeros((isolated.shape[1], tree.node_start[runs]))
-    charge[:, : isolated.shape[0]] = isolated.T
+    size = tree.node_start[runs]
+    charges = Charges(np.empty((isolated.shape[1], size)), np.zeros((isolated.shape[1], size)))
+    charges.isolated[:, : isolated.shape[0]] = isolated.T
     work = np.empty((2, tree.rank.max()))
     for run in range(gaps, runs):
-        _charge_run(tree, factor, run, charge, work)
-    return np.ascontiguousarray(charge.T)
+        charge_run(tree, factor, run, charges, work)
+    return charges
 
 
 @compiled
@@ -477,19 +546,28 @@ def _pass_potential(
 
 
 @compiled
-def downward_pass(tree: Tree, factor: TreeFactor, charge: Array, outside: Array) -> Array:
-    """Compute the potentials at all gaps, shape (N, columns), from charges of :func:`upward_pass`.
+def downward_pass(
+    tree: Tree, factor: TreeFactor, below: NDArray[np.bool_], charge: Array, potential: Array
+) -> None:
+    """Compute the potentials of all runs, and their final charges, in place.
 
-    ``outside`` are those at the nodes of the whole, shape (its rank, columns). ``charge`` becomes
-    that of the whole tree.
+    Both have the shape (columns, nodes of all runs). ``below`` marks the runs at whose nodes the
+    potentials are given; those inside them are marked, too, and the others left as they are.
+    ``charge`` begins as the coupled charges (:class:`Charges`).
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    charges = np.ascontiguousarray(charge.T)
-    potential = np.zeros(charges.shape)
-    potential[:, tree.node_start[runs - 1] : tree.node_start[runs]] = outside.T
     work = np.empty(tree.rank.max())
     for run in range(runs - 1, gaps - 1, -1):
-        _pass_potential(tree, factor, run, charges, potential, work)
-    charge[:] = charges.T
-    return np.ascontiguousarray(potential[:, : tree.node_start[gaps]].T)
+        if below[run]:
+            below[tree.children[run, 0]] = True
+            below[tree.children[run, 1]] = True
+            _pass_potential(tree, factor, run, charge, potential, work)
+
+
+@compiled
+def whole_tree(tree: Tree) -> NDArray[np.bool_]:
+    """Mark the whole of a tree, for :func:`downward_pass`."""
+    below = np.zeros(tree.rank.shape[0], dtype=np.bool_)
+    below[-1] = True
+    return below

@@ -106,7 +106,8 @@ class GapField:
         device: LoadingDevice = FIXED_SEPARATION,
         solution: Solution | None = None,
     ) -> None:
-        self.source, self.gaps, self.prescribed, self.device = source, gaps, prescribed, device
+        self.source, self.gaps, self.prescribed = source, gaps, prescribed
+        self.tolerance, self.device = tolerance, device
         if solution is None:
             model = FieldModel(device, float(-np.log(tolerance)), GAUSS_RULES, source.panels)
             orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
@@ -117,6 +118,11 @@ class GapField:
         self.pressure, self.separation = solution.pressure, solution.separation
 
     @property
+    def held(self) -> Solution:
+        """Solution with its responses at held edges."""
+        return self.solution
+
+    @property
     def opening(self) -> Array:
         """C at each gap end, shape (L, 2)."""
         return self.solution.opening.reshape(-1, 2)
@@ -124,18 +130,18 @@ class GapField:
     @property
     def pressure_by_prescribed(self) -> float:
         """∂p/∂d at fixed edges; negative."""
-        return -2 * np.pi / float(self.solution.mean.resistance)
+        return -2 * np.pi / float(self.held.mean.resistance)
 
     @property
     def separation_by_prescribed(self) -> float:
         """∂(q0 s)/∂d at fixed edges."""
-        unit_mean = float(self.solution.mean.unit_mean)
+        unit_mean = float(self.held.mean.unit_mean)
         return -unit_mean * self.pressure_by_prescribed / (2 * np.pi)
 
     @cached_property
     def opening_by_prescribed(self) -> Array:
         """∂C/∂d at fixed edges, shape (L, 2)."""
-        state = self.solution
+        state = self.held
         unit = np.ascontiguousarray(-self.pressure_by_prescribed * state.solved[:, 1:2])
         out: Array = edge_openings(unit, state.nodes, GAUSS_RULES)
         return out[:, 0].reshape(-1, 2)

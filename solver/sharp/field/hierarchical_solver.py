@@ -21,6 +21,7 @@ from adhesis.solver.sharp.field.cluster_tree import (
     downward_pass,
     factor_tree,
     upward_pass,
+    whole_tree,
 )
 from adhesis.solver.sharp.field.solution import (
     FieldModel,
@@ -70,21 +71,33 @@ def invert_blocks(nodes: Nodes, blocks: Array, rules: GaussRules) -> tuple[Array
     for k in range(gaps):
         m = offset[k + 1] - offset[k]
         start = rules.vector_start[nodes.orders[k]]
-        factor = blocks[offset[k] : offset[k + 1], :m].copy()
-        if not factor_rows(factor, 0.0):
+        block = blocks[offset[k] : offset[k + 1], :m]
+        if not invert_block(block, inverse[at : at + m * m]):
             return inverse, response, False
-        unit = np.zeros((m, m))
         for i in range(m):
-            unit[i, i] = 1.0
-        solve_factored(factor, unit)
-        for i in range(m):
+            weight = rules.weights[start + i]
             for j in range(m):
-                value = 0.5 * (unit[i, j] + unit[j, i])
-                inverse[at + i * m + j] = value
-                weight = rules.weights[start + i]
+                value = inverse[at + i * m + j]
                 response[at + i * m + j] = weight * value * rules.weights[start + j]
         at += m * m
     return inverse, response, True
+
+
+@compiled
+def invert_block(block: Array, inverse: Array) -> bool:
+    """Invert a diagonal block, flat; returns whether it is definite."""
+    m = block.shape[0]
+    factor = block.copy()
+    if not factor_rows(factor, 0.0):
+        return False
+    unit = np.zeros((m, m))
+    for i in range(m):
+        unit[i, i] = 1.0
+    solve_factored(factor, unit)
+    for i in range(m):
+        for j in range(m):
+            inverse[i * m + j] = 0.5 * (unit[i, j] + unit[j, i])
+    return True
 
 
 @compiled
@@ -170,9 +183,12 @@ def solve_loads(
     isolated = apply_inverse(offset, system.inverse, load)
     w = system.weights.reshape(-1, 1)
     charges = upward_pass(system.tree, system.factor, isolated * w + charge)
-    outside = np.zeros((0, load.shape[1]))
-    potential = downward_pass(system.tree, system.factor, charges, outside)
-    return isolated - apply_inverse(offset, system.inverse, potential * w)
+    potential = np.zeros(charges.coupled.shape)
+    downward_pass(
+        system.tree, system.factor, whole_tree(system.tree), charges.coupled, potential
+    )
+    of_nodes = np.ascontiguousarray(potential[:, : load.shape[0]].T)
+    return isolated - apply_inverse(offset, system.inverse, of_nodes * w)
 
 
 @compiled

@@ -14,14 +14,14 @@ from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, total_motion
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
-from adhesis.solver.sharp.field.dense_solver import solve
+from adhesis.solver.sharp.field.dense_solver import GapField, solve
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
-from adhesis.solver.sharp.tolerances import FASTEST_CLOSING
+from adhesis.solver.sharp.tolerances import FASTEST_CLOSING, FINER_FIELD
 
 
 class DenseSystem(EdgeSystem):
@@ -37,6 +37,11 @@ class DenseSystem(EdgeSystem):
         orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
         solution: Solution = solve(gaps, prescribed, orders, fields, model, NO_EXTERIOR)
         return solution
+
+    def finer_openings(self, field: GapField) -> Array:
+        """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
+        opening = self.solution(field.gaps, field.prescribed, FINER_FIELD, 1).opening
+        return opening.reshape(-1, 2)
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂θ_f between some edges, the others held, shape (edges, edges)."""

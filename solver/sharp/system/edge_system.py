@@ -13,6 +13,7 @@ from adhesis.solver.sharp.descent.gradient_flow import Descent
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 
@@ -44,6 +45,10 @@ class EdgeSystem(ABC):
     @abstractmethod
     def solution(self, gaps: Array, prescribed: float, share: float, fields: int) -> Solution:
         """Solve these gaps to a ``share`` of the tolerance, with S or (two fields) S and S'."""
+
+    @abstractmethod
+    def finer_openings(self, field: GapField) -> Array:
+        """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
 
     @abstractmethod
     def stiffness(self, point: Point, edges: Integers) -> Array:

@@ -1,0 +1,111 @@
+"""Linear responses of many gaps that are kept from one state to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.equilibrium.linear_response import (
+    LinearResponse,
+    respond,
+    respond_again,
+    settle_response,
+)
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+from adhesis.solver.sharp.system.edge_problem import EdgeProblem
+from adhesis.solver.sharp.tolerances import RESPONSE_TRIALS, RESPONSES_KEPT
+
+_ANY = np.empty(0, dtype=np.int64)
+
+
+class KeptResponse:
+    """A linear response, which changes in place.
+
+    Attributes
+    ----------
+    response : LinearResponse
+    settled : array, optional
+        Gaps for which it was last solved.
+    is_outgrown : bool
+        Whether some gap needs more nodes than it has.
+    version : int
+        Changes whenever the response does.
+    """
+
+    def __init__(self, response: LinearResponse) -> None:
+        self.response = response
+        self.settled: Array | None = None
+        self.is_outgrown, self.version = False, 0
+
+
+class KeptResponses:
+    """The last linear responses of one problem, each with another number of gaps.
+
+    A jump leads from one number to another, is compared with its rival, and goes on from either.
+
+    Parameters
+    ----------
+    problem : EdgeProblem
+    """
+
+    def __init__(self, problem: EdgeProblem) -> None:
+        self._problem = problem
+        self._kept: list[KeptResponse] = []  # the last one at the end
+
+    def forget(self) -> None:
+        """Forget all, on which results depend within the error of the field."""
+        self._kept.clear()
+
+    def near(self, gaps: Array, prescribed: float, least: Integers) -> KeptResponse | None:
+        """Return a response of as many gaps, not far from these if possible, that is to change.
+
+        ``least`` are the least orders of the gaps, or empty. None if these have no field.
+        """
+        kept = self._kept
+        for known in reversed(kept):
+            if len(known.response.nodes.orders) == len(gaps) and not known.is_outgrown:
+                kept.remove(known)
+                break
+        else:
+            response = self._new(gaps, prescribed, least)
+            kept[:] = [old for old in kept if len(old.response.nodes.orders) != len(gaps)]
+            if response is None:
+                return None
+            known = KeptResponse(response)
+        kept.append(known)
+        del kept[:-RESPONSES_KEPT]
+        known.settled = None
+        known.version += 1
+        return known
+
+    def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
+        """Set up a response of these gaps, from the last one if there is one."""
+        problem = self._problem
+        law, model = problem.law, problem.model
+        problem.count.fields += 1
+        if self._kept:
+            last = self._kept[-1].response
+            response, has_field = respond_again(last, gaps, prescribed, least, law, model)
+        else:
+            orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+            if len(least) == len(orders):
+                orders = np.maximum(orders, least)
+            response, has_field = respond(gaps, prescribed, orders, law, model)
+        return response if has_field else None
+
+    def at(self, gaps: Array, prescribed: float) -> KeptResponse | None:
+        """Return the response about these gaps; None if they have no field."""
+        problem = self._problem
+        for known in self._kept:
+            if known.settled is gaps:
+                return known
+        for _ in range(RESPONSE_TRIALS):
+            near = self.near(gaps, prescribed, _ANY)
+            if near is None:
+                return None
+            if settle_response(near.response, gaps, prescribed, problem.law, problem.model):
+                near.settled = gaps
+                return near
+            near.is_outgrown = True
+        return None
