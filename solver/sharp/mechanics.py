@@ -87,29 +87,14 @@ class EdgeMechanics(EdgeProblem):
         equilibrium is not stable. ``orders`` are the least orders of the gaps. If not ``patient``,
         gaps that are nearly in equilibrium are taken as they are.
         """
-        return self.correct(gaps, prescribed, reach, orders, patient=patient)[0]
-
-    def correct(
-        self,
-        gaps: Array,
-        prescribed: float,
-        reach: float,
-        orders: Integers = _ANY,
-        *,
-        patient: bool = True,
-    ) -> tuple[Point | None, int]:
-        """Return the equilibrium as :meth:`equilibrium` does, and the edge that moved away instead.
-
-        That is -1 where one is found, or where no single edge is known.
-        """
         if not shortest_length(gaps) > 0:
-            return None, -1
+            return None
         try:
             return self.system(gaps).equilibrium(
                 gaps, prescribed, max(reach, self.settled), orders, patient=patient
             )
         except np.linalg.LinAlgError:
-            return None, -1
+            return None
 
     @property
     def responses(self) -> KeptResponses:

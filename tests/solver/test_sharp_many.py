@@ -17,10 +17,8 @@ from adhesis.solver.sharp.equilibrium.griffith import (
     symmetrise,
 )
 from adhesis.solver.sharp.equilibrium.linear_exterior import open_window
-from adhesis.solver.sharp.equilibrium.linear_response import (
-    respond,
-    solve_response,
-)
+from adhesis.solver.sharp.equilibrium.linear_response import solve_response
+from adhesis.solver.sharp.equilibrium.renewal import respond
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.field.cluster_tree import build_tree

@@ -182,9 +182,7 @@ def descend(
             take(step, interaction)
             gaps = step.gaps
     points = trajectory.points[: trajectory.length]
-    return Descent(
-        gaps, event, orders, fields, tangents, points, comparison.has_left, interaction
-    )
+    return Descent(gaps, event, orders, fields, tangents, points, comparison.has_left, interaction)
 
 
 @compiled

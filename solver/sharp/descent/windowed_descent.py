@@ -37,11 +37,10 @@ from adhesis.solver.sharp.equilibrium.linear_exterior import extend_window, open
 from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
     motion_to,
-    move_references,
     pressure_at,
-    renew_held,
     solve_response,
 )
+from adhesis.solver.sharp.equilibrium.renewal import move_references, renew_held
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.tolerances import (
     FAR_FROM_BALANCE,

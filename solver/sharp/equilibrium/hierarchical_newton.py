@@ -11,15 +11,13 @@ from adhesis.solver.runtime.jit import compiled_for_both
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, shortest_length
 from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
-    departed,
     motion_to,
-    move_references,
     moved_gaps,
     no_motion,
     pressure_at,
-    renew_held,
     solve_response,
 )
+from adhesis.solver.sharp.equilibrium.renewal import departed, move_references, renew_held
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.tolerances import (

@@ -18,8 +18,8 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
     motion_in,
     motion_to,
-    renew_held,
 )
+from adhesis.solver.sharp.equilibrium.renewal import renew_held
 from adhesis.solver.sharp.field.cluster_tree import (
     Charges,
     Tree,

@@ -51,9 +51,7 @@ def assemble_dense(
 
 
 @compiled
-def assemble_changed(
-    table: Array, before: Solution, model: FieldModel
-) -> tuple[Nodes, Equations]:
+def assemble_changed(table: Array, before: Solution, model: FieldModel) -> tuple[Nodes, Equations]:
     """Assemble as :func:`assemble_dense`, taking over the parts of gaps that have not changed."""
     old, known = before.nodes, before.equations
     offset = old.offset

@@ -173,9 +173,7 @@ def solve_many(
 
 
 @compiled
-def solve_loads(
-    system: HierarchicalSystem, offset: Integers, load: Array, charge: Array
-) -> Array:
+def solve_loads(system: HierarchicalSystem, offset: Integers, load: Array, charge: Array) -> Array:
     """Apply (B + G)⁻¹ to loads, and to the potentials of further charges of the gaps, as columns.
 
     The potential of a gap's further charges in that gap itself is part of its load.
@@ -184,9 +182,7 @@ def solve_loads(
     w = system.weights.reshape(-1, 1)
     charges = upward_pass(system.tree, system.factor, isolated * w + charge)
     potential = np.zeros(charges.coupled.shape)
-    downward_pass(
-        system.tree, system.factor, whole_tree(system.tree), charges.coupled, potential
-    )
+    downward_pass(system.tree, system.factor, whole_tree(system.tree), charges.coupled, potential)
     of_nodes = np.ascontiguousarray(potential[:, : load.shape[0]].T)
     return isolated - apply_inverse(offset, system.inverse, of_nodes * w)
 

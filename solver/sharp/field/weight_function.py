@@ -26,9 +26,7 @@ from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 
 @compiled
-def end_singularity(
-    nodes: Nodes, e: int, rules: GaussRules, density: Array
-) -> tuple[float, float]:
+def end_singularity(nodes: Nodes, e: int, rules: GaussRules, density: Array) -> tuple[float, float]:
     """Compute the singular opening of edge e: weight at the edge, and area.
 
     ``density`` is filled with that at the nodes of its gap.

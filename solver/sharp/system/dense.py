@@ -49,7 +49,7 @@ class DenseSystem(EdgeSystem):
 
     def equilibrium(
         self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
-    ) -> tuple[Point | None, int]:
+    ) -> Point | None:
         """Iterate for the equilibrium near these gaps, by the matrix of all edges."""
         problem = self._problem
         found, at, solution, rate, slope, steps = equilibrium(
@@ -57,8 +57,8 @@ class DenseSystem(EdgeSystem):
         )
         problem.count.newton(steps)
         if not found:
-            return None, -1
-        return Point(prescribed, problem.solved(at, prescribed, solution), rate, slope), -1
+            return None
+        return Point(prescribed, problem.solved(at, prescribed, solution), rate, slope)
 
     def descend(
         self,

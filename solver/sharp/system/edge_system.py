@@ -57,15 +57,13 @@ class EdgeSystem(ABC):
     @abstractmethod
     def equilibrium(
         self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
-    ) -> tuple[Point | None, int]:
+    ) -> Point | None:
         """Iterate for the equilibrium near these gaps.
 
         Returns
         -------
         Point or None
             None unless the iteration converged to a stable equilibrium within reach.
-        int
-            Where nothing was found, the edge that moved away; -1 if it is unknown.
 
         Raises
         ------

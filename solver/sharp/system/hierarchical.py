@@ -83,7 +83,7 @@ class HierarchicalSystem(EdgeSystem):
 
     def equilibrium(
         self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
-    ) -> tuple[Point | None, int]:
+    ) -> Point | None:
         """Iterate for the equilibrium near these gaps, the edges of each gap eliminated."""
         problem = self._problem
         start, least = gaps, orders
@@ -98,13 +98,12 @@ class HierarchicalSystem(EdgeSystem):
             if found.event == FOUND:
                 near.settled = found.gaps
                 edges = _Found(problem, prescribed, near.response, found)
-                return PointOfMany(edges, prescribed), -1
+                return PointOfMany(edges, prescribed)
             if found.event != MORE_NODES:
-                lost = found.rate
-                return None, int(np.argmax(np.abs(lost))) if np.isfinite(lost).all() else -1
+                break
             start, least = found.gaps, _ANY
             near.is_outgrown = True
-        return None, -1
+        return None
 
     def descend(
         self,
