@@ -79,8 +79,8 @@ NEWTON_GROWTH = 2.0
 """Share of the last correction that the next one may have, at most; else the iteration diverges."""
 
 HIERARCHICAL_NEWTON_GROWTH = 0.7
-"""The same for many gaps, where an iteration that hardly shrinks is given up early: of some 1,300
-that came to a minimum one in a hundred had a correction half as large as the one before."""
+"""The same for many gaps, where an iteration that hardly shrinks is given up early. Corrections no
+longer than ``DESCENT_HANDS_OVER`` are not judged so: the error of references takes part in them."""
 
 KNOWN_TANGENT = 1e-3
 """Relative change of the tangent by a last correction below which it serves for the branch after

@@ -28,7 +28,7 @@ MATHEMATICAL = {
         "VANISHED",
         "STEP_LIMIT",
         "NO_FIELD",
-        "MORE_NODES",
+        "OUTGROWN",
         "REJOINED",
     },
     "output/grid_fields.py": {"_FIELD_NODES", "_FINER"},  # nodes of an output, not of a loop

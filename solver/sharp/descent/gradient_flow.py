@@ -64,7 +64,7 @@ VANISHED = 1  # a gap or patch is below the smallest length
 STEP_LIMIT = 2  # the fields that were allowed are used up
 NO_FIELD = 3  # the edges have no field
 REJOINED = 4  # the descent is on the other one's trajectory again
-MORE_NODES = 5  # of many gaps, some need more nodes than they have
+OUTGROWN = 5  # some of many gaps need more nodes than their linear response has
 
 
 class Descent(NamedTuple):

@@ -19,8 +19,8 @@ from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.edge_forces import FlowProblem
 from adhesis.solver.sharp.descent.gradient_flow import (
     AT_REST,
-    MORE_NODES,
     NO_FIELD,
+    OUTGROWN,
     STEP_LIMIT,
     VANISHED,
     Descent,
@@ -88,7 +88,7 @@ def descend_many(
 ) -> Descent:
     """Descend as ``gradient_flow.descend`` does, with many gaps, on a response about such gaps.
 
-    Trajectory and interaction are not known, and left empty. The event is MORE_NODES where the
+    Trajectory and interaction are not known, and left empty. The event is OUTGROWN where the
     response must be set up anew for the gaps that were reached.
     """
     law, model = system.law, system.model
@@ -101,7 +101,7 @@ def descend_many(
     while fields < most_fields:
         renew_held(response, np.zeros(count, dtype=np.bool_), law, model)
         if not move_references(response, gaps, pressure, prescribed, law, model):
-            event = MORE_NODES
+            event = OUTGROWN
             break
         now = solve_response(response, prescribed, model.device)
         pressure = now.pressure

@@ -73,8 +73,8 @@ def _load_gap(
 def _near_potential(out: LinearResponse, k: int, own: Array, slope: Array) -> None:
     """Compute the potential g of both neighbours at the nodes of a gap, and its derivative by θ.
 
-    They change it most sharply: without them the derivative of the interpolated potential is
-    exacter by an order of magnitude.
+    They change it most sharply. Without them the derivative of the interpolated potential is more
+    accurate, for uneven gaps by an order of magnitude.
     """
     nodes, opening = out.nodes, out.scaled_opening
     offset, sine, cosine = nodes.offset, nodes.sine, nodes.cosine
@@ -154,10 +154,8 @@ def _move_gap(
     own = slice(nodes.offset[k], nodes.offset[k + 1])
     potential, pressure = out.about[own], out.about_pressure[k]
     residual = out.residual[2 * k : 2 * k + 2]
-    tangent, compliance = (
-        space[:, :2],
-        space[:, 2:],
-    )  # ∂(C_e - C_c)/∂n_f in the potential of the others
+    # ∂(C_e - C_c)/∂n_f in the potential of the others, and its inverse
+    tangent, compliance = space[:, :2], space[:, 2:]
     for side in range(2):
         place = nodes.table[k, LEFT + side]
         critical, drift = critical_opening(place, law, model.panels)

@@ -8,11 +8,10 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled_for_both
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, shortest_length
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, move_edges, shortest_length
 from adhesis.solver.sharp.equilibrium.linear_response import (
     LinearResponse,
     motion_to,
-    moved_gaps,
     no_motion,
     pressure_at,
     solve_response,
@@ -26,29 +25,29 @@ from adhesis.solver.sharp.tolerances import (
     STALLED_SHARE,
 )
 
-FOUND, NOT_FOUND, MORE_NODES = 0, 1, 2
-
 
 class EquilibriumOfMany(NamedTuple):
     """Result of Newton's iteration on many gaps.
 
     Attributes
     ----------
-    event : int
-        FOUND if a stable equilibrium was found within reach; MORE_NODES if a gap or run needs more
-        than the response has, which is then of no further use.
+    found : bool
+        Whether a stable equilibrium was found within reach.
+    is_outgrown : bool
+        Whether the iteration ended because a gap or run needs more nodes than the response has.
     gaps : array, shape (L, 2)
     potential : array, shape (N,)
         Of the other gaps at the reference nodes, as G.
     rate : array, shape (2L,)
-        dn/dd of every edge along the branch; if no equilibrium was found, the last correction.
+        dn/dd of every edge along the branch.
     pressure, separation : float
     slope : float
         dY/dd along the branch: Y is p, under a load q0 s.
     corrections : int
     """
 
-    event: int
+    found: bool
+    is_outgrown: bool
     gaps: Array
     potential: Array
     rate: Array
@@ -72,22 +71,21 @@ def equilibrium_many(
 
     The references of gaps follow where they move by more than that to which the response is
     accurate. Where the edges are not stable on the way, or the corrections hardly shrink, the
-    iteration ends: of some 1,300 that came to a minimum four had not been stable, and one in a
-    hundred had a correction half as large as the one before.
+    iteration ends.
     """
     travelled = np.zeros(gaps.size)
     last = np.inf
     judged_again = False
-    event = NOT_FOUND
+    found = False
+    is_outgrown = False
     steps = 0
     pressure = pressure_at(response, prescribed, model.device)
     renew_held(response, np.zeros(gaps.shape[0], dtype=np.bool_), law, model)
     now = no_motion(gaps.shape[0])
-    step = now.motion
     while True:
         steps += 1
         if not move_references(response, gaps, pressure, prescribed, law, model):
-            event = MORE_NODES
+            is_outgrown = True
             break
         now = solve_response(response, prescribed, model.device)
         pressure = now.pressure
@@ -106,23 +104,20 @@ def equilibrium_many(
         # not written as > : a size that is no number is a failure, too
         most = max(HIERARCHICAL_NEWTON_GROWTH * last, law.rest_step)
         within = size <= min(reach, most)
-        moved = moved_gaps(response, now.motion)
+        moved = move_edges(response.nodes.table[:, :2], now.motion)
         if not (within and np.abs(travelled).max() <= reach and shortest_length(moved) > 0):
             break
         gaps = moved
         at_rest = stalled or (not strict and size <= law.rest_step)
         if at_rest or not departed(response, map_gaps(gaps), law)[0].any():
-            event = FOUND
+            found = True
             break
         if steps == MOST_CORRECTIONS:
             break
         last = size
     potential = np.empty(response.nodes.theta.shape[0])
-    rate = step
-    if event == FOUND:
-        rate = now.rate
-        for i in range(potential.shape[0]):
-            potential[i] = response.potential[0, i] + pressure * response.potential[1, i]
+    for i in range(potential.shape[0]):
+        potential[i] = response.potential[0, i] + pressure * response.potential[1, i]
     return EquilibriumOfMany(
-        event, gaps, potential, rate, pressure, now.separation, now.slope, steps
+        found, is_outgrown, gaps, potential, now.rate, pressure, now.separation, now.slope, steps
     )

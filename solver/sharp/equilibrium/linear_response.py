@@ -223,17 +223,6 @@ def motion_in(response: LinearResponse, potential: Array, wanted: Flags) -> Arra
 
 
 @compiled
-def moved_gaps(response: LinearResponse, motion: Array) -> Array:
-    """Return the gaps whose edges have moved so far outwards from their references."""
-    table = response.nodes.table
-    out = np.empty((table.shape[0], 2))
-    for k in range(out.shape[0]):
-        out[k, 0] = table[k, LEFT] + motion[2 * k]
-        out[k, 1] = table[k, RIGHT] - motion[2 * k + 1]
-    return out
-
-
-@compiled
 def motion_to(response: LinearResponse, gaps: Array) -> Array:
     """Compute the motion of all edges outwards from their references to these."""
     table = response.nodes.table

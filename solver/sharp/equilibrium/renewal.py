@@ -31,6 +31,7 @@ from adhesis.solver.sharp.field.cluster_tree import (
 from adhesis.solver.sharp.field.hierarchical_solver import (
     gap_potentials,
     invert_block,
+    quadrature_weights,
     solve_many,
 )
 from adhesis.solver.sharp.field.separate_gaps import interpolate_potential
@@ -106,12 +107,8 @@ def respond_again(
             table[k] = known.nodes.table[source[k]]
             orders[k] = known.nodes.orders[source[k]]
     nodes, equations = assemble_some(table, orders, source, known.nodes, known.equations, model)
-    offset, n = nodes.offset, nodes.theta.shape[0]
-    stretch = np.empty(n)
-    for k in range(orders.shape[0]):
-        start = model.rules.vector_start[orders[k]] - offset[k]
-        for i in range(offset[k], offset[k + 1]):
-            stretch[i] = nodes.weight[i] / model.rules.weights[start + i]
+    offset = nodes.offset
+    stretch = nodes.weight / quadrature_weights(nodes, model.rules)
     tree = build_tree(table, offset, nodes.theta, stretch, model.digits, True)
     out = allocate_response(nodes, equations, tree, empty_factor(tree))
     out.held[:] = fresh
@@ -260,7 +257,8 @@ def move_references(
     """Move the references of gaps to these edges where they have departed from them.
 
     ``pressure`` is p, with which the last solution gives the potentials. Returns False where a gap
-    or run needs more nodes than it has: then all gaps must be solved anew.
+    or run needs more nodes than it has, or many gaps are far from their references: then another
+    response is to be set up.
     """
     table = map_gaps(gaps)
     nodes, counts = response.nodes, model.rules.counts
@@ -283,6 +281,7 @@ def move_references(
     fill_gaps(indices, nodes, response.equations, column, model)
     for k in range(changed.shape[0]):
         if changed[k] and not _renew_gap(response, k, before[k], pressure, law, model):
+            nodes.table[changed] = np.nan  # they serve for no other response
             return False
     if not _replace_runs(response, changed, model):
         return False
@@ -322,7 +321,6 @@ def _renew_gap(
     square = slice(tree.response_start[k], tree.response_start[k + 1])
     block = response.equations.matrix[first : first + m, :m]
     if not invert_block(block, response.inverse[square]):
-        nodes.table[k] = np.nan  # serves for no other
         return False
     linearise_gap(response, k, law, model)
     return True

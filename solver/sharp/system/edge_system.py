@@ -30,7 +30,7 @@ class EdgeSystem(ABC):
     Attributes
     ----------
     uses_windows : bool
-        Whether few gaps are followed in windows, the others responding linearly.
+        Whether descents move few gaps at a time, in windows, the others responding linearly.
     closing_factor : float
         A gap closes locally at most so many times faster than gaps on average. Where a search for
         touches costs more than to return to a touch that was passed, this is 1.

@@ -10,16 +10,13 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.descent.edge_forces import FlowProblem
-from adhesis.solver.sharp.descent.gradient_flow import MORE_NODES as DESCENT_NEEDS_MORE
-from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD, STEP_LIMIT, Descent
+from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD, OUTGROWN, STEP_LIMIT, Descent
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.descent.windowed_descent import descend_many
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.edge_interaction import openings_between_edges
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
-    FOUND,
-    MORE_NODES,
     EquilibriumOfMany,
     equilibrium_many,
 )
@@ -40,8 +37,6 @@ from adhesis.solver.sharp.tolerances import (
     FINER_FIELD,
     RESPONSE_TRIALS,
 )
-
-_ANY = np.empty(0, dtype=np.int64)
 
 
 class HierarchicalSystem(EdgeSystem):
@@ -86,22 +81,21 @@ class HierarchicalSystem(EdgeSystem):
     ) -> Point | None:
         """Iterate for the equilibrium near these gaps, the edges of each gap eliminated."""
         problem = self._problem
-        start, least = gaps, orders
+        start = gaps
         for _ in range(RESPONSE_TRIALS):
-            near = self.responses.near(start, prescribed, least)
+            near = self.responses.near(start, prescribed, orders)
             if near is None:
                 break
             found: EquilibriumOfMany = equilibrium_many(
                 near.response, start, prescribed, reach, patient, problem.law, problem.model
             )
             problem.count.newton(found.corrections)
-            if found.event == FOUND:
+            if found.found:
                 near.settled = found.gaps
-                edges = _Found(problem, prescribed, near.response, found)
-                return PointOfMany(edges, prescribed)
-            if found.event != MORE_NODES:
+                return PointOfMany(_Found(problem, prescribed, near.response, found))
+            if not found.is_outgrown:
                 break
-            start, least = found.gaps, _ANY
+            start = found.gaps
             near.is_outgrown = True
         return None
 
@@ -132,7 +126,7 @@ class HierarchicalSystem(EdgeSystem):
             fields += found.fields
             tangents += found.tangents
             gaps, orders = found.gaps, found.orders
-            if found.event != DESCENT_NEEDS_MORE:
+            if found.event != OUTGROWN:
                 return found._replace(fields=fields, tangents=tangents)
             near.is_outgrown = True
             fields += 1
@@ -163,30 +157,30 @@ class _Found:
     def __init__(
         self, problem: EdgeProblem, at: float, response: LinearResponse, found: EquilibriumOfMany
     ) -> None:
-        self._problem, self._at, self.edges = problem, at, found
+        self._problem, self.at, self.equilibrium = problem, at, found
         # the response will change
         self._table, self._orders = response.nodes.table.copy(), response.nodes.orders.copy()
 
     @cached_property
     def field(self) -> GapField:
         """Field between the edges."""
-        problem, found = self._problem, self.edges
+        problem, found = self._problem, self.equilibrium
         solution: Solution = solve_separately(
             found.gaps, self._table, self._orders, found.potential, found.pressure,
-            self._at, problem.model,
+            self.at, problem.model,
         )  # fmt: skip
         return FieldOfMany(
-            problem.source, found.gaps, self._at, problem.tolerance, problem.model.device, solution
+            problem.source, found.gaps, self.at, problem.tolerance, problem.model.device, solution
         )
 
 
 class PointOfMany(Point):
     """A point of a branch of many gaps, whose field is solved when it is asked for."""
 
-    def __init__(self, found: _Found, at: float) -> None:
-        edges = found.edges
+    def __init__(self, found: _Found) -> None:
+        rate, slope = found.equilibrium.rate, found.equilibrium.slope
         # Point is frozen
-        self.__dict__.update(found=found, at=at, rate=edges.rate, slope=edges.slope)
+        self.__dict__.update(found=found, at=found.at, rate=rate, slope=slope)
 
     @property
     def _found(self) -> _Found:
@@ -201,14 +195,14 @@ class PointOfMany(Point):
     @property
     def gaps(self) -> Array:
         """Gap ends, shape (L, 2)."""
-        return self._found.edges.gaps
+        return self._found.equilibrium.gaps
 
     @property
     def pressure(self) -> float:
         """2p̄/E*."""
-        return self._found.edges.pressure
+        return self._found.equilibrium.pressure
 
     @property
     def separation(self) -> float:
         """Separation q0 s."""
-        return self._found.edges.separation
+        return self._found.equilibrium.separation

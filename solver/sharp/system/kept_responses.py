@@ -26,7 +26,7 @@ class KeptResponse:
     is_outgrown : bool
         Whether some gap needs more nodes than it has.
     version : int
-        Changes whenever the response does.
+        Changes whenever the response does; no other response has it.
     """
 
     def __init__(self, response: LinearResponse) -> None:
@@ -48,6 +48,7 @@ class KeptResponses:
     def __init__(self, problem: EdgeProblem) -> None:
         self._problem = problem
         self._kept: list[KeptResponse] = []  # the last one at the end
+        self._changes = 0
 
     def forget(self) -> None:
         """Forget all, on which results depend within the error of the field."""
@@ -72,7 +73,8 @@ class KeptResponses:
         kept.append(known)
         del kept[:-RESPONSES_KEPT]
         known.settled = None
-        known.version += 1
+        self._changes += 1
+        known.version = self._changes
         return known
 
     def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
