@@ -190,7 +190,7 @@ def relaxed(edges, gaps, at):
 
 def test_an_equilibrium_of_many_gaps_is_the_dense_one(loaded, hierarchical):
     """Edges and rates against dense matrices a hundred times as accurate."""
-    method, state = loaded
+    method, _ = loaded
     edges, point = hierarchical
     exact = SharpMethod(method.problem, accuracy=1e-6).edges
     dense = exact.equilibrium(point.gaps, point.at, exact.wave)

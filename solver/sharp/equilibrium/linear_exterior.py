@@ -20,19 +20,18 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     motion_to,
 )
 from adhesis.solver.sharp.equilibrium.renewal import renew_held
-from adhesis.solver.sharp.field.cluster_tree import (
+from adhesis.solver.sharp.field.cluster_tree import Tree, build_tree
+from adhesis.solver.sharp.field.dense_solver import solve
+from adhesis.solver.sharp.field.exterior import Exterior, exterior_kernel
+from adhesis.solver.sharp.field.solution import FieldModel
+from adhesis.solver.sharp.field.tree_factor import (
     Charges,
-    Tree,
     TreeFactor,
-    build_tree,
     downward_pass,
     factor_tree,
     upward_pass,
     whole_tree,
 )
-from adhesis.solver.sharp.field.dense_solver import solve
-from adhesis.solver.sharp.field.exterior import Exterior, exterior_kernel
-from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.gap.quadrature import Integers

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.field.cluster_tree import (
+from adhesis.solver.sharp.field.cluster_tree import Tree
+from adhesis.solver.sharp.field.solution import Equations, LoadingDevice, Nodes
+from adhesis.solver.sharp.field.tree_factor import (
     Charges,
-    Tree,
     TreeFactor,
     downward_pass,
     whole_tree,
 )
-from adhesis.solver.sharp.field.solution import Equations, LoadingDevice, Nodes
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT
 from adhesis.solver.sharp.tolerances import SOFT_RATE
 

@@ -21,13 +21,7 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     solve_response,
 )
 from adhesis.solver.sharp.field.assembly import assemble_some, fill_gaps
-from adhesis.solver.sharp.field.cluster_tree import (
-    build_tree,
-    charge_run,
-    empty_factor,
-    factor_run,
-    replace_run,
-)
+from adhesis.solver.sharp.field.cluster_tree import build_tree, replace_run
 from adhesis.solver.sharp.field.hierarchical_solver import (
     gap_potentials,
     invert_block,
@@ -36,6 +30,7 @@ from adhesis.solver.sharp.field.hierarchical_solver import (
 )
 from adhesis.solver.sharp.field.separate_gaps import interpolate_potential
 from adhesis.solver.sharp.field.solution import FieldModel
+from adhesis.solver.sharp.field.tree_factor import charge_run, empty_factor, factor_run
 from adhesis.solver.sharp.gap.conformal_map import (
     LEFT,
     LEFT_PATCH,

@@ -14,15 +14,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.field.assembly import assemble_blocks
 from adhesis.solver.sharp.field.cholesky import factor_rows, solve_factored
-from adhesis.solver.sharp.field.cluster_tree import (
-    Tree,
-    TreeFactor,
-    build_tree,
-    downward_pass,
-    factor_tree,
-    upward_pass,
-    whole_tree,
-)
+from adhesis.solver.sharp.field.cluster_tree import Tree, build_tree
 from adhesis.solver.sharp.field.solution import (
     FieldModel,
     Nodes,
@@ -30,6 +22,13 @@ from adhesis.solver.sharp.field.solution import (
     balance_means,
     combine_openings,
     no_exterior_terms,
+)
+from adhesis.solver.sharp.field.tree_factor import (
+    TreeFactor,
+    downward_pass,
+    factor_tree,
+    upward_pass,
+    whole_tree,
 )
 from adhesis.solver.sharp.gap.conformal_map import in_order, map_gaps
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
