@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import pkgutil
+import re
 import shutil
 import sys
 import types
@@ -327,19 +328,48 @@ def sum_of_chosen(a):
 
 
 def sum_of_doubled(a):
-    return (2 * a).sum()
+    rows = a[1:]
+    doubled = 2 * rows
+    return doubled.sum() + rows.sum()
+
+
+def sum_of_view_of_doubled(a):
+    row = (2 * a)[1]  # keeps the doubled array, which no name keeps
+    other = np.ones(a.shape[1])
+    return row.sum() + other.sum()
+
+
+def sum_of_last(a):
+    last = a
+    for i in range(a.shape[0]):
+        if a[i, 0] > 1:
+            last = a[i:] + i  # sometimes the argument, sometimes made here
+    return last.sum()
 
 
 @pytest.mark.parametrize(
     ("function", "counts"),
-    [(sum_of_squares, False), (last_row, True), (sum_of_chosen, True), (sum_of_doubled, True)],
+    [
+        (sum_of_squares, set()),
+        (last_row, {"NRT_incref"}),
+        (sum_of_chosen, {"NRT_decref"}),
+        (sum_of_doubled, {"NRT_decref"}),
+        (sum_of_view_of_doubled, {"NRT_decref"}),
+        (sum_of_last, {"NRT_incref", "NRT_decref"}),
+    ],
 )
-def test_references_are_counted_where_arrays_are_made_or_returned(places, function, counts):
-    compiled = module.compiled(function)
+def test_references_are_counted_of_arrays_that_are_made_or_returned(places, function, counts):
+    compiled = module.compiled_for_both(function)
     given = np.arange(6.0).reshape(3, 2)
     wanted = np.array(function(given))
+    before = sys.getrefcount(given)
     result = compiled(given)
+    np.testing.assert_array_equal(result, wanted)
+    if function is not last_row:
+        assert sys.getrefcount(given) == before
     del given
     np.testing.assert_array_equal(result, wanted)
-    (code,) = compiled.inspect_llvm().values()
-    assert ("NRT_decref" in code) == counts
+    inner = module.compiled(function).inner  # without the unpacking of objects
+    inner.compile(compiled.signatures[0])
+    (code,) = inner.inspect_llvm().values()
+    assert set(re.findall(r"call void @(NRT_[id][ne]cref)", code)) == counts
