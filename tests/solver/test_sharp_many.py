@@ -10,6 +10,7 @@ import pytest
 from adhesis import HalfSpace, Problem, self_affine_profile
 from adhesis.solver.loading.loop import run_loop
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.edge_interaction import openings_between_edges
 from adhesis.solver.sharp.equilibrium.griffith import (
     edge_tangent,
     imbalance,
@@ -18,18 +19,24 @@ from adhesis.solver.sharp.equilibrium.griffith import (
 )
 from adhesis.solver.sharp.equilibrium.linear_exterior import open_window
 from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.renewal import respond
+from adhesis.solver.sharp.equilibrium.renewal import respond, respond_again
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.cholesky import is_definite
-from adhesis.solver.sharp.field.cluster_tree import build_tree
+from adhesis.solver.sharp.field.cluster_tree import build_tree, pair_again
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel
+from adhesis.solver.sharp.field.tree_factor import (
+    downward_pass,
+    factor_tree,
+    upward_pass,
+    whole_tree,
+)
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
-from adhesis.solver.sharp.gap.ends import with_patches
+from adhesis.solver.sharp.gap.ends import outward, with_patches
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
@@ -242,6 +249,91 @@ def test_an_equilibrium_of_other_gaps_is_found_on_the_response_of_these(hierarch
         assert np.abs(again.rate - anew.rate).max() < 1e-3 * np.abs(anew.rate).max()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_gaps_that_come_and_go_leave_the_other_runs_of_the_tree_as_they_are(seed):
+    """Every run joins neighbours, and those that stay hold the gaps that they held."""
+    rng = np.random.default_rng(seed)
+    children = build_tree(*arguments_of_tree(random_gaps(20, 0.3, 0.5, seed))).children
+    for _ in range(30):
+        before = (len(children) + 1) // 2
+        # some stay, in order, others come
+        stay = np.flatnonzero(rng.random(before) < rng.choice([0.5, 0.95]))
+        source = np.full(max(2, before + rng.integers(-3, 4), len(stay) + 1), -1)
+        source[np.sort(rng.choice(len(source), len(stay), replace=False))] = stay
+        again, same = pair_again(children, source)
+        gaps, known = gaps_of_runs(again), gaps_of_runs(children)
+        assert gaps[-1] == list(range(len(source)))
+        for run, of_run in enumerate(gaps):
+            assert of_run == list(range(of_run[0], of_run[-1] + 1))
+            if same[run] >= 0:
+                assert known[same[run]] == [source[k] for k in of_run]
+        assert (same[: len(source)] == source).all()
+        children = again
+
+
+def test_runs_without_a_change_are_taken_over():
+    children = build_tree(*arguments_of_tree(random_gaps(64, 0.3, 0.5))).children
+    source = np.delete(np.arange(64), 21)  # the patch between the gaps of a pair goes
+    source[20] = -1
+    _, same = pair_again(children, source)
+    assert (same[63:] < 0).sum() == 5  # all runs above the new gap: log2(64) - 1
+
+
+def gaps_of_runs(children):
+    """List the gaps of every run of a tree."""
+    gaps = []
+    for run, (one, two) in enumerate(children):
+        gaps.append([run] if one < 0 else gaps[one] + gaps[two])
+    return gaps
+
+
+def arguments_of_tree(ends, digits=12.0):
+    """Nodes of gaps, as ``build_tree`` takes them."""
+    table = map_gaps(ends)
+    orders = choose_orders(table, digits, GAUSS_RULES.counts)
+    offset = np.append(0, np.cumsum(GAUSS_RULES.counts[orders]))
+    theta = np.linspace(0.0, 1.0, offset[-1])
+    return table, offset, theta, np.ones(offset[-1]), digits, True
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
+    """Gaps merge, close and open, one after the other, each response set up from the last one."""
+    method, state = loaded
+    edges, at = method.edges, state.separation * method.q0
+    rng = np.random.default_rng(seed)
+    ends = random_gaps(40, 0.4, 0.5, seed)
+    orders = choose_orders(map_gaps(ends), edges.model.digits, GAUSS_RULES.counts)
+    response, _ = respond(ends, at, orders, edges.law, edges.model)
+    for change in ["merge", "merge", "close", "open", "open", "merge", "close", "close", "open"]:
+        k = int(rng.integers(1, len(ends) - 1))
+        if change == "merge":
+            ends = np.concatenate([ends[:k], [[ends[k, 0], ends[k + 1, 1]]], ends[k + 2 :]])
+        elif change == "close":
+            ends = np.delete(ends, k, axis=0)
+        else:
+            one, two = ends[k, 0] + np.diff(ends[k]) * [0.4, 0.6]
+            ends = np.concatenate([ends[:k], [[ends[k, 0], one], [two, ends[k, 1]]], ends[k + 1 :]])
+        none = np.empty(0, dtype=np.int64)
+        response, found = respond_again(response, ends, at, none, edges.law, edges.model)
+        assert found
+        solve_response(response, at, edges.model.device)
+        nodes, count, n = response.nodes, len(ends), len(response.nodes.theta)
+        tree = build_tree(
+            nodes.table, nodes.offset, response.tree.theta[:n], response.tree.stretch[:n],
+            edges.model.digits, True,
+        )  # fmt: skip
+        of_gaps = response.factor.response[: tree.response_start[count]]
+        factor = factor_tree(tree, of_gaps, response.factor.negative[:count])
+        charges = upward_pass(tree, factor, response.charges.isolated[:, :n].T.copy())
+        potential = np.zeros(charges.mutual.shape)
+        downward_pass(tree, factor, whole_tree(tree), charges, potential)
+        difference = np.abs(potential[:, :n] - response.potential[:, :n]).max(axis=1)
+        assert (difference < 1e-4 * np.abs(potential[:, :n]).max(axis=1)).all()
+        # far from balance; of two eigenvalues that change sign in one pair none is counted
+        assert (factor.negative[-1] - response.factor.negative[-1]) % 2 == 0
+
+
 def test_responses_of_a_few_numbers_of_gaps_are_kept(loaded):
     """A jump and its rival need two in turn; what is forgotten is set up anew."""
     method, state = loaded
@@ -358,7 +450,11 @@ def test_stiffness_between_some_edges_is_the_dense_one(loaded):
     finally:
         edges.many = before
     np.fill_diagonal(dense, 0.0)
-    assert np.abs(tree - dense).max() < 1e-5 * np.abs(dense).max()
+    assert np.abs(tree - dense).max() < 4e-3 * np.abs(dense).max()  # as ``RACE_FIELD`` says
+    orders = point.field.solution.nodes.orders
+    exact = openings_between_edges(point.gaps, at, orders, some, edges.model)
+    exact = exact * outward(point.gaps)[some]
+    assert np.abs(exact - dense).max() < 1e-5 * np.abs(dense).max()
 
 
 def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():

@@ -229,3 +229,8 @@ def _charge_gap(
                 value -= 0.5 * moving[side, j] * follows[i, side]
             response[i * m + j] = value
             charge[0, first + i] += value * potential[j]
+    for i in range(m):
+        total = 0.0
+        for j in range(m):
+            total += response[i * m + j] * out.tree.stretch[first + j]
+        out.mean_by_potential[first + i] = total

@@ -20,7 +20,7 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     motion_to,
 )
 from adhesis.solver.sharp.equilibrium.renewal import renew_held
-from adhesis.solver.sharp.field.cluster_tree import Tree, build_tree
+from adhesis.solver.sharp.field.cluster_tree import Tree, build_tree, run_span
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.exterior import Exterior, exterior_kernel
 from adhesis.solver.sharp.field.solution import FieldModel
@@ -185,15 +185,18 @@ def _reduce_exterior(outside: OutsideRuns, ends: Array, law: EdgeLaw, panels: Pa
     charge = np.empty((r, 2))
     charge[:, 0] = outside.charges.isolated[0, last]
     charge[:, 1] = -outside.charges.isolated[1, last]
-    final = outside.charges.coupled.copy()
-    if tree.children[run, 0] < 0:
-        final[:] = outside.charges.isolated
-    downward_pass(tree, factor, whole_tree(tree), final, np.zeros(final.shape))
+    potential = np.zeros(outside.charges.mutual.shape)
+    downward_pass(tree, factor, whole_tree(tree), outside.charges, potential)
     mean = np.zeros(2)
-    leaves = tree.node_start[outside.runs.shape[0]]
-    for i in range(leaves):
-        mean[0] += tree.stretch[i] * final[0, i]
-        mean[1] -= tree.stretch[i] * final[1, i]
+    for leaf in range(outside.runs.shape[0]):
+        own, size = run_span(tree.node_start, leaf), tree.rank[leaf]
+        stretch = tree.stretch[own]
+        response = factor.response[run_span(tree.response_start, leaf)].reshape(size, size)
+        by_potential = response @ stretch
+        for column in range(2):
+            charge_of_leaf, there = outside.charges.isolated[column], potential[column]
+            mean[column] += charge_of_leaf[own] @ stretch - there[own] @ by_potential
+    mean[1] = -mean[1]
     opening = np.empty(2)
     for side in range(2):
         opening[side], _ = critical_opening(ends[side], law, panels)
@@ -226,28 +229,20 @@ def extend_window(
     now = solve(window, prescribed, orders, 1, model, exterior)
     kernel, _ = exterior_kernel(now.nodes.theta, now.nodes.weight, exterior)
     own = outside.tree
-    charge = np.zeros((1, outside.charges.coupled.shape[1]))
-    for i in range(charge.shape[1]):
-        charge[0, i] = outside.charges.coupled[0, i] + now.pressure * outside.charges.coupled[1, i]
-    potential = np.zeros(charge.shape)
+    potential = np.zeros(outside.charges.mutual.shape)
     whole = own.node_start[own.rank.shape[0] - 1]
     for i in range(kernel.shape[0]):
         for a in range(kernel.shape[1]):
             potential[0, whole + a] -= kernel[i, a] * now.scaled_opening[i]
-    downward_pass(own, outside.factor, whole_tree(own), charge, potential)
+    downward_pass(own, outside.factor, whole_tree(own), outside.charges, potential)
     tree = response.tree
-    inside = np.zeros((1, tree.theta.shape[0]))
-    of_all = np.empty((1, tree.theta.shape[0]))
-    for i in range(of_all.shape[1]):
-        coupled = response.charges.coupled
-        of_all[0, i] = coupled[0, i] + now.pressure * coupled[1, i]
+    inside = np.zeros(response.potential.shape)
     below = np.zeros(tree.rank.shape[0], dtype=np.bool_)
     for i in range(outside.runs.shape[0]):
         run = outside.runs[i]
         below[run] = True
-        for j in range(tree.rank[run]):
-            inside[0, tree.node_start[run] + j] = potential[0, own.node_start[i] + j]
-    downward_pass(tree, response.factor, below, of_all, inside)
+        inside[:, run_span(tree.node_start, run)] = potential[:, run_span(own.node_start, i)]
+    downward_pass(tree, response.factor, below, response.charges, inside)
     wanted: Flags = np.zeros(outside.edges.shape[0], dtype=np.bool_)
     wanted[outside.gaps] = True
     motion = motion_in(response, inside, wanted)

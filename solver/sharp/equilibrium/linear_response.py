@@ -61,6 +61,8 @@ class LinearResponse(NamedTuple):
         Motions of its edges without potentials and p, and by a unit of p.
     motion_by_potential : array, shape (N, 2)
         Motion of both edges of a gap by the potential at each of its nodes.
+    mean_by_potential : array, shape (N,)
+        Its mean opening, times 2π, likewise, with the other sign.
     potential : array, shape (2, nodes of all runs)
         Of the last solution, without p and by a unit of p.
     mean : array, shape (2,)
@@ -83,6 +85,7 @@ class LinearResponse(NamedTuple):
     balancing: Array
     motion: Array
     motion_by_potential: Array
+    mean_by_potential: Array
     potential: Array
     mean: Array
     softness: Array
@@ -140,6 +143,7 @@ def allocate_response(
         balancing=np.zeros(2 * count),
         motion=np.zeros((2 * count, 2)),
         motion_by_potential=np.zeros((n, 2)),
+        mean_by_potential=np.zeros(n),
         potential=np.zeros((2, size)),
         mean=np.zeros(2),
         softness=np.ones(count),
@@ -153,13 +157,14 @@ def solve_response(
     """Solve for all edges, with d prescribed."""
     tree, nodes = response.tree, response.nodes
     count, n = nodes.orders.shape[0], nodes.theta.shape[0]
-    charge, potential = response.charges.coupled.copy(), response.potential
-    downward_pass(tree, response.factor, whole_tree(tree), charge, potential)
+    charges, potential = response.charges, response.potential
+    downward_pass(tree, response.factor, whole_tree(tree), charges, potential)
     mean = response.mean
     mean[:] = 0.0
     for column in range(2):
         for i in range(n):
-            mean[column] += tree.stretch[i] * charge[column, i]
+            mean[column] += tree.stretch[i] * charges.isolated[column, i]
+            mean[column] -= response.mean_by_potential[i] * potential[column, i]
     motion = motion_in(response, potential, np.ones(count, dtype=np.bool_))
     # weight·mean - 2π compliance·p = 2π d
     weight = device.separation_weight
@@ -208,7 +213,7 @@ def pressure_at(response: LinearResponse, prescribed: float, device: LoadingDevi
 def motion_in(response: LinearResponse, potential: Array, wanted: Flags) -> Array:
     """Compute the motions of some gaps' edges, shape (2L, 2): in potentials, and by a unit of p.
 
-    The potentials have one row, or a second for those by a unit of p.
+    The potentials have a row for each.
     """
     offset, follows = response.nodes.offset, response.motion_by_potential
     motion = response.motion.copy()

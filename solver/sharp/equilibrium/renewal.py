@@ -21,7 +21,13 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     solve_response,
 )
 from adhesis.solver.sharp.field.assembly import assemble_some, fill_gaps
-from adhesis.solver.sharp.field.cluster_tree import build_tree, replace_run
+from adhesis.solver.sharp.field.cluster_tree import (
+    empty_tree,
+    pair_again,
+    place_charges,
+    replace_run,
+    run_span,
+)
 from adhesis.solver.sharp.field.hierarchical_solver import (
     gap_potentials,
     invert_block,
@@ -103,21 +109,31 @@ def respond_again(
             orders[k] = known.nodes.orders[source[k]]
     nodes, equations = assemble_some(table, orders, source, known.nodes, known.equations, model)
     offset = nodes.offset
-    stretch = nodes.weight / quadrature_weights(nodes, model.rules)
-    tree = build_tree(table, offset, nodes.theta, stretch, model.digits, True)
+    children, same = pair_again(known.tree.children, source)
+    rank = np.zeros(same.shape[0], dtype=np.int64)
+    for run in range(same.shape[0]):
+        if same[run] >= 0:
+            rank[run] = known.tree.rank[same[run]]
+    tree = empty_tree(table, offset, children, rank, model.digits, True)
     out = allocate_response(nodes, equations, tree, empty_factor(tree))
     out.held[:] = fresh
+    tree.theta[: offset[-1]] = nodes.theta
+    tree.stretch[: offset[-1]] = nodes.weight / quadrature_weights(nodes, model.rules)
+    for run in range(same.shape[0]):
+        if same[run] >= 0:
+            _copy_run(known, same[run], out, run)
+        elif run >= orders.shape[0]:
+            place_charges(tree, run)
     for k in range(orders.shape[0]):
-        own = slice(offset[k], offset[k + 1])
-        square = slice(tree.response_start[k], tree.response_start[k + 1])
         if fresh[k]:
+            own = slice(offset[k], offset[k + 1])
             block = equations.matrix[own, : offset[k + 1] - offset[k]]
-            if not invert_block(block, out.inverse[square]):
+            if not invert_block(block, out.inverse[run_span(tree.response_start, k)]):
                 return out, False
             linearise_gap(out, k, law, model)
         else:
             _copy_gap(known, source[k], out, k)
-    _factor_runs(out, np.ones(orders.shape[0], dtype=np.bool_))
+    _factor_runs(out, same < 0)
     pressure = solve_response(out, prescribed, model.device).pressure
     if not np.isfinite(pressure):
         return out, False
@@ -148,16 +164,37 @@ def _known_gaps(known: LinearResponse, table: Array, law: EdgeLaw, model: FieldM
 
 
 @compiled
+def _copy_run(known: LinearResponse, old: int, out: LinearResponse, new: int) -> None:
+    """Copy the charges and the response of a run, and how its halves act on each other."""
+    source, tree = known.tree, out.tree
+    theirs, own = run_span(source.node_start, old), run_span(tree.node_start, new)
+    tree.theta[own], tree.stretch[own] = source.theta[theirs], source.stretch[theirs]
+    out.charges.isolated[:, own] = known.charges.isolated[:, theirs]
+    theirs, own = run_span(source.response_start, old), run_span(tree.response_start, new)
+    out.factor.response[own] = known.factor.response[theirs]
+    out.factor.negative[new] = known.factor.negative[old]
+    theirs, own = run_span(source.pair_start, old), run_span(tree.pair_start, new)
+    out.factor.pair[own] = known.factor.pair[theirs]
+    theirs, own = run_span(source.kernel_start, old), run_span(tree.kernel_start, new)
+    tree.kernel[own] = source.kernel[theirs]
+    theirs = run_span(source.interpolation_start, old)
+    own = run_span(tree.interpolation_start, new)
+    tree.interpolation[own] = source.interpolation[theirs]
+    out.factor.inward[own] = known.factor.inward[theirs]
+    for half in range(2):
+        if tree.children[new, half] >= 0:
+            theirs = run_span(source.node_start, source.children[old, half])
+            own = run_span(tree.node_start, tree.children[new, half])
+            out.charges.mutual[:, own] = known.charges.mutual[:, theirs]
+
+
+@compiled
 def _copy_gap(known: LinearResponse, j: int, out: LinearResponse, k: int) -> None:
-    """Copy the response of a gap by itself."""
+    """Copy how the edges of a gap respond, and its reference."""
     theirs = slice(known.nodes.offset[j], known.nodes.offset[j + 1])
     own = slice(out.nodes.offset[k], out.nodes.offset[k + 1])
-    square = slice(known.tree.response_start[j], known.tree.response_start[j + 1])
-    here = slice(out.tree.response_start[k], out.tree.response_start[k + 1])
-    out.inverse[here] = known.inverse[square]
-    out.factor.response[here] = known.factor.response[square]
-    out.factor.negative[k] = known.factor.negative[j]
-    out.charges.isolated[:, own] = known.charges.isolated[:, theirs]
+    square = run_span(known.tree.response_start, j)
+    out.inverse[run_span(out.tree.response_start, k)] = known.inverse[square]
     out.held[k] = known.held[j]
     out.about[own] = known.about[theirs]
     out.about_pressure[k] = known.about_pressure[j]
@@ -167,17 +204,18 @@ def _copy_gap(known: LinearResponse, j: int, out: LinearResponse, k: int) -> Non
         out.balancing[2 * k + side] = known.balancing[2 * j + side]
         out.motion[2 * k + side] = known.motion[2 * j + side]
     out.motion_by_potential[own] = known.motion_by_potential[theirs]
+    out.mean_by_potential[own] = known.mean_by_potential[theirs]
 
 
 @compiled
 def _factor_runs(response: LinearResponse, changed: Flags) -> None:
-    """Compute the responses and charges of all runs that hold gaps that have changed."""
-    tree, count = response.tree, changed.shape[0]
+    """Compute the responses and charges of runs that have changed, or hold gaps that have."""
+    tree, count = response.tree, response.held.shape[0]
     renewed = np.zeros(tree.rank.shape[0], dtype=np.bool_)
-    renewed[:count] = changed
-    work = np.empty((2, tree.rank.max()))
+    renewed[: changed.shape[0]] = changed
+    work = np.empty((3, tree.rank.max()))
     for run in range(count, renewed.shape[0]):
-        if renewed[tree.children[run, 0]] or renewed[tree.children[run, 1]]:
+        if renewed[run] or renewed[tree.children[run, 0]] or renewed[tree.children[run, 1]]:
             renewed[run] = True
             factor_run(tree, response.factor, run)
             charge_run(tree, response.factor, run, response.charges, work)
@@ -274,11 +312,12 @@ def move_references(
         response.held[gap] = far[gap]
     column = np.zeros(changed.shape[0], dtype=np.int64)
     fill_gaps(indices, nodes, response.equations, column, model)
+    renewed = True
     for k in range(changed.shape[0]):
-        if changed[k] and not _renew_gap(response, k, before[k], pressure, law, model):
-            nodes.table[changed] = np.nan  # they serve for no other response
-            return False
-    if not _replace_runs(response, changed, model):
+        if changed[k] and renewed:
+            renewed = _renew_gap(response, k, before[k], pressure, law, model)
+    if not (renewed and _replace_runs(response, changed, model)):
+        nodes.table[changed] = np.nan  # they serve for no other response
         return False
     _factor_runs(response, changed)
     if far.any():

@@ -103,35 +103,117 @@ def _wanted_rank(row: Array, digits: float) -> int:
 
 
 @compiled
-def _pair_runs(
-    table: Array, rank: Integers, digits: float, closed: bool
-) -> tuple[Integers, Integers, Array]:
-    """Pair neighbouring runs, level by level: children, span and row of each; fills in ``rank``."""
-    gaps, runs = table.shape[0], rank.shape[0]
-    children = np.full((runs, 2), -1)
-    span = np.empty((runs, 2), dtype=np.int64)
-    rows = np.empty((runs, table.shape[1]))
-    for k in range(gaps):
-        span[k] = k
-        rows[k] = table[k]
+def _pair_runs(gaps: int) -> Integers:
+    """Pair neighbouring runs, level by level; returns both halves of each."""
+    children = np.full((2 * gaps - 1, 2), -1)
     level = np.arange(gaps)
     made = gaps
     while level.shape[0] > 1:
         above = np.empty((level.shape[0] + 1) // 2, dtype=np.int64)
         for i in range(level.shape[0] // 2):
-            children[made, 0] = level[2 * i]
-            children[made, 1] = level[2 * i + 1]
-            span[made, 0] = span[level[2 * i], 0]
-            span[made, 1] = span[level[2 * i + 1], 1]
-            if made < runs - 1 or not closed:
-                rows[made] = _interval(table, span[made, 0], span[made, 1])
-                rank[made] = _wanted_rank(rows[made], digits)
+            children[made] = level[2 * i : 2 * i + 2]
             above[i] = made
             made += 1
         if level.shape[0] % 2 == 1:
             above[-1] = level[-1]
         level = above
-    return children, span, rows
+    return children
+
+
+@compiled
+def pair_again(known: Integers, source: Integers) -> tuple[Integers, Integers]:
+    """Pair the runs of gaps of which most are those of a tree with the halves ``known``.
+
+    Returns both halves of each run, and which run it was, -1 where something has changed.
+    ``source`` is which gap each was, -1 if none. Such a gap takes the place of one that is gone, if
+    there is one between the same neighbours; else it is paired with the gap before it.
+    """
+    gaps, runs, before = source.shape[0], 2 * source.shape[0] - 1, (known.shape[0] + 1) // 2
+    children, same = np.full((runs, 2), -1), np.full(runs, -1)
+    same[:gaps] = source
+    image = np.full(known.shape[0], -1)  # of every run of the tree
+    made = gaps
+    first = -1  # run of the gaps before all places
+    free = 0  # place
+    for k in range(gaps):
+        after = k
+        while after < gaps and source[after] < 0:
+            after += 1
+        end = source[after] if after < gaps else before
+        if source[k] >= 0:
+            free = source[k]
+        if source[k] >= 0 or free < end:
+            image[free] = k
+            if first >= 0:
+                children[made, 0], children[made, 1] = first, k
+                image[free], first = made, -1
+                made += 1
+            free += 1
+        elif free == 0 and first < 0:
+            first = k
+        else:
+            place = first if free == 0 else image[free - 1]
+            children[made, 0], children[made, 1] = place, k
+            if free == 0:
+                first = made
+            else:
+                image[free - 1] = made
+            made += 1
+    for run in range(before, known.shape[0]):
+        one, two = image[known[run, 0]], image[known[run, 1]]
+        image[run] = max(one, two)
+        if one >= 0 and two >= 0:
+            children[made, 0], children[made, 1] = one, two
+            if same[one] == known[run, 0] and same[two] == known[run, 1]:
+                same[made] = run
+            image[run] = made
+            made += 1
+    return children, same
+
+
+@compiled
+def empty_tree(
+    table: Array, offset: Integers, children: Integers, known: Integers, digits: float, closed: bool
+) -> Tree:
+    """Make space for the tree of the gaps of ``table``, in runs with these halves.
+
+    ``known`` are the numbers of charges of runs for which they are known, else 0. ``closed`` if the
+    gaps are all those of the period, so that there is nothing outside; else they must leave space
+    for at least one more.
+    """
+    runs, gaps = children.shape[0], table.shape[0]
+    rank = known.copy()
+    span = np.empty((runs, 2), dtype=np.int64)
+    rows = np.empty((runs, table.shape[1]))
+    at = np.zeros(runs + 1, dtype=np.int64)
+    square = np.zeros(runs + 1, dtype=np.int64)
+    inner = np.zeros(runs + 1, dtype=np.int64)
+    mixed = np.zeros(runs + 1, dtype=np.int64)
+    lift = np.zeros(runs + 1, dtype=np.int64)
+    for run in range(runs):
+        one, two = 0, 0
+        if run < gaps:
+            span[run] = run
+            rows[run] = table[run]
+            rank[run] = offset[run + 1] - offset[run]
+        else:
+            first, last = children[run, 0], children[run, 1]
+            one, two = rank[first], rank[last]
+            span[run, 0], span[run, 1] = span[first, 0], span[last, 1]
+            if run < runs - 1 or not closed:
+                rows[run] = _interval(table, span[run, 0], span[run, 1])
+                if rank[run] == 0:
+                    rank[run] = _wanted_rank(rows[run], digits)
+        r = rank[run]
+        at[run + 1] = at[run] + r
+        square[run + 1] = square[run] + r * r
+        inner[run + 1] = inner[run] + one * one
+        mixed[run + 1] = mixed[run] + one * two
+        lift[run + 1] = lift[run] + (one + two) * r
+    return Tree(
+        children, span, rows, rank, at, square, inner, mixed, lift, np.empty(at[runs]),
+        np.empty(at[runs]), np.empty(mixed[runs]), np.empty(lift[runs]),
+    )  # fmt: skip
 
 
 @compiled
@@ -140,47 +222,21 @@ def build_tree(
 ) -> Tree:
     """Build the tree over the gaps of ``table``, whose nodes are ``theta`` with dθ/dη ``stretch``.
 
-    ``closed`` if they are all gaps of the period, so that there is nothing outside; else they must
-    leave space for at least one more.
+    ``closed`` as in :func:`empty_tree`.
     """
     gaps = table.shape[0]
-    runs = 2 * gaps - 1
-    rank = np.zeros(runs, dtype=np.int64)
-    for k in range(gaps):
-        rank[k] = offset[k + 1] - offset[k]
-    children, span, rows = _pair_runs(table, rank, digits, closed)
-    at = np.zeros(runs + 1, dtype=np.int64)
-    square = np.zeros(runs + 1, dtype=np.int64)
-    inner = np.zeros(runs + 1, dtype=np.int64)
-    mixed = np.zeros(runs + 1, dtype=np.int64)
-    lift = np.zeros(runs + 1, dtype=np.int64)
-    for run in range(runs):
-        r = rank[run]
-        at[run + 1] = at[run] + r
-        square[run + 1] = square[run] + r * r
-        one = 0
-        two = 0
-        if run >= gaps:
-            one = rank[children[run, 0]]
-            two = rank[children[run, 1]]
-        inner[run + 1] = inner[run] + one * one
-        mixed[run + 1] = mixed[run] + one * two
-        lift[run + 1] = lift[run] + (one + two) * r
-    places = np.empty(at[runs])
-    stretches = np.empty(at[runs])
-    places[: theta.shape[0]] = theta
-    stretches[: theta.shape[0]] = stretch
-    tree = Tree(
-        children, span, rows, rank, at, square, inner, mixed, lift, places, stretches,
-        np.empty(mixed[runs]), np.empty(lift[runs]),
-    )  # fmt: skip
-    for run in range(gaps, runs):
-        _place_charges(tree, run)
+    children = _pair_runs(gaps)
+    none: Integers = np.zeros(children.shape[0], dtype=np.int64)
+    tree = empty_tree(table, offset, children, none, digits, closed)
+    tree.theta[: theta.shape[0]] = theta
+    tree.stretch[: theta.shape[0]] = stretch
+    for run in range(gaps, children.shape[0]):
+        place_charges(tree, run)
     return tree
 
 
 @compiled
-def _place_charges(tree: Tree, run: int) -> None:
+def place_charges(tree: Tree, run: int) -> None:
     """Place the charges of a run, and compute its interpolation and kernel."""
     at, r, row = tree.node_start, tree.rank[run], tree.rows[run]
     places, stretches = tree.theta, tree.stretch
@@ -210,7 +266,7 @@ def replace_run(tree: Tree, run: int, table: Array, digits: float) -> bool:
         tree.rows[run] = _interval(table, tree.span[run, 0], tree.span[run, 1])
         if _wanted_rank(tree.rows[run], digits) > tree.rank[run] + 1:
             return False
-    _place_charges(tree, run)
+    place_charges(tree, run)
     return True
 
 

@@ -180,8 +180,8 @@ def solve_loads(system: HierarchicalSystem, offset: Integers, load: Array, charg
     isolated = apply_inverse(offset, system.inverse, load)
     w = system.weights.reshape(-1, 1)
     charges = upward_pass(system.tree, system.factor, isolated * w + charge)
-    potential = np.zeros(charges.coupled.shape)
-    downward_pass(system.tree, system.factor, whole_tree(system.tree), charges.coupled, potential)
+    potential = np.zeros(charges.mutual.shape)
+    downward_pass(system.tree, system.factor, whole_tree(system.tree), charges, potential)
     of_nodes = np.ascontiguousarray(potential[:, : load.shape[0]].T)
     return isolated - apply_inverse(offset, system.inverse, of_nodes * w)
 

@@ -2,11 +2,12 @@
 
 With R the response of a run, q = q° - R g, a pair of neighbours 1, 2 obeys
 
-    q1 = q1° - R1 (E1 g - K12 q2),      q2 = q2° - R2 (E2 g - K21 q1),
+    g1 = E1 g - K12 q2,      g2 = E2 g - K21 q1,      q = E1ᵀ q1 + E2ᵀ q2:
 
-and the pair's charges are q = E1ᵀ q1 + E2ᵀ q2. Going up the tree gives the response of every run,
-going down the potentials at every gap. The work grows as the number of gaps. The responses are
-symmetric, and the number of negative eigenvalues, that is stability, is counted on the way up.
+its potential g and the charges of both halves give g1 = c1 + D1 g and g2 = c2 + D2 g. Going up the
+tree gives R, c and D of every run, going down the potentials at every gap. The work grows as the
+number of gaps. The responses are symmetric, and the number of negative eigenvalues, that is
+stability, is counted on the way up.
 """
 
 from __future__ import annotations
@@ -30,16 +31,16 @@ class TreeFactor(NamedTuple):
     response : array
         R of every run.
     pair : array
-        W = (R1⁻¹ - K12 R2 K21)⁻¹ of every pair.
-    charge : array
-        Charges of both halves of a pair by the potentials at its nodes.
+        (1 - K12 R2 K21 R1)⁻¹ of every pair.
+    inward : array
+        D of both halves of every pair.
     negative : int array, shape (runs,)
         Number of negative eigenvalues of every run; the whole is the last one.
     """
 
     response: Array
     pair: Array
-    charge: Array
+    inward: Array
     negative: Integers
 
 
@@ -49,13 +50,13 @@ class Charges(NamedTuple):
     Attributes
     ----------
     isolated : array
-        Without potentials from outside the run.
-    coupled : array
-        Without potentials from outside the run's parent.
+        q°, without potentials from outside the run.
+    mutual : array
+        c, the potential of the other half of the run's parent, without any from outside that.
     """
 
     isolated: Array
-    coupled: Array
+    mutual: Array
 
 
 @compiled_sums
@@ -102,7 +103,7 @@ def empty_factor(tree: Tree) -> TreeFactor:
     return TreeFactor(
         response=np.empty(tree.response_start[runs]),
         pair=np.empty(tree.pair_start[runs]),
-        charge=np.empty(tree.interpolation_start[runs]),
+        inward=np.empty(tree.interpolation_start[runs]),
         negative=np.zeros(runs, dtype=np.int64),
     )
 
@@ -137,17 +138,18 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
     first = responses[run_span(tree.response_start, one)].reshape(n, n)
     second = responses[run_span(tree.response_start, two)].reshape(m, m)
     kernel = tree.kernel[run_span(tree.kernel_start, run)].reshape(n, m)
-    w = factor.pair[run_span(tree.pair_start, run)].reshape(n, n)
-    # W = (R1⁻¹ - H)⁻¹ = (1 - R1 H)⁻¹ R1, H = K12 R2 K21
+    inverse = factor.pair[run_span(tree.pair_start, run)].reshape(n, n)
+    # (1 - H R1)⁻¹, H = K12 R2 K21
     half = np.dot(kernel, second)
     reflected = np.dot(half, kernel.T)
-    matrix = np.dot(first, reflected)
+    matrix = np.dot(reflected, first)
     for i in range(n):
         for j in range(n):
-            w[i, j] = first[i, j]
+            inverse[i, j] = 0.0
             matrix[i, j] = -matrix[i, j]
+        inverse[i, i] = 1.0
         matrix[i, i] += 1.0
-    odd = _eliminate(matrix, w)
+    odd = _eliminate(matrix, inverse)
     count = max(negative[one], negative[two])
     if (negative[one] + negative[two] + count + (1 if odd else 0)) % 2 == 1:
         count += 1
@@ -155,18 +157,16 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
     if r == 0:
         return
     interpolation = tree.interpolation[run_span(tree.interpolation_start, run)].reshape(n + m, r)
-    charges = factor.charge[run_span(tree.interpolation_start, run)].reshape(n + m, r)
-    # q1 = W (E1 + K12 R2 E2), q2 = R2 (E2 + K21 q1)
+    inward = factor.inward[run_span(tree.interpolation_start, run)].reshape(n + m, r)
+    charges = np.empty((n + m, r))  # by the potential, with the other sign
+    # D1 = (1 - H R1)⁻¹ (E1 + K12 R2 E2), D2 = E2 + K21 R1 D1
     drive = np.dot(half, interpolation[n:])
-    for i in range(n):
-        for j in range(r):
-            drive[i, j] += interpolation[i, j]
-    np.dot(w, drive, charges[:n])
-    more = np.dot(kernel.T, charges[:n])
-    for i in range(m):
-        for j in range(r):
-            more[i, j] += interpolation[n + i, j]
-    np.dot(second, more, charges[n:])
+    _add(interpolation[:n], drive)
+    np.dot(inverse, drive, inward[:n])
+    np.dot(first, inward[:n], charges[:n])
+    np.dot(kernel.T, charges[:n], inward[n:])
+    _add(interpolation[n:], inward[n:])
+    np.dot(second, inward[n:], charges[n:])
     response = responses[run_span(tree.response_start, run)].reshape(r, r)
     np.dot(interpolation.T, charges, response)
     for i in range(r):
@@ -176,16 +176,12 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
             response[j, i] = mean
 
 
-@compiled_sums
-def _apply(a: Array, x: Array, out: Array) -> None:
-    """Compute a x into ``out``, a flat."""
-    n = x.shape[0]
-    for i in range(out.shape[0]):
-        row = a[i * n : (i + 1) * n]
-        total = 0.0
-        for k in range(n):
-            total += row[k] * x[k]
-        out[i] = total
+@compiled
+def _add(a: Array, out: Array) -> None:
+    """Add a to ``out``."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            out[i, j] += a[i, j]
 
 
 @compiled_sums
@@ -201,6 +197,18 @@ def _add_apply(a: Array, x: Array, out: Array) -> None:
 
 
 @compiled_sums
+def _subtract_apply(a: Array, x: Array, out: Array) -> None:
+    """Subtract a x from ``out``, a flat."""
+    n = x.shape[0]
+    for i in range(out.shape[0]):
+        row = a[i * n : (i + 1) * n]
+        total = 0.0
+        for k in range(n):
+            total += row[k] * x[k]
+        out[i] -= total
+
+
+@compiled_sums
 def _add_transposed(a: Array, x: Array, out: Array) -> None:
     """Add aᵀ x to ``out``, a flat."""
     n = out.shape[0]
@@ -213,35 +221,37 @@ def _add_transposed(a: Array, x: Array, out: Array) -> None:
 
 @compiled
 def charge_run(tree: Tree, factor: TreeFactor, run: int, charges: Charges, work: Array) -> None:
-    """Compute the charges of a run from those of its two parts, and couple these."""
+    """Compute the charges of a run from those of its two parts, and their mutual potentials."""
     one, two, n, m = run_halves(tree, run)
     first = factor.response[run_span(tree.response_start, one)]
     second = factor.response[run_span(tree.response_start, two)]
     kernel = tree.kernel[run_span(tree.kernel_start, run)]
-    w = factor.pair[run_span(tree.pair_start, run)]
+    inverse = factor.pair[run_span(tree.pair_start, run)]
     up = tree.interpolation[run_span(tree.interpolation_start, run)]
     split = n * tree.rank[run]
-    a = work[0, :n]
-    b = work[1, :m]
-    isolated, coupled = charges.isolated, charges.coupled
-    for column in range(coupled.shape[0]):
-        q1 = coupled[column][run_span(tree.node_start, one)]
-        q2 = coupled[column][run_span(tree.node_start, two)]
-        q1[:] = isolated[column][run_span(tree.node_start, one)]
-        q2[:] = isolated[column][run_span(tree.node_start, two)]
-        # q1 = t + W K12 R2 K21 t, t = q1° + R1 K12 q2°;  q2 = q2° + R2 K21 q1
-        _apply(kernel, q2, a)
-        _add_apply(first, a, q1)
-        b[:] = 0.0
-        _add_transposed(kernel, q1, b)
-        c = work[0, :m]
-        _apply(second, b, c)
-        _apply(kernel, c, work[1, :n])
-        _add_apply(w, work[1, :n], q1)
-        b[:] = 0.0
-        _add_transposed(kernel, q1, b)
-        _add_apply(second, b, q2)
-        q = isolated[column][run_span(tree.node_start, run)]
+    q1, g, q2 = work[0, :n], work[1, :n], work[2, :m]
+    for column in range(charges.mutual.shape[0]):
+        isolated, mutual = charges.isolated[column], charges.mutual[column]
+        g1 = mutual[run_span(tree.node_start, one)]
+        g2 = mutual[run_span(tree.node_start, two)]
+        q1[:] = isolated[run_span(tree.node_start, one)]
+        q2[:] = isolated[run_span(tree.node_start, two)]
+        # g1 = -(1 - H R1)⁻¹ K12 (q2° + R2 K21 q1°);  g2 = -K21 q1
+        g2[:] = 0.0
+        _add_transposed(kernel, q1, g2)
+        _add_apply(second, g2, q2)
+        g[:] = 0.0
+        _add_apply(kernel, q2, g)
+        g1[:] = 0.0
+        _subtract_apply(inverse, g, g1)
+        _subtract_apply(first, g1, q1)
+        q2[:] = isolated[run_span(tree.node_start, two)]
+        g2[:] = 0.0
+        _add_transposed(kernel, q1, g2)
+        _add_apply(second, g2, q2)
+        for i in range(m):
+            g2[i] = -g2[i]
+        q = isolated[run_span(tree.node_start, run)]
         q[:] = 0.0
         _add_transposed(up[:split], q1, q)
         _add_transposed(up[split:], q2, q)
@@ -258,65 +268,42 @@ def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Charges:
     size = tree.node_start[runs]
     charges = Charges(np.empty((isolated.shape[1], size)), np.zeros((isolated.shape[1], size)))
     charges.isolated[:, : isolated.shape[0]] = isolated.T
-    work = np.empty((2, tree.rank.max()))
+    work = np.empty((3, tree.rank.max()))
     for run in range(gaps, runs):
         charge_run(tree, factor, run, charges, work)
     return charges
 
 
 @compiled
-def _pass_potential(
-    tree: Tree, factor: TreeFactor, run: int, charges: Array, potential: Array, work: Array
-) -> None:
-    """Compute potentials of the two parts of a run from its own, and change their charges."""
-    one, two, n, m = run_halves(tree, run)
-    kernel = tree.kernel[run_span(tree.kernel_start, run)]
-    up = tree.interpolation[run_span(tree.interpolation_start, run)]
-    by_potential = factor.charge[run_span(tree.interpolation_start, run)]
-    split = n * tree.rank[run]
-    for column in range(charges.shape[0]):
-        q1 = charges[column][run_span(tree.node_start, one)]
-        q2 = charges[column][run_span(tree.node_start, two)]
-        g1 = potential[column][run_span(tree.node_start, one)]
-        g2 = potential[column][run_span(tree.node_start, two)]
-        g = potential[column][run_span(tree.node_start, run)]
-        a = work[:n]
-        _apply(by_potential[:split], g, a)
-        for i in range(n):
-            q1[i] -= a[i]
-        b = work[:m]
-        _apply(by_potential[split:], g, b)
-        for i in range(m):
-            q2[i] -= b[i]
-        _apply(kernel, q2, a)
-        _apply(up[:split], g, g1)
-        for i in range(n):
-            g1[i] -= a[i]
-        b[:] = 0.0
-        _add_transposed(kernel, q1, b)
-        _apply(up[split:], g, g2)
-        for i in range(m):
-            g2[i] -= b[i]
-
-
-@compiled
 def downward_pass(
-    tree: Tree, factor: TreeFactor, below: NDArray[np.bool_], charge: Array, potential: Array
+    tree: Tree,
+    factor: TreeFactor,
+    below: NDArray[np.bool_],
+    charges: Charges,
+    potential: Array,
 ) -> None:
-    """Compute the potentials of all runs, and their final charges, in place.
+    """Compute the potentials of all runs, shape (columns, nodes of all runs), in place.
 
-    Both have the shape (columns, nodes of all runs). ``below`` marks the runs at whose nodes the
-    potentials are given; those inside them are marked, too, and the others left as they are.
-    ``charge`` begins as the coupled charges (:class:`Charges`).
+    ``below`` marks the runs at whose nodes the potentials are given; those inside them are marked,
+    too, and the others left as they are.
     """
     runs = tree.rank.shape[0]
     gaps = (runs + 1) // 2
-    work = np.empty(tree.rank.max())
     for run in range(runs - 1, gaps - 1, -1):
-        if below[run]:
-            below[tree.children[run, 0]] = True
-            below[tree.children[run, 1]] = True
-            _pass_potential(tree, factor, run, charge, potential, work)
+        if not below[run]:
+            continue
+        inward = factor.inward[run_span(tree.interpolation_start, run)]
+        at = 0
+        for half in range(2):
+            child = tree.children[run, half]
+            below[child] = True
+            own = run_span(tree.node_start, child)
+            size = tree.rank[child] * tree.rank[run]
+            for column in range(potential.shape[0]):
+                potential[column, own] = charges.mutual[column, own]
+                outer = potential[column][run_span(tree.node_start, run)]
+                _add_apply(inward[at : at + size], outer, potential[column][own])
+            at += size
 
 
 @compiled

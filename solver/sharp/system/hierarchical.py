@@ -35,6 +35,7 @@ from adhesis.solver.sharp.tolerances import (
     CLOSING_BY_MOTION,
     CLOSING_OF_MANY,
     FINER_FIELD,
+    RACE_FIELD,
     RESPONSE_TRIALS,
 )
 
@@ -54,11 +55,15 @@ class HierarchicalSystem(EdgeSystem):
 
     def solution(self, gaps: Array, prescribed: float, share: float, fields: int) -> Solution:
         """Solve these gaps to a ``share`` of the tolerance, with S or (two fields) S and S'."""
-        problem = self._problem
-        model = problem.model._replace(digits=problem.model.digits - math.log(share))
-        orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+        model, orders = self._accuracy(gaps, share)
         solution: Solution = solve_many(gaps, prescribed, orders, fields, model)[0]
         return solution
+
+    def _accuracy(self, gaps: Array, share: float) -> tuple[FieldModel, Integers]:
+        """Model and orders for a ``share`` of the tolerance."""
+        model = self._problem.model
+        model = model._replace(digits=model.digits - math.log(share))
+        return model, choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
 
     def finer_openings(self, field: GapField) -> Array:
         """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
@@ -70,10 +75,8 @@ class HierarchicalSystem(EdgeSystem):
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂θ_f between some edges, the others held; the diagonal is not given."""
-        problem = self._problem
-        by_edge: Array = openings_between_edges(
-            point.gaps, point.at, point.field.solution.nodes.orders, edges, problem.model
-        )
+        model, orders = self._accuracy(point.gaps, RACE_FIELD)
+        by_edge: Array = openings_between_edges(point.gaps, point.at, orders, edges, model)
         return by_edge
 
     def equilibrium(
