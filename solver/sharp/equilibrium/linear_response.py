@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.cluster_tree import Tree
 from adhesis.solver.sharp.field.solution import Equations, LoadingDevice, Nodes
 from adhesis.solver.sharp.field.tree_factor import (
@@ -150,7 +150,7 @@ def allocate_response(
     )
 
 
-@compiled_for_both
+@compiled
 def solve_response(
     response: LinearResponse, prescribed: float, device: LoadingDevice
 ) -> ResponseSolution:
