@@ -24,6 +24,7 @@ _NEAREST = 1e-8  # of the range: resolution of the location of first touch
 _APART = 0.1  # shortest waves between edges of different minima
 _FEWEST_APART = 2  # nodes
 _STRENGTH_EXCEEDED = 1e-3  # of the strength: by so much a tension may exceed it when it opens
+_LONGEST = 0.05  # of the range: jumps hide in longer steps, where D is smooth by chance
 _MOST_OPENINGS = 1000  # one after the other at one place of a path; more are an endless loop
 
 
@@ -126,8 +127,10 @@ class Steps:
         # In shorter steps a jump is relaxed to its end, which shows how precisely it is located.
         self.least = self.accuracy * self.scale
         left, contact = self._open(contact)
+        longest = _LONGEST * self.scale if self.adhesion_scale else np.inf
         while contact.prescribed != prescribed:
             remaining = prescribed - contact.prescribed
+            step = float(np.clip(step, -longest, longest))
             if abs(step) >= abs(remaining) * (1 - 1e-9):
                 step, target = remaining, prescribed
             else:

@@ -180,6 +180,17 @@ def test_finer_grid_and_finer_path_keep_the_loss(loop):
     assert rough_loop(rough_profile(), load_steps=24).loss == pytest.approx(loop.loss, rel=3e-3)
 
 
+def test_no_jump_hides_in_a_long_load_step():
+    """From nearly full contact in two load steps: the drops of thirty."""
+    profile = self_affine_profile(
+        0.553, period=2e-3, n0=1, ratio=11, seed=876325, h_rms=1.7697e-6, amplitudes="deterministic"
+    )
+    gamma = 0.065377 * 1e6 * profile.h_rms**2 * profile.q0
+    method = GridMethod(Problem(profile, HalfSpace(1e6, 0.5), gamma))
+    few, many = (run_loop(method, max_penetration=0.99992, load_steps=steps) for steps in (2, 30))
+    assert few.loss_from_drops == pytest.approx(many.loss_from_drops, rel=1e-2)
+
+
 def test_gap_is_open_outside_and_nothing_overlaps():
     method = GridMethod(Problem(rough_profile(), HALF_SPACE, 2e-3), nodes=512)
     h_max = method.problem.profile.h_max

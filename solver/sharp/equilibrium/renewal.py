@@ -164,47 +164,61 @@ def _known_gaps(known: LinearResponse, table: Array, law: EdgeLaw, model: FieldM
 
 
 @compiled
+def _copy(source: Array, theirs: slice, out: Array, own: slice) -> None:
+    """Copy a part of an array into one of another."""
+    taken, kept = source[theirs], out[own]
+    for i in range(taken.shape[0]):
+        kept[i] = taken[i]
+
+
+@compiled
 def _copy_run(known: LinearResponse, old: int, out: LinearResponse, new: int) -> None:
     """Copy the charges and the response of a run, and how its halves act on each other."""
     source, tree = known.tree, out.tree
     theirs, own = run_span(source.node_start, old), run_span(tree.node_start, new)
-    tree.theta[own], tree.stretch[own] = source.theta[theirs], source.stretch[theirs]
-    out.charges.isolated[:, own] = known.charges.isolated[:, theirs]
+    _copy(source.theta, theirs, tree.theta, own)
+    _copy(source.stretch, theirs, tree.stretch, own)
+    for column in range(2):
+        _copy(known.charges.isolated[column], theirs, out.charges.isolated[column], own)
     theirs, own = run_span(source.response_start, old), run_span(tree.response_start, new)
-    out.factor.response[own] = known.factor.response[theirs]
+    _copy(known.factor.response, theirs, out.factor.response, own)
     out.factor.negative[new] = known.factor.negative[old]
     theirs, own = run_span(source.pair_start, old), run_span(tree.pair_start, new)
-    out.factor.pair[own] = known.factor.pair[theirs]
+    _copy(known.factor.pair, theirs, out.factor.pair, own)
     theirs, own = run_span(source.kernel_start, old), run_span(tree.kernel_start, new)
-    tree.kernel[own] = source.kernel[theirs]
+    _copy(source.kernel, theirs, tree.kernel, own)
     theirs = run_span(source.interpolation_start, old)
     own = run_span(tree.interpolation_start, new)
-    tree.interpolation[own] = source.interpolation[theirs]
-    out.factor.inward[own] = known.factor.inward[theirs]
+    _copy(source.interpolation, theirs, tree.interpolation, own)
+    _copy(known.factor.inward, theirs, out.factor.inward, own)
     for half in range(2):
         if tree.children[new, half] >= 0:
             theirs = run_span(source.node_start, source.children[old, half])
             own = run_span(tree.node_start, tree.children[new, half])
-            out.charges.mutual[:, own] = known.charges.mutual[:, theirs]
+            for column in range(2):
+                _copy(known.charges.mutual[column], theirs, out.charges.mutual[column], own)
 
 
 @compiled
 def _copy_gap(known: LinearResponse, j: int, out: LinearResponse, k: int) -> None:
     """Copy how the edges of a gap respond, and its reference."""
-    theirs = slice(known.nodes.offset[j], known.nodes.offset[j + 1])
-    own = slice(out.nodes.offset[k], out.nodes.offset[k + 1])
-    square = run_span(known.tree.response_start, j)
-    out.inverse[run_span(out.tree.response_start, k)] = known.inverse[square]
+    square, here = run_span(known.tree.response_start, j), run_span(out.tree.response_start, k)
+    _copy(known.inverse, square, out.inverse, here)
     out.held[k] = known.held[j]
-    out.about[own] = known.about[theirs]
     out.about_pressure[k] = known.about_pressure[j]
-    out.scaled_opening[own] = known.scaled_opening[theirs]
+    theirs, own = run_span(known.nodes.offset, j), run_span(out.nodes.offset, k)
+    _copy(known.about, theirs, out.about, own)
+    _copy(known.scaled_opening, theirs, out.scaled_opening, own)
+    _copy(known.mean_by_potential, theirs, out.mean_by_potential, own)
     for side in range(2):
-        out.residual[2 * k + side] = known.residual[2 * j + side]
-        out.balancing[2 * k + side] = known.balancing[2 * j + side]
-        out.motion[2 * k + side] = known.motion[2 * j + side]
-    out.motion_by_potential[own] = known.motion_by_potential[theirs]
-    out.mean_by_potential[own] = known.mean_by_potential[theirs]
+        e, f = 2 * j + side, 2 * k + side
+        out.residual[f], out.balancing[f] = known.residual[e], known.balancing[e]
+        for column in range(2):
+            out.motion[f, column] = known.motion[e, column]
+    for i in range(own.stop - own.start):
+        for side in range(2):
+            follows = known.motion_by_potential[theirs.start + i, side]
+            out.motion_by_potential[own.start + i, side] = follows
 
 
 @compiled

@@ -177,13 +177,18 @@ def solve_loads(system: HierarchicalSystem, offset: Integers, load: Array, charg
 
     The potential of a gap's further charges in that gap itself is part of its load.
     """
-    isolated = apply_inverse(offset, system.inverse, load)
-    w = system.weights.reshape(-1, 1)
-    charges = upward_pass(system.tree, system.factor, isolated * w + charge)
+    solved = apply_inverse(offset, system.inverse, load)
+    w, own = system.weights, np.empty(load.shape)
+    for i in range(load.shape[0]):
+        for c in range(load.shape[1]):
+            own[i, c] = w[i] * solved[i, c] + charge[i, c]
+    charges = upward_pass(system.tree, system.factor, own)
     potential = np.zeros(charges.mutual.shape)
     downward_pass(system.tree, system.factor, whole_tree(system.tree), charges, potential)
-    of_nodes = np.ascontiguousarray(potential[:, : load.shape[0]].T)
-    return isolated - apply_inverse(offset, system.inverse, of_nodes * w)
+    for i in range(load.shape[0]):
+        for c in range(load.shape[1]):
+            own[i, c] = load[i, c] - w[i] * potential[c, i]
+    return apply_inverse(offset, system.inverse, own)
 
 
 @compiled
