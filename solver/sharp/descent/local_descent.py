@@ -137,7 +137,7 @@ class KnownState:
         if found.event == NO_FIELD:
             return None
         everywhere = window.extend(inside, orders, prescribed)
-        if not np.isfinite(everywhere).all():
+        if everywhere is None:
             return None
         return LocalDescent(everywhere, inside, found.event)
 

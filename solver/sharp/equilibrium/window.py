@@ -12,6 +12,7 @@ from adhesis.solver.sharp.field.exterior import Exterior
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import Integers
+from adhesis.solver.sharp.tolerances import LOCAL_WINDOW_FOLLOWING
 
 
 class Window:
@@ -67,14 +68,22 @@ class Window:
         inside = both[(both[:, 0] >= left) & (both[:, 1] <= right)]
         return np.concatenate([inside, self.gaps[-1:]])
 
-    def extend(self, local: Array, orders: Integers, prescribed: float) -> Array:
-        """Extend gaps of the window to all gaps, the others following."""
-        limit = step_limits(map_gaps(self._all), self._law.longest_step)
+    def extend(self, local: Array, orders: Integers, prescribed: float) -> Array | None:
+        """Extend gaps of the window to all gaps, the others following.
+
+        None if they would move too far for that: next to a fold of others their linear response is
+        that of no edges, and what ran inside was not what runs.
+        """
+        longest = self._law.longest_step
         motion = extend_window(
-            local, prescribed, orders, self.exterior, self._outside, self._response, limit,
-            self._model,
+            local, prescribed, orders, self.exterior, self._outside, self._response,
+            np.full(self._all.size, np.inf), self._model,
         )  # fmt: skip
-        outside = self._all + motion.reshape(-1, 2) * [1.0, -1.0]
+        # not written as > : a motion that is no number is too far
+        if not np.abs(motion).max() <= LOCAL_WINDOW_FOLLOWING * longest:
+            return None
+        limit = step_limits(map_gaps(self._all), longest)
+        outside = self._all + np.clip(motion, -limit, limit).reshape(-1, 2) * [1.0, -1.0]
         inside = local[:-1].copy()
         inside[inside.mean(axis=1) > self._end] -= 2 * np.pi
         gaps = np.concatenate([inside, outside[self._outside.gaps]])
