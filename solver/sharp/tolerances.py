@@ -249,6 +249,9 @@ FOLLOWING_SHARE = 0.2
 """Longest steps; an edge outside that its tangent moves further is held."""
 NEWTON_STEPS_IN_A_ROW = 12
 """Of all edges, after which a window is opened though they are stable."""
+MOST_SHORT_WINDOWS = 50
+"""Windows in a row whose edges move by less than a longest step: next to a fold Newton's steps of
+all edges and a window may lead to and fro without end."""
 LOCAL_WINDOW_MARGIN = 4
 """Gaps on each side of what changed, where a descent begins in a window."""
 LOCAL_WINDOW_WIDEST = 24

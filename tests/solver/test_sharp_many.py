@@ -528,6 +528,28 @@ def test_outside_a_window_gaps_follow_to_second_order(hierarchical):
     assert errors[1] < 2e-3
 
 
+def test_a_window_gives_up_where_the_others_would_follow_far(hierarchical):
+    """By a quarter of the shortest wave: another place decides there what runs."""
+    edges, point = hierarchical
+    response = edges.responses.at(point.gaps, point.at).response
+    window = Window(point.gaps, response, 0, len(point.gaps) - 3, edges.law, edges.model)
+    fastest = np.abs(point.rate[2 * len(point.gaps) - 6 :]).max()  # of the others
+    near, far = (point.at + motion * edges.wave / fastest for motion in (0.15, 0.5))
+    assert window.extend(window.gaps, window.orders, near) is not None
+    assert window.extend(window.gaps, window.orders, far) is None
+
+
+def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():
+    """Newton's steps led 0.002 λ_min on, a window as far back, 100,000 times: an error."""
+    profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=300, h_rms=1e-6, seed=1)
+    method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.005))
+    state = method.detached(profile.h_max)
+    for step in range(39):
+        state = method.follow(state, profile.h_max * (1 - 0.0225 * step)).states[-1]
+    assert method.report().descent_steps < 50_000
+    assert state.patches > 40
+
+
 def test_a_descent_begun_in_a_window_ends_where_one_of_all_gaps_does(hierarchical):
     """From a seed in the widest gap, and from edges pushed out of balance."""
     edges, point = hierarchical

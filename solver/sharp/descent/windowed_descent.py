@@ -45,6 +45,7 @@ from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.tolerances import (
     FAR_FROM_BALANCE,
     FOLLOWING_SHARE,
+    MOST_SHORT_WINDOWS,
     NEWTON_STEPS_IN_A_ROW,
     WINDOW_FIELDS,
     WINDOW_HALF_WIDTH,
@@ -95,7 +96,7 @@ def descend_many(
     fields, tangents, event = 0, 0, STEP_LIMIT
     count = gaps.shape[0]
     half = WINDOW_HALF_WIDTH
-    newton_steps = 0
+    newton_steps, short_windows = 0, 0
     orders = response.nodes.orders.copy()
     pressure = pressure_at(response, prescribed, model.device)
     while fields < most_fields:
@@ -140,14 +141,14 @@ def descend_many(
         if found.inside.event == VANISHED or shortest_length(gaps) < law.smallest:
             event = VANISHED
             break
-        if found.progress > law.rest_step:
+        short_windows = 0 if found.progress > law.longest_step else short_windows + 1
+        if found.progress > law.rest_step and short_windows <= MOST_SHORT_WINDOWS:
             half = WINDOW_HALF_WIDTH
         elif (
             2 * half + 1 >= count - 2
             or half >= WINDOW_WIDEST
-            or (
-                np.abs(step).max() < law.rest_step  # next to a fold
-            )
+            or short_windows > MOST_SHORT_WINDOWS
+            or np.abs(step).max() < law.rest_step  # next to a fold
         ):
             event = AT_REST
             break
