@@ -9,10 +9,11 @@ within both errors, where nothing raced; and for every twentieth that ``grid`` d
 refused (PathError) is counted.
 
     python tools/fuzz/loops.py --seed N [--scenes 2000] [--log FILE] [--number K]
-        [--tight] [--waves M] [--strength]
+        [--tight] [--waves M] [--strength | --many]
 
 With ``--tight`` only the scenes are followed that are compared with a far more accurate run, with
-``--waves`` only those of at most so many waves: they are cheap. With ``--strength`` patches open
+``--waves`` only those of at most so many waves: they are cheap. With ``--many`` they have 20 to 80
+patches, and all are compared: half a minute each. With ``--strength`` patches open
 from inside, at ranges of adhesion up to four decades above that which keeps them closed; then no
 state may have a place at the strength where a crack grows, and none may have a tension inside a
 patch that exceeds the strength by more than a hundredth, unless the loop's warnings state it.
@@ -45,8 +46,8 @@ _PATIENCE = 20  # times as many seconds of the clock, should a process only slee
 
 
 def _work(tasks: Any, results: Any) -> None:
-    for seed, number, strength in iter(tasks.get, None):
-        results.put((number, judge(draw(seed, number, strength), number)))
+    for seed, number, strength, many in iter(tasks.get, None):
+        results.put((number, judge(draw(seed, number, strength, many), number)))
 
 
 class Worker:
@@ -64,9 +65,9 @@ class Worker:
         clock = (~self.process.pid << 3) | 2  # Linux: the CPU clock of another process
         return time.clock_gettime(clock)
 
-    def judge(self, seed: int, number: int, strength: bool) -> dict[str, Any]:
-        """Judge one scene; a process that dies or takes too long is a failure."""
-        self.tasks.put((seed, number, strength))
+    def judge(self, *drawn: int) -> dict[str, Any]:
+        """Judge the scene that these draw; a process that dies or takes too long is a failure."""
+        self.tasks.put(drawn)
         started, begun = self._spent(), time.monotonic()
         spent = 0.0
         while spent < LIMIT and time.monotonic() - begun < _PATIENCE * LIMIT:
@@ -127,11 +128,13 @@ def main() -> int:
     parser.add_argument("--tight", action="store_true", help="only scenes that are compared so")
     parser.add_argument("--waves", type=float, default=np.inf, help="highest wave number over q0")
     parser.add_argument("--strength", action="store_true", help="patches open from inside")
+    parser.add_argument("--many", action="store_true", help="20 to 80 patches, all compared")
     parser.add_argument("--log", type=Path, help="a line of JSON for each scene")
     args = parser.parse_args()
     if args.number is not None:
-        print(draw(args.seed, args.number, args.strength))
-        one = judge(draw(args.seed, args.number, args.strength), args.number)
+        alone = draw(args.seed, args.number, args.strength, args.many)
+        print(alone)
+        one = judge(alone, args.number)
         print(one)
         return int(bool(one["wrong"]))
     end, shown = time.monotonic() + args.seconds, time.monotonic()
@@ -142,12 +145,12 @@ def main() -> int:
     for number in range(args.first, args.first + args.scenes):
         if time.monotonic() > end and everything:
             break
-        scene = draw(args.seed, number, args.strength)
+        scene = draw(args.seed, number, args.strength, args.many)
         if scene.n0 * scene.ratio > args.waves or (
             args.tight and not compared_tightly(scene, number)
         ):
             continue
-        found = worker.judge(args.seed, number, args.strength)
+        found = worker.judge(args.seed, number, args.strength, args.many)
         if not worker.process.is_alive():
             worker = Worker()
         everything.append(found)
@@ -160,7 +163,7 @@ def main() -> int:
         if found["wrong"]:
             failures += 1
             again = f"python tools/fuzz/loops.py --seed {args.seed} --number {number}"
-            again += " --strength" if args.strength else ""
+            again += " --strength" if args.strength else " --many" if args.many else ""
             print(f"{'; '.join(found['wrong'])}\n    {again}\n    {scene}")
         if time.monotonic() - shown > 14:
             shown = time.monotonic()
