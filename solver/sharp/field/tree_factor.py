@@ -197,18 +197,6 @@ def _add_apply(a: Array, x: Array, out: Array) -> None:
 
 
 @compiled_sums
-def _subtract_apply(a: Array, x: Array, out: Array) -> None:
-    """Subtract a x from ``out``, a flat."""
-    n = x.shape[0]
-    for i in range(out.shape[0]):
-        row = a[i * n : (i + 1) * n]
-        total = 0.0
-        for k in range(n):
-            total += row[k] * x[k]
-        out[i] -= total
-
-
-@compiled_sums
 def _add_transposed(a: Array, x: Array, out: Array) -> None:
     """Add aᵀ x to ``out``, a flat."""
     n = out.shape[0]
@@ -243,12 +231,14 @@ def charge_run(tree: Tree, factor: TreeFactor, run: int, charges: Charges, work:
         g[:] = 0.0
         _add_apply(kernel, q2, g)
         g1[:] = 0.0
-        _subtract_apply(inverse, g, g1)
-        _subtract_apply(first, g1, q1)
+        _add_apply(inverse, g, g1)  # still with the other sign
+        _add_apply(first, g1, q1)
         q2[:] = isolated[run_span(tree.node_start, two)]
         g2[:] = 0.0
         _add_transposed(kernel, q1, g2)
         _add_apply(second, g2, q2)
+        for i in range(n):
+            g1[i] = -g1[i]
         for i in range(m):
             g2[i] = -g2[i]
         q = isolated[run_span(tree.node_start, run)]
