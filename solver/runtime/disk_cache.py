@@ -28,7 +28,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_OTHERS = ("runtime/jit.py", "sharp/tolerances.py")
+_OTHERS = ("runtime/compiler.py", "runtime/jit.py", "sharp/tolerances.py")
 """Modules without compiled functions that compiled code depends on."""
 _KERNEL = re.compile(r"^@compiled(_\w+)?\s*$", re.MULTILINE)
 

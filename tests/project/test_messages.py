@@ -21,7 +21,7 @@ INTERNAL = {
     "ensemble/results/head.py": "caught in read.py",
     "ensemble/results/write.py": "rows are made by the code alone",
     "solver/references": "closed forms are called by tests and the code alone",
-    "solver/runtime/jit.py": "compiled code; its callers have checked the shapes",
+    "solver/runtime/compiler.py": "compiled code; its callers have checked the shapes",
     "solver/validate": "refused by the command before",
 }
 # Short words of reasons that other messages contain.

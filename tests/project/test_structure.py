@@ -36,7 +36,7 @@ HDF5 = {
     "adhesis.ensemble.doctor.probe",
     "adhesis.ensemble.versions",
 }
-COMPILED = {"adhesis.solver.runtime.jit"}
+COMPILED = {"adhesis.solver.runtime.compiler", "adhesis.solver.runtime.jit"}
 FIGURES = {
     "adhesis.ensemble.loop.loop_figure",
     "adhesis.ensemble.loop.film",

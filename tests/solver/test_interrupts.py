@@ -26,6 +26,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.precompile import COMPILED_METHODS, _small_loops, small_problem
 from adhesis.solver.registry import make_method
+from adhesis.solver.runtime import compiler
 from adhesis.solver.runtime import jit as compiled
 from adhesis.solver.runtime.uninterrupted import uninterrupted
 from adhesis.solver.sharp.descent.track import Stage
@@ -126,7 +127,7 @@ def test_results_are_what_numba_makes_of_them():
 def boxed_in_c(typ: Any) -> bool:
     """Whether boxing a result of this type runs C code alone."""
     box = pythonapi._boxers.lookup(type(typ))
-    if box in (boxing.box_tuple, compiled._box_named_tuple):
+    if box in (boxing.box_tuple, compiler._box_named_tuple):
         of_ours = not isinstance(typ, types.BaseNamedTuple) or (
             typ.instance_class.__module__.startswith("adhesis.solver.")
         )
@@ -134,7 +135,7 @@ def boxed_in_c(typ: Any) -> bool:
     if isinstance(typ, types.Optional):
         return boxed_in_c(typ.type)
     return box in (
-        boxing.box_bool, boxing.box_integer, boxing.box_float, boxing.box_none, compiled._box_array
+        boxing.box_bool, boxing.box_integer, boxing.box_float, boxing.box_none, compiler._box_array
     )  # fmt: skip
 
 
