@@ -19,7 +19,7 @@ from adhesis.solver.sharp.equilibrium.griffith import (
 )
 from adhesis.solver.sharp.equilibrium.linear_exterior import open_window
 from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.renewal import respond, respond_again
+from adhesis.solver.sharp.equilibrium.response_setup import respond, respond_again
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.field.cluster_tree import build_tree, pair_again

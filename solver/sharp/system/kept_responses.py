@@ -6,7 +6,8 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
-from adhesis.solver.sharp.equilibrium.renewal import respond, respond_again, settle_response
+from adhesis.solver.sharp.equilibrium.renewal import settle_response
+from adhesis.solver.sharp.equilibrium.response_setup import respond, respond_again
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
