@@ -25,14 +25,15 @@ from adhesis.solver.model.profile import Amplitudes
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.registry import MethodName
 from adhesis.solver.sharp.method import SharpMethod
-from tests.support.explicit_solution import explicit_openings
+from tests.support.explicit_solution import explicit_nodes, explicit_openings
 
 TIGHT = 4  # every so many scenes are followed again, to 1e-5 or a hundred times as accurately
 GRID = 20
 _MOST_WAVES = 250  # of the scenes that are not of many patches
 _WEAK = 1e-3  # for so weak adhesion accuracy is dear: one in four of these
 _LOOKED_AT = 6  # states, and those at jumps
-_MOST_NODES = 3000  # of the independent openings
+_MOST_BY_WIDTH = 3000  # waves over the root of the narrowest length, for independent openings
+_MOST_NODES = 20_000  # of these
 _OVERLAP = 1e-6
 _TENSION = 1e-3  # of the strength
 _DECADES = 1e-4  # least strength that is drawn, of the largest tension without openings
@@ -283,7 +284,7 @@ def _of_states(method: Method, states: list[ContactState]) -> list[str]:
 def independent_clearance(method: Method, state: ContactState) -> float:
     """Least gap over h_max by the Riemann-Hilbert solution, with what the field's error allows.
 
-    0 where edges are too close to each other for that.
+    0 where edges are too close to each other for that, or ask for too many nodes.
     """
     profile = method.problem.profile
     edges = state.edges * profile.q0
@@ -291,7 +292,9 @@ def independent_clearance(method: Method, state: ContactState) -> float:
     right = np.append(edges[1:, 0], edges[0, 0] + 2 * np.pi)
     gaps = np.stack([left, right], axis=1)
     narrowest = min(float(np.diff(gaps, axis=1).min()), float(np.diff(edges, axis=1).min()))
-    if len(gaps) * profile.highest_harmonic / np.sqrt(narrowest) > _MOST_NODES:
+    if len(gaps) * profile.highest_harmonic / np.sqrt(narrowest) > _MOST_BY_WIDTH:
+        return 0.0
+    if len(gaps) * explicit_nodes(profile, gaps) > _MOST_NODES:
         return 0.0
     _, opening = explicit_openings(profile, gaps, state.separation * profile.q0)
     room = 10 * getattr(method.report(), "field_tolerance", 0.0)

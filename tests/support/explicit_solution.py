@@ -49,8 +49,9 @@ def _solve(stress, gaps, separation, nodes):
     strength = sign[:, None] * root * stress(phi.ravel()).reshape(phi.shape) * weight
 
     theta = centre[:, None] + half[:, None] * target_x
-    u = -(kernel(theta.ravel()[:, None] - phi.ravel()) @ strength.ravel()) / (2 * np.pi)
-    u = u.reshape(theta.shape)
+    # gap by gap, as all at once may take gigabytes
+    apart = (of_gap[:, None] - phi.ravel() for of_gap in theta)
+    u = np.stack([kernel(x) @ strength.ravel() for x in apart]) / (-2 * np.pi)
     basis = [np.prod(np.sin((theta[..., None] - centre) / 2), axis=-1)]
     for k in range(count):
         others = np.delete(centre, k)
@@ -86,6 +87,15 @@ def _solve(stress, gaps, separation, nodes):
     return c, theta, -sign[:, None] * w / smooth * half[:, None]
 
 
+def explicit_nodes(profile, gaps, least_nodes=96):
+    """Return how many nodes every gap has in :func:`explicit_openings`."""
+    widest = float(np.diff(gaps, axis=1).max()) / 2
+    patch = np.append(gaps[1:, 0], gaps[0, 0] + 2 * np.pi) - gaps[:, 1]
+    # a narrow patch beside a wide gap asks for nodes as dense as it is, and 1/sqrt of it suffices
+    narrow = float(np.sqrt(widest / patch.min()))
+    return int(np.ceil(max(least_nodes, 12 * widest * profile.highest_harmonic, 12 * narrow)))
+
+
 def explicit_openings(profile, gaps, separation, least_nodes=96):
     """Return θ and the opening q0 t of every gap, each of shape (L, nodes + 1).
 
@@ -99,11 +109,7 @@ def explicit_openings(profile, gaps, separation, least_nodes=96):
         phase = np.exp(1j * np.multiply.outer(np.asarray(theta), m[1:]))
         return (phase @ weight[1:]).real
 
-    widest = float(np.diff(gaps, axis=1).max()) / 2
-    patch = np.append(gaps[1:, 0], gaps[0, 0] + 2 * np.pi) - gaps[:, 1]
-    # a narrow patch beside a wide gap asks for nodes as dense as it is, and 1/sqrt of it suffices
-    narrow = float(np.sqrt(widest / patch.min()))
-    nodes = int(np.ceil(max(least_nodes, 12 * widest * profile.highest_harmonic, 12 * narrow)))
+    nodes = explicit_nodes(profile, gaps, least_nodes)
     _, theta, slope = _solve(stress, gaps, separation, nodes)
     # x = cos φ: dt/dφ = -slope, with t = 0 at φ = 0; slope is a polynomial in x, a cosine series
     series = dct(slope, type=1, axis=1) / nodes
