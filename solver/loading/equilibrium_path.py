@@ -137,7 +137,7 @@ class EquilibriumPath(ByValue, Viewed):
 
     @property
     def races(self) -> int:
-        """Number of jumps whose end state depends on the assumed edge kinetics."""
+        """Number of jumps whose end state depends on assumed speeds or order (``Jump.raced``)."""
         return sum(jump.raced for jump in self.jumps)
 
     @property
@@ -152,7 +152,7 @@ class EquilibriumPath(ByValue, Viewed):
 
     @property
     def energy_at_stake(self) -> float:
-        """Sum over the jumps of the energy that depends on the assumed kinetics, in J/m²."""
+        """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
 
     # ------------------------------------------------------------------ for tables and files

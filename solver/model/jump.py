@@ -63,10 +63,11 @@ class Jump(Shown):
     patch_length : float
         Length in m of the largest patch that the jump changed, before or after it.
     raced : bool
-        True if the end state depends on the assumed edge kinetics.
+        True if the end state depends on the assumed speeds of the edges, or on which of two events
+        comes first that are too near to each other to tell.
     at_stake : float
         |U_other - U_after| per unit nominal area, in J/m², with U_other the energy of the end state
-        under the other assumed edge kinetics; 0 unless ``raced``.
+        at the other speeds or in the other order; 0 unless ``raced``.
     barrier : float
         Of an opening, the energy per unit nominal area, in J/m², up to the crack that grows by
         itself, which adhesion of zero range has to be lifted over; else 0.

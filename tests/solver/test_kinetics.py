@@ -178,6 +178,27 @@ def test_the_length_of_the_steps_does_not_decide_where_a_jump_ends(hurst, n0, ra
     assert losses == pytest.approx([losses[1]] * 3, rel=1e-5)
 
 
+def test_a_touch_and_a_fold_too_near_to_be_told_apart_are_a_race():
+    """At a finer accuracy the fold comes first, and another loss: the coarser loop states it."""
+    half_space = HalfSpace(young=1e6, poisson=0.5)
+    profile = self_affine_profile(
+        0.756, period=2e-3, n0=14, ratio=72, seed=468326, h_rms=1e-6, amplitudes="rayleigh"
+    )
+    problem = Problem(profile, half_space, work_of_adhesion=0.04262480422968221)
+    coarse, fine = (
+        run_loop(SharpMethod(problem, accuracy=a), max_penetration=0.892824341, load_steps=23)
+        for a in (1e-3, 2e-4)
+    )
+    apart = abs(coarse.loss - fine.loss)
+    assert apart > 10 * (coarse.loss_error + fine.loss_error)
+    (raced,) = (jump for jump in coarse.jumps if jump.raced)
+    same = min(fine.jumps, key=lambda jump: abs(jump.separation - raced.separation))
+    assert raced.separation == pytest.approx(same.separation, abs=1e-5 * profile.h_max)
+    assert raced.at_stake > 0
+    # the two ways differ by that, at the same separation
+    assert same.energy_drop - raced.energy_drop == pytest.approx(raced.at_stake, rel=0.05)
+
+
 def test_nothing_races_where_the_rules_agree():
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=5, ratio=8, seed=3, h_rms=1e-6)
     result = run_loop(SharpMethod(Problem(profile, SOLID, 0.02)), max_penetration=0.9, load_steps=9)

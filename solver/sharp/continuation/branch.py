@@ -103,6 +103,15 @@ class Branch:
             self._accept(event, closed, step)
             return event
 
+    @property
+    def fold_ahead(self) -> tuple[float, float]:
+        """Return d of the fold that is predicted, or infinity, and of a place beyond it."""
+        predictor = self._predictor
+        way = self._target.at - predictor.point.at
+        distances = predictor.fold_distance, predictor.across(self._resolution.jump)
+        fold, beyond = (predictor.point.at + math.copysign(x, way) for x in distances)
+        return fold, beyond
+
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.add(point, self._closing.over(self.point, point, self._target.branch))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
-from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.continuation.jump import Contender, Jumps
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
@@ -156,7 +157,7 @@ class Follower:
             return jump
         touched = self._touch_before_fold(fold)
         if touched is not None:
-            touching = self._touch_jump(touched, target)
+            touching = self._touch_jump(touched, Contender(fold.at, []), target)
             return replace(touching, states=(self.states.of_point(fold.point), *touching.states))
         last = history.states[-1] if history.states else None
         jump, refined = self._fold_jump(last, fold, target, branch.steps.finest)
@@ -193,7 +194,11 @@ class Follower:
                 jump = self._opening_jump(opened, target)
                 if jump is not None:
                     return jump
-        return None if touched is None else self._touch_jump(touched, target)
+        if touched is None:
+            return None
+        fold, beyond = branch.fold_ahead
+        may_fold = abs(fold - touched.point.at) < self.resolution.order
+        return self._touch_jump(touched, Contender(beyond, []) if may_fold else None, target)
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
@@ -240,29 +245,34 @@ class Follower:
         ):
             raise NoState("patches open and close in turn", jump.at)
 
-    def _touch_jump(self, touched: Located[Touch], target: Target) -> ComputedJump:
+    def _touch_jump(
+        self, touched: Located[Touch], contender: Contender | None, target: Target
+    ) -> ComputedJump:
         """Compute the jump from the point of a branch at which surfaces touch inside a gap."""
         point = touched.point
         before = self.states.of_point(point)
         jump = self.jumps.compute(
-            before, point.field.gaps, point.at, target.branch, touched.seeds, point
-        )
+            before, point.field.gaps, point.at, target.branch, touched.seeds, point,
+            contender=contender,
+        )  # fmt: skip
         late = self.states.work(before, jump.states[-1], touched.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 
-    def _touch_before_fold(self, fold: Fold) -> Located[Touch] | None:
+    def _touch_before_fold(self, fold: Fold, further: float = 0.0) -> Located[Touch] | None:
         """Locate a touch on the last step to a fold, its edges being held; None if there is none.
 
-        The fold lies somewhere on that step, too: which of the two comes first is not resolved.
+        Or a little ``further``. The fold lies somewhere on that step, too: which of the two comes
+        first is not known.
         """
         point = fold.point
         low = self.nucleation.least(point.field)[0]
-        way = abs(fold.at - point.at)
+        end = fold.at + math.copysign(further, fold.at - point.at)
+        way = abs(end - point.at)
         if not self.edges.is_fixed:
             way *= max(1.0, abs(point.field.separation_by_prescribed))
         if low > self.closing.rate_held(point) * way:
             return None
-        return self.nucleation.located_held(point, low, fold.at)
+        return self.nucleation.located_held(point, low, end)
 
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float
@@ -279,7 +289,11 @@ class Follower:
             last = self.states.of_point(point)
             states = (last,)
         before = self.states.shifted(last, point.field, fold.at)
-        jump = self.jumps.compute(before, point.field.gaps, fold.at, target.branch, known=point)
+        touched = self._touch_before_fold(fold, self.resolution.order)
+        jump = self.jumps.compute(
+            before, point.field.gaps, fold.at, target.branch, known=point,
+            contender=None if touched is None else Contender(touched.point.at, touched.seeds),
+        )  # fmt: skip
         after = jump.states[-1]
         late = self.states.work(before, after, way)
         drop = jump.jump.energy_drop

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,21 @@ Rival = Point | None | FullContact
 """Where equal speeds led: a minimum, no contact, or full contact (under a load)."""
 
 
+class Contender(NamedTuple):
+    """Another event so near to that of a jump that it may as well come first.
+
+    Attributes
+    ----------
+    at : float
+        d of its descent.
+    touches : list of Touch
+        Where patches are put; none at a fold.
+    """
+
+    at: float
+    touches: list[Touch]
+
+
 class Jumps:
     """Jumps of one problem.
 
@@ -52,12 +68,14 @@ class Jumps:
         touches: list[Touch] | None = None,
         known: Point | None = None,
         barrier: float = 0.0,
+        contender: Contender | None = None,
     ) -> ComputedJump:
         """Descend at d = ``at`` from the gaps ``start`` to the next state in which nothing touches.
 
         The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
-        to a fold it may not be found again from its own edges.
+        to a fold it may not be found again from its own edges. Where a ``contender`` leads
+        elsewhere the jump raced, too.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals, known)
@@ -68,14 +86,19 @@ class Jumps:
         )
         after = self._after(before, point, at)
         other = after
-        if rivals:
-            try:
+        try:
+            rival = point
+            if rivals:
                 rival = self._settle_rival(rivals[0], at)
-            except FullContact:  # elsewhere, but with no energy that could be compared
-                other = replace(after)
-            else:
-                if not self._alike(rival, point):
-                    other = self._after(before, rival, at)
+            elif contender is not None:
+                rival = self._in_other_order(start, contender, known, at)
+        except FullContact:  # elsewhere, but with no energy that could be compared
+            other = replace(after)
+        except NoState:  # a comparison that does not come to rest is no failure of the path
+            pass
+        else:
+            if rival is not point and not self._alike(rival, point):
+                other = self._after(before, rival, at)
         jump = self.states.jump(before, after, branch, other, barrier)
         return ComputedJump(at, (after,), jump, point)
 
@@ -97,6 +120,27 @@ class Jumps:
                 start=self.edges.start(before),
             ),
         )
+
+    def _in_other_order(
+        self, start: Array, contender: Contender, known: Point | None, at: float
+    ) -> Point | None:
+        """Descend where a contender comes first; return the minimum at d = ``at`` next to its end.
+
+        Raises
+        ------
+        NoState
+            If it does not come to rest.
+        """
+
+        def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
+            gaps = self.nucleation.seeded(gaps, touching) if touching else gaps
+            return self._relax(gaps, contender.at, start=self.edges.start(before))
+
+        end = self._settle(relaxed(start, contender.touches, known), contender.at, relaxed)
+        if end is None:
+            return None
+        back = self.edges.equilibrium(end.gaps, at, CORRECTED * self.edges.wave)
+        return end if back is None else back
 
     def _settle(
         self,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from adhesis.solver.sharp.tolerances import ORDER_RESOLVED
+
 
 @dataclass(frozen=True)
 class Resolution:
@@ -38,3 +40,8 @@ class Resolution:
     late: float
     least_drop: float
     field_share: float
+
+    @property
+    def order(self) -> float:
+        """Separation of two events below which either may come first."""
+        return ORDER_RESOLVED * self.jump
