@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.runtime.jit import compiled, compiled_for_both, compiled_sums
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.conformal_map import (
@@ -78,7 +78,7 @@ def fast_size(fewest: int) -> int:
     return 32 * eighth - 1
 
 
-@compiled_for_both
+@compiled_sums
 def _fine_nodes(gap: Array, circle: Circle, theta: Array, span: Array) -> None:
     """Place the sine nodes of a gap, as many as ``theta`` holds: θ, falling, and dθ/dt.
 

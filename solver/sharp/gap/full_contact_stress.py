@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array, Profile
-from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.runtime.jit import compiled, compiled_for_both, compiled_sums
 
 # Nodes p of a panel, by the tolerance they serve. The finest panel is at most half a shortest wave
 # long: interpolation there leaves (π/2)^p/(p! 2^(p-1)) of the shortest wave's amplitude. A panel as
@@ -203,7 +203,7 @@ def _lagrange(nodes: Array, x: Array) -> Array:
     )
 
 
-@compiled
+@compiled_sums
 def _clenshaw(coefficients: Array, x: float) -> float:
     """Sum a Chebyshev series at ``x``."""
     b1 = 0.0
@@ -215,7 +215,18 @@ def _clenshaw(coefficients: Array, x: float) -> float:
     return total
 
 
-@compiled
+@compiled_sums
+def _clenshaw_both(coefficients: Array, x: float) -> tuple[float, float]:
+    """Sum a Chebyshev series at ``x``, and its derivative."""
+    b1, b2, d1, d2 = 0.0, 0.0, 0.0, 0.0
+    twice = 2 * x
+    for j in range(coefficients.shape[0] - 1, 0, -1):
+        d1, d2 = twice * d1 + (2 * b1 - d2), d1
+        b1, b2 = twice * b1 + (coefficients[j] - b2), b1
+    return x * b1 - b2 + coefficients[0], b1 + x * d1 - d2
+
+
+@compiled_sums
 def value_at(coefficients: Array, place: float) -> float:
     """Evaluate the piecewise series at θ = place · panel width."""
     k = int(np.floor(place))
@@ -223,7 +234,7 @@ def value_at(coefficients: Array, place: float) -> float:
     return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
 
 
-@compiled_for_both
+@compiled_sums
 def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
     """Evaluate a piecewise series at each angle, shape (len(theta),)."""
     count = theta.shape[0]
@@ -253,39 +264,27 @@ def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
     return out
 
 
-@compiled
+@compiled_sums
 def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
     """Evaluate sqrt(1 + h'²) and its θ-derivative at one angle."""
     place = theta / panels.width
     k = int(np.floor(place))
     x = 2 * (place - k) - 1
     c = panels.tilt[k & (panels.finest - 1)]
-    b1, b2, d1, d2 = 0.0, 0.0, 0.0, 0.0  # as _clenshaw, with the derivative
-    twice = 2 * x
-    for j in range(c.shape[0] - 1, 0, -1):
-        d1, d2 = twice * d1 + (2 * b1 - d2), d1
-        b1, b2 = twice * b1 + (c[j] - b2), b1
-    tilt = x * b1 - b2 + c[0]
+    tilt, rate = _clenshaw_both(c, x)
     measure = np.sqrt(1 + tilt * tilt)
-    return measure, tilt / measure * (b1 + x * d1 - d2) * 2 / panels.width
+    return measure, tilt / measure * rate * 2 / panels.width
 
 
-@compiled
+@compiled_sums
 def half_plane_opening(theta: float, side: int, panels: Panels) -> tuple[float, float]:
     """Evaluate C and dC/dθ of a half-plane crack that begins (side 0) or ends (1) at θ."""
     place = theta / panels.width
     k = int(np.floor(place))
     x = 2 * (place - k) - 1
     c = panels.half_plane[side, k & (panels.finest - 1)]
-    # d/dx of Σ c_j T_j = Σ j c_j U_{j-1}
-    total, rate = c[0], 0.0
-    t_prev, t, u_prev, u = 1.0, x, 0.0, 1.0
-    for j in range(1, c.shape[0]):
-        total += c[j] * t
-        rate += j * c[j] * u
-        t, t_prev = 2 * x * t - t_prev, t
-        u, u_prev = 2 * x * u - u_prev, u
-    return total, rate * 2 / panels.width
+    value, rate = _clenshaw_both(c, x)
+    return value, rate * 2 / panels.width
 
 
 @compiled_for_both

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.runtime.jit import compiled, compiled_for_both, compiled_sums
 
 _ROTATIONS = 64  # before a cosine is computed anew, so that rounding does not grow
 _THIRD = float(np.sqrt(0.75))
@@ -62,7 +62,7 @@ def tabulate_circle(count: int) -> Circle:
     return Circle(cosine, sine)
 
 
-@compiled
+@compiled_sums
 def _butterflies_of_two(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
     """Take ``parts`` butterflies of radix 2 for each of ``stride``."""
     re, im, out_re, out_im = x.re, x.im, out.re, out.im
@@ -83,7 +83,7 @@ def _butterflies_of_two(parts: int, stride: int, circle: Circle, x: Parts, out: 
             out_im[to + stride + q] = a_re * s1 + a_im * c1
 
 
-@compiled
+@compiled_sums
 def _butterflies_of_three(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
     """Take ``parts`` butterflies of radix 3 for each of ``stride``."""
     re, im, out_re, out_im = x.re, x.im, out.re, out.im
@@ -112,7 +112,7 @@ def _butterflies_of_three(parts: int, stride: int, circle: Circle, x: Parts, out
             out_im[to + 2 * stride + q] = x_re * s2 + x_im * c2
 
 
-@compiled
+@compiled_sums
 def _butterflies_of_four(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
     """Take ``parts`` butterflies of radix 4 for each of ``stride``."""
     re, im, out_re, out_im = x.re, x.im, out.re, out.im
@@ -148,7 +148,7 @@ def _butterflies_of_four(parts: int, stride: int, circle: Circle, x: Parts, out:
             out_im[to + 3 * stride + q] = x_re * s3 + x_im * c3
 
 
-@compiled
+@compiled_sums
 def _butterflies_of_five(parts: int, stride: int, circle: Circle, x: Parts, out: Parts) -> None:
     """Take ``parts`` butterflies of radix 5 for each of ``stride``."""
     re, im, out_re, out_im = x.re, x.im, out.re, out.im
