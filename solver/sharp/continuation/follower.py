@@ -155,12 +155,13 @@ class Follower:
         jump = self._nucleation_jump(branch, target)
         if jump is not None:
             return jump
-        touched = self._touch_before_fold(fold)
-        if touched is not None:
+        touched = self._touch_beside(fold)
+        if touched is not None and fold.is_on_step(touched.point.at):
             touching = self._touch_jump(touched, Contender(fold.at, []), target)
             return replace(touching, states=(self.states.of_point(fold.point), *touching.states))
         last = history.states[-1] if history.states else None
-        jump, refined = self._fold_jump(last, fold, target, branch.steps.finest)
+        contender = None if touched is None else Contender(touched.point.at, touched.seeds)
+        jump, refined = self._fold_jump(last, fold, contender, target, branch.steps.finest)
         after = None if jump is None else jump.point
         if refined < branch.steps.finest:
             branch.steps.refine(refined)
@@ -258,15 +259,14 @@ class Follower:
         late = self.states.work(before, jump.states[-1], touched.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 
-    def _touch_before_fold(self, fold: Fold, further: float = 0.0) -> Located[Touch] | None:
-        """Locate a touch on the last step to a fold, its edges being held; None if there is none.
+    def _touch_beside(self, fold: Fold) -> Located[Touch] | None:
+        """Locate a touch on the last step to a fold or hardly beyond, edges being held, or None.
 
-        Or a little ``further``. The fold lies somewhere on that step, too: which of the two comes
-        first is not known.
+        The fold lies somewhere on that step, too: which of the two comes first is not known.
         """
         point = fold.point
         low = self.nucleation.least(point.field)[0]
-        end = fold.at + math.copysign(further, fold.at - point.at)
+        end = fold.at + math.copysign(self.resolution.order, fold.at - point.at)
         way = abs(end - point.at)
         if not self.edges.is_fixed:
             way *= max(1.0, abs(point.field.separation_by_prescribed))
@@ -275,7 +275,12 @@ class Follower:
         return self.nucleation.located_held(point, low, end)
 
     def _fold_jump(
-        self, last: ContactState | None, fold: Fold, target: Target, finest: float
+        self,
+        last: ContactState | None,
+        fold: Fold,
+        contender: Contender | None,
+        target: Target,
+        finest: float,
     ) -> tuple[ComputedJump | None, float]:
         """Compute the jump at a fold.
 
@@ -289,11 +294,9 @@ class Follower:
             last = self.states.of_point(point)
             states = (last,)
         before = self.states.shifted(last, point.field, fold.at)
-        touched = self._touch_before_fold(fold, self.resolution.order)
         jump = self.jumps.compute(
-            before, point.field.gaps, fold.at, target.branch, known=point,
-            contender=None if touched is None else Contender(touched.point.at, touched.seeds),
-        )  # fmt: skip
+            before, point.field.gaps, fold.at, target.branch, known=point, contender=contender
+        )
         after = jump.states[-1]
         late = self.states.work(before, after, way)
         drop = jump.jump.energy_drop
