@@ -22,6 +22,7 @@ from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
 from adhesis.solver.sharp.continuation.trail import Trail
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
+from adhesis.solver.sharp.nucleation.location import locate
 
 WAVE, FOLD = 1.0, 0.2
 
@@ -226,6 +227,64 @@ def test_a_vanished_patch_is_an_event():
     assert vanished == [e.point.at > 0.5 for e in found]
     assert 0 < sum(vanished) < len(vanished)
     assert all(e.may_touch for e in found if e.remaining is not None)
+
+
+def test_a_branch_tells_where_the_fold_ahead_is_and_what_is_surely_beyond():
+    of = branch(Curve(), 0.9, 0.1)
+    assert np.isinf(of.fold_ahead[0])  # one point shows none
+    while not abs(of.fold_ahead[0] - FOLD) < 1e-4:
+        assert isinstance(of.advance(), Accepted)
+    assert of.point.at > FOLD > of.fold_ahead[1]
+
+
+# ---------------------------------------------------------------------- location
+
+
+class Clearance:
+    """Clear down to d = 0.6 by ``before``, and from there on an overlap of ``after``."""
+
+    tolerance = 1e-6
+
+    def __init__(self, before: float, after: float) -> None:
+        self.before, self.after = before, after
+
+    def least(self, field: Any) -> tuple[float, float]:
+        """Value at a field, and its place."""
+        at = field.separation
+        return (at - 0.6 + self.before if at > 0.6 else at - 0.6 - self.after), at
+
+    def ready(self, place: float) -> list[float]:
+        """Seed at a place."""
+        return [place]
+
+    def is_located(self, value: float, many: bool, near: bool) -> bool:
+        """Whether the overlap is small."""
+        return near and value > -0.5 * self.tolerance
+
+    def tracked(self, clear: Point, hit: Point) -> None:
+        """Few gaps."""
+
+    def check_located(self, value: float, at: float) -> None:
+        """Nothing to check."""
+
+
+def test_a_touch_is_located_to_the_resolution_and_the_overlap_that_is_allowed():
+    curve = Curve(fold=None)
+    trail = [curve.point(at) for at in (0.8, 0.5)]
+    found, _ = locate(cast(Any, Clearance(0.0, 0.0)), cast(Any, curve), trail, 1e-4, 0.0)
+    assert found is not None
+    assert 0 <= 0.6 - found.point.at < 0.5e-6
+    assert found.late < 1e-4
+
+
+def test_a_touch_where_the_clearance_leaps_is_at_the_last_clear_point():
+    """By the error of the field: no smaller step makes the overlap small."""
+    curve = Curve(fold=None)
+    trail = [curve.point(at) for at in (0.8, 0.5)]
+    found, _ = locate(cast(Any, Clearance(1e-5, 1e-5)), cast(Any, curve), trail, 1e-4, 0.0)
+    assert found is not None
+    assert 0 < found.point.at - 0.6 < 1e-15
+    assert (found.seeds, found.late) == ([0.6], 0.0)
 
 
 # ---------------------------------------------------------------------- trail and history

@@ -44,7 +44,3 @@ class Fold:
 
     point: Point
     at: float
-
-    def is_on_step(self, at: float) -> bool:
-        """Whether d = ``at`` lies between the last point and there."""
-        return abs(at - self.point.at) <= abs(self.at - self.point.at)

@@ -12,7 +12,7 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
-from adhesis.solver.sharp.continuation.jump import Contender, Jumps
+from adhesis.solver.sharp.continuation.jump import Jumps
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
@@ -155,13 +155,17 @@ class Follower:
         jump = self._nucleation_jump(branch, target)
         if jump is not None:
             return jump
-        touched = self._touch_beside(fold)
-        if touched is not None and fold.is_on_step(touched.point.at):
-            touching = self._touch_jump(touched, Contender(fold.at, []), target)
-            return replace(touching, states=(self.states.of_point(fold.point), *touching.states))
+        touched = self._touch_before_fold(fold)
+        if touched is not None:
+            ahead, _ = branch.fold_ahead
+            apart = math.copysign(1.0, fold.at - fold.point.at) * (ahead - touched.point.at)
+            if apart > -self.resolution.order:  # else the fold comes first
+                beyond = fold.at if apart < self.resolution.order else None
+                touching = self._touch_jump(touched, beyond, target)
+                before = self.states.of_point(fold.point)
+                return replace(touching, states=(before, *touching.states))
         last = history.states[-1] if history.states else None
-        contender = None if touched is None else Contender(touched.point.at, touched.seeds)
-        jump, refined = self._fold_jump(last, fold, contender, target, branch.steps.finest)
+        jump, refined = self._fold_jump(last, fold, target, branch.steps.finest)
         after = None if jump is None else jump.point
         if refined < branch.steps.finest:
             branch.steps.refine(refined)
@@ -199,7 +203,7 @@ class Follower:
             return None
         fold, beyond = branch.fold_ahead
         may_fold = abs(fold - touched.point.at) < self.resolution.order
-        return self._touch_jump(touched, Contender(beyond, []) if may_fold else None, target)
+        return self._touch_jump(touched, beyond if may_fold else None, target)
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
@@ -247,40 +251,37 @@ class Follower:
             raise NoState("patches open and close in turn", jump.at)
 
     def _touch_jump(
-        self, touched: Located[Touch], contender: Contender | None, target: Target
+        self, touched: Located[Touch], beyond: float | None, target: Target
     ) -> ComputedJump:
-        """Compute the jump from the point of a branch at which surfaces touch inside a gap."""
+        """Compute the jump from the point of a branch at which surfaces touch inside a gap.
+
+        A fold that may as well come first has come ``beyond`` that d.
+        """
         point = touched.point
         before = self.states.of_point(point)
         jump = self.jumps.compute(
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,
-            contender=contender,
+            fold=beyond,
         )  # fmt: skip
         late = self.states.work(before, jump.states[-1], touched.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
 
-    def _touch_beside(self, fold: Fold) -> Located[Touch] | None:
-        """Locate a touch on the last step to a fold or hardly beyond, edges being held, or None.
+    def _touch_before_fold(self, fold: Fold) -> Located[Touch] | None:
+        """Locate a touch on the last step to a fold, its edges being held; None if there is none.
 
-        The fold lies somewhere on that step, too: which of the two comes first is not known.
+        The fold lies somewhere on that step, too.
         """
         point = fold.point
         low = self.nucleation.least(point.field)[0]
-        end = fold.at + math.copysign(self.resolution.order, fold.at - point.at)
-        way = abs(end - point.at)
+        way = abs(fold.at - point.at)
         if not self.edges.is_fixed:
             way *= max(1.0, abs(point.field.separation_by_prescribed))
         if low > self.closing.rate_held(point) * way:
             return None
-        return self.nucleation.located_held(point, low, end)
+        return self.nucleation.located_held(point, low, fold.at)
 
     def _fold_jump(
-        self,
-        last: ContactState | None,
-        fold: Fold,
-        contender: Contender | None,
-        target: Target,
-        finest: float,
+        self, last: ContactState | None, fold: Fold, target: Target, finest: float
     ) -> tuple[ComputedJump | None, float]:
         """Compute the jump at a fold.
 
@@ -294,9 +295,7 @@ class Follower:
             last = self.states.of_point(point)
             states = (last,)
         before = self.states.shifted(last, point.field, fold.at)
-        jump = self.jumps.compute(
-            before, point.field.gaps, fold.at, target.branch, known=point, contender=contender
-        )
+        jump = self.jumps.compute(before, point.field.gaps, fold.at, target.branch, known=point)
         after = jump.states[-1]
         late = self.states.work(before, after, way)
         drop = jump.jump.energy_drop

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,21 +28,6 @@ Rival = Point | None | FullContact
 """Where equal speeds led: a minimum, no contact, or full contact (under a load)."""
 
 
-class Contender(NamedTuple):
-    """Another event so near to that of a jump that it may as well come first.
-
-    Attributes
-    ----------
-    at : float
-        d of its descent.
-    touches : list of Touch
-        Where patches are put; none at a fold.
-    """
-
-    at: float
-    touches: list[Touch]
-
-
 class Jumps:
     """Jumps of one problem.
 
@@ -68,14 +51,14 @@ class Jumps:
         touches: list[Touch] | None = None,
         known: Point | None = None,
         barrier: float = 0.0,
-        contender: Contender | None = None,
+        fold: float | None = None,
     ) -> ComputedJump:
         """Descend at d = ``at`` from the gaps ``start`` to the next state in which nothing touches.
 
         The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
-        to a fold it may not be found again from its own edges. Where a ``contender`` leads
-        elsewhere the jump raced, too.
+        to a fold it may not be found again from its own edges. The jump raced, too, if a fold that
+        may come before the touches, and surely before d = ``fold``, leads elsewhere in the end.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals, known)
@@ -85,22 +68,30 @@ class Jumps:
             lambda gaps, touching, before: self._descend(gaps, at, touching, rivals, before),
         )
         after = self._after(before, point, at)
-        other = after
+        at_stake = None
         try:
-            rival = point
             if rivals:
                 rival = self._settle_rival(rivals[0], at)
-            elif contender is not None:
-                rival = self._in_other_order(start, contender, known, at)
+                at_stake = self._at_stake(before, point, rival, at)
+            elif fold is not None:
+                rival = self._beyond(fold, start, known)
+                both = None if point is None else self._beyond(fold, point.gaps, point)
+                at_stake = self._at_stake(before, both, rival, fold)
         except FullContact:  # elsewhere, but with no energy that could be compared
-            other = replace(after)
+            at_stake = 0.0
         except NoState:  # a comparison that does not come to rest is no failure of the path
             pass
-        else:
-            if rival is not point and not self._alike(rival, point):
-                other = self._after(before, rival, at)
-        jump = self.states.jump(before, after, branch, other, barrier)
+        jump = self.states.jump(before, after, branch, at_stake, barrier)
         return ComputedJump(at, (after,), jump, point)
+
+    def _at_stake(
+        self, before: ContactState, point: Point | None, rival: Point | None, at: float
+    ) -> float | None:
+        """Difference of the energies of two ends in J/m²; None if they are one."""
+        if self._alike(rival, point):
+            return None
+        ends = (self._after(before, end, at) for end in (point, rival))
+        return self.states.apart(*ends)
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
         """State that a descent led to."""
@@ -121,26 +112,14 @@ class Jumps:
             ),
         )
 
-    def _in_other_order(
-        self, start: Array, contender: Contender, known: Point | None, at: float
-    ) -> Point | None:
-        """Descend where a contender comes first; return the minimum at d = ``at`` next to its end.
-
-        Raises
-        ------
-        NoState
-            If it does not come to rest.
-        """
+    def _beyond(self, at: float, start: Array, known: Point | None) -> Point | None:
+        """Descend at a d next to that of an equilibrium, until nothing touches."""
 
         def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
             gaps = self.nucleation.seeded(gaps, touching) if touching else gaps
-            return self._relax(gaps, contender.at, start=self.edges.start(before))
+            return self._relax(gaps, at, start=self.edges.start(before))
 
-        end = self._settle(relaxed(start, contender.touches, known), contender.at, relaxed)
-        if end is None:
-            return None
-        back = self.edges.equilibrium(end.gaps, at, CORRECTED * self.edges.wave)
-        return end if back is None else back
+        return self._settle(relaxed(start, [], known), at, relaxed)
 
     def _settle(
         self,

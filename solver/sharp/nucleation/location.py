@@ -135,6 +135,8 @@ def locate(
             aimed = clear_value + 0.2 * criterion.tolerance
             share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
         aim = clear + (hit.at - clear) * share
+        if aim in (clear, hit.at):  # there its value differs by the error of the field
+            return Located(last, criterion.ready(hit_places), 0.0), 0.0
         point = None
         reach = CORRECTED * edges.wave
         if many:

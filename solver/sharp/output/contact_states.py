@@ -184,24 +184,27 @@ class States:
         work = 0.5 * way * (y[0] + y[1]) - way**2 * change / 12
         return (after.potential - before.potential) / self.period + work
 
+    def apart(self, one: ContactState, other: ContactState) -> float:
+        """Difference of two energies, in J/m² of nominal area."""
+        return abs(other.potential - one.potential) / self.period
+
     def jump(
         self,
         before: ContactState,
         after: ContactState,
         branch: Branch,
-        other: ContactState,
+        at_stake: float | None = None,
         barrier: float = 0.0,
     ) -> Jump:
-        """Jump between two states; ``other`` is where another rule of descent would have led.
+        """Jump between two states, with what is ``at_stake`` in J/m² if it raced.
 
         ``barrier`` is that of an opening, in units of γ/q0.
         """
-        raced = other is not after
-        at_stake = abs(other.potential - after.potential) / self.period
         barrier *= self.problem.work_of_adhesion / (self.q0 * self.period)
         jump = Jump.between(
-            before, after, branch, self.period, raced=raced, at_stake=at_stake, barrier=barrier
-        )
+            before, after, branch, self.period, raced=at_stake is not None,
+            at_stake=at_stake or 0.0, barrier=barrier,
+        )  # fmt: skip
         if self.problem.control.is_load and not after.patches:
             # The load's own work is not counted, which may leave less than nothing.
             jump = replace(jump, energy_drop=before.energy / self.period)
