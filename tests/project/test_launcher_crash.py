@@ -1,4 +1,4 @@
-"""A test in which mpirun itself crashes runs once more; no other test does."""
+"""A test in which mpirun itself crashes or hangs runs once more; no other test does."""
 
 from __future__ import annotations
 
@@ -44,3 +44,39 @@ def test_a_test_runs_once_more_if_mpirun_crashes_in_it(tmp_path: Path) -> None:
     assert passed == {f"test_crash[1-{crash}]", "test_count"}
     assert failed == {"test_crash[1-adhesis]", f"test_crash[2-{crash}]", "test_crash[2-adhesis]"}
     assert "mpirun itself crashed: this test runs once more" in done.stdout
+
+
+HANGING = """
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+runs = []
+
+@pytest.mark.parametrize("ranks", [0, 1])
+def test_hang(ranks, tmp_path):
+    launcher = tmp_path / "mpirun"
+    shutil.copy(shutil.which("bash"), launcher)
+    runs.append(ranks)
+    if runs.count(ranks) == 1:
+        words = [launcher, "-c", "sleep 5 & echo; wait" if ranks else "echo; read"]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        process = subprocess.Popen(words, **pipes)
+        process.stdout.readline()
+        process.wait(timeout=0.1)
+"""
+
+
+def test_a_test_runs_once_more_if_mpirun_hangs_in_it_without_ranks(tmp_path: Path) -> None:
+    path = tmp_path / "test_it.py"
+    path.write_text(HANGING)
+    words = ("-q", "-rA", "-p", "tests.support.launcher_crash", "-c", "/dev/null", str(path))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", *words], cwd=ROOT, capture_output=True, text=True
+    )
+    lines = done.stdout.splitlines()
+    assert [line.split("::")[1] for line in lines if line.startswith("PASSED")] == ["test_hang[0]"]
+    failed = [line.split("::")[1].split()[0] for line in lines if line.startswith("FAILED")]
+    assert failed == ["test_hang[1]"]
