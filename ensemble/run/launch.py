@@ -17,8 +17,10 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -41,6 +43,11 @@ STARTED = "ADHESIS_STARTED"
 _RANKS_PER_CORE = 16
 KILLED = 137  # exit code that a shell reports for a process ended by signal 9
 
+
+# s from the exit code of the ranks to a message, and from there to the end of a launcher that goes
+# on. Open MPI 4.1.4 was seen to hang once all ranks had ended, in PMIx_server_finalize.
+_LAUNCHER_ENDS, _LAUNCHER_KILLED = 10.0, 15.0
+_LOOK_EVERY = 0.5  # s
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
 _LIBC = ctypes.CDLL(None)
@@ -151,7 +158,8 @@ def run_ranks(
     launcher and no message.
 
     SIGTERM, SIGHUP, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C ends them at once.
-    If this process is killed, the launcher ends them.
+    If this process is killed, the launcher ends them. A launcher that does not end soon after the
+    ranks have passed on an exit code is killed.
 
     Parameters
     ----------
@@ -181,6 +189,7 @@ def run_ranks(
         process_group=0,  # else Ctrl-C reaches mpirun, which ends its ranks without a stop in order
         preexec_fn=end_with_parent,  # else ranks would continue and keep the results file locked
     )
+    threading.Thread(target=_see_end, args=(process, handed_over), daemon=True).start()
     with _signals_passed_to(process), open(handle, encoding="utf-8") as stream:
         try:
             if process.stdout is not None and output is not None:
@@ -191,6 +200,19 @@ def run_ranks(
             os.unlink(handed_over)
         own, _, sentence = stream.read().partition("\n")
     return int(own or code), sentence
+
+
+def _see_end(process: subprocess.Popen[str], handed_over: str) -> None:
+    """Kill a launcher that goes on after its ranks have written the file of their exit code."""
+    with suppress(OSError):  # the file goes when the launcher has ended
+        while not os.path.getsize(handed_over):
+            time.sleep(_LOOK_EVERY)
+        time.sleep(_LAUNCHER_ENDS)
+        os.stat(handed_over)
+        print("the ranks are done: waiting for their launcher to end", file=sys.stderr, flush=True)
+        time.sleep(_LAUNCHER_KILLED)
+        os.stat(handed_over)
+        process.kill()
 
 
 @contextmanager
