@@ -209,7 +209,9 @@ def _see_end(process: subprocess.Popen[str], handed_over: str) -> None:
             time.sleep(_LOOK_EVERY)
         time.sleep(_LAUNCHER_ENDS)
         os.stat(handed_over)
-        print("the ranks are done: waiting for their launcher to end", file=sys.stderr, flush=True)
+        left = f"{_LAUNCHER_KILLED:.0f} s"
+        text = f"the run is over, but its launcher has not ended: it is ended in {left}"
+        print(text, file=sys.stderr, flush=True)
         time.sleep(_LAUNCHER_KILLED)
         os.stat(handed_over)
         process.kill()

@@ -319,7 +319,7 @@ PREDICTED_MOTION = 0.15
 """λ_min. Longest predicted motion of an edge in one step."""
 ORDER_RESOLVED = 0.1
 """Of the resolution of a jump. A touch and a fold nearer to each other may come in either order:
-the error of the field displaces them by a few hundredths."""
+the error of the field displaces them by up to that."""
 SAME_BRANCH = 1e-3
 """λ_min. Edges that a descent moves by less than this have not left their branch."""
 STEP_GROWTH = 2.0

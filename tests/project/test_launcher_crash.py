@@ -66,7 +66,7 @@ def test_hang(ranks, tmp_path):
     shutil.copy(shutil.which("bash"), launcher)
     runs.append(ranks)
     if runs.count(ranks) == 1:
-        words = [launcher, "-c", "sleep 5 & echo; wait" if ranks else "echo; read"]
+        words = [launcher, "-c", "exec 3<&0; cat <&3 & echo; wait" if ranks else "echo; read"]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         process = subprocess.Popen(words, **pipes)
         process.stdout.readline()

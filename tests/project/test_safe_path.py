@@ -88,7 +88,8 @@ def test_a_launcher_that_hangs_after_its_ranks_have_ended_is_killed(
     monkeypatch.setattr(launch, "_LAUNCHER_ENDS", 0.1)
     monkeypatch.setattr(launch, "_LAUNCHER_KILLED", 0.1)
     assert launch.run_ranks(str(launcher), 2, [], output=output) == (75, "stopped")
-    assert capfd.readouterr().err == "the ranks are done: waiting for their launcher to end\n"
+    text = "the run is over, but its launcher has not ended: it is ended in 0 s\n"
+    assert capfd.readouterr().err == text
 
 
 # --------------------------------------------------------------------- the end of the parent
