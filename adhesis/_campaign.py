@@ -79,9 +79,7 @@ class Campaign:
 
     def __repr__(self) -> str:
         cells, tasks = len(self.tables.cells), self.tables.task_count
-        return (
-            f"<Campaign: {checks.counted(cells, 'cell')}, {checks.counted(tasks, 'task')}>"
-        )
+        return f"<Campaign: {checks.counted(cells, 'cell')}, {checks.counted(tasks, 'task')}>"
 
     def _repr_html_(self) -> str:
         """Return the number of tasks and the campaign file, for notebooks."""

@@ -120,9 +120,7 @@ def _refusing(option: str, path: Path) -> Iterator[None]:
     except InputError:
         raise
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        raise InputError(
-            f"{option} is {path}: it cannot be written ({_reason(error)})"
-        ) from None
+        raise InputError(f"{option} is {path}: it cannot be written ({_reason(error)})") from None
 
 
 def _check_file(option: str, path: Path) -> None:

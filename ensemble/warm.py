@@ -58,8 +58,7 @@ def warm_up(
                 return
             if next_report == _MOMENT:
                 write(
-                    f"compiling {_listed(methods)} for {processor()}: about {total} functions, "
-                    "once"
+                    f"compiling {_listed(methods)} for {processor()}: about {total} functions, once"
                 )
                 if show_bar:
                     show = stack.enter_context(bar("compiling", remaining=True))
@@ -71,9 +70,7 @@ def warm_up(
 
         caught = stack.enter_context(warnings.catch_warnings(record=True))
         warnings.simplefilter("always")
-        seen = warm(
-            methods, report=report, to_installation=to_installation, many_gaps=many_gaps
-        )
+        seen = warm(methods, report=report, to_installation=to_installation, many_gaps=many_gaps)
     for text in dict.fromkeys(str(warning.message) for warning in caught):
         write(f"warning: {text}")
     if next_report > _MOMENT:

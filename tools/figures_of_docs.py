@@ -66,9 +66,7 @@ def _paper() -> tuple[str, ...]:
 
 PARTS = {
     "loop": Part(("docs/figures/loop.py OUT/loop.png",), "loop.png", "figures"),
-    "structure": Part(
-        ("docs/figures/structure.py OUT/structure.png",), "structure.png", "figures"
-    ),
+    "structure": Part(("docs/figures/structure.py OUT/structure.png",), "structure.png", "figures"),
     "zero-range": Part(
         ("docs/figures/zero_range.py OUT/zero_range.png",), "zero_range.png", "figures"
     ),

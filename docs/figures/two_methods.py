@@ -56,11 +56,20 @@ def draw_gap(axes: Axes) -> None:
     spot = ((nodes.x + 0.5 * PERIOD) % PERIOD) - 0.5 * PERIOD
     inside = nodes.gap <= 0
     axes.plot(
-        1e6 * spot[~inside], 1e6 * (nodes.height + nodes.gap)[~inside], "o", ms=3.5, mfc="w",
-        color=GRID, label="grid: free nodes",
+        1e6 * spot[~inside],
+        1e6 * (nodes.height + nodes.gap)[~inside],
+        "o",
+        ms=3.5,
+        mfc="w",
+        color=GRID,
+        label="grid: free nodes",
     )
     axes.plot(
-        1e6 * spot[inside], 1e6 * nodes.height[inside], "o", ms=3.5, color=GRID,
+        1e6 * spot[inside],
+        1e6 * nodes.height[inside],
+        "o",
+        ms=3.5,
+        color=GRID,
         label="grid: contact nodes",
     )
     for edge in np.ravel(exact.edges):
@@ -87,8 +96,13 @@ def draw_stress(axes: Axes) -> None:
         order = np.argsort(place)
         close = np.abs(place[order]) < 5e-6
         axes.plot(
-            1e6 * place[order][close], fields.stress[order][close] / 1e3, style, ms=4, lw=1.2,
-            color=colour, label=name,
+            1e6 * place[order][close],
+            fields.stress[order][close] / 1e3,
+            style,
+            ms=4,
+            lw=1.2,
+            color=colour,
+            label=name,
         )
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
     lowest = nodes.stress.min() / 1e3
@@ -102,9 +116,7 @@ def draw_branch(axes: Axes) -> None:
     method = make_method("sharp", PROBLEM)
     loop = run_loop(method, max_penetration=0.5, load_steps=10)
     rows = [k for k in loop.states("unloading") if loop.contact_states[k].patches]
-    width = np.array(
-        [float(np.diff(loop.contact_states[k].edges[0])[0]) / 2 for k in rows]
-    )
+    width = np.array([float(np.diff(loop.contact_states[k].edges[0])[0]) / 2 for k in rows])
     places = loop.penetration[rows]
     axes.plot(places, 1e6 * width, "o-", ms=2, lw=0.8, color=SHARP, label="points of the branch")
     axes.annotate(

@@ -151,9 +151,7 @@ def main() -> None:
         panels[above].set_ylim(1.08 * lowest, 0.72)
         panels[above].axhline(0, color="0.6", lw=0.6)
         panels[above].tick_params(labelbottom=False)
-        panels[name].fill_between(
-            1e3 * x, -4, 1e6 * loop.problem.profile.at(x), color=RIGID, lw=0
-        )
+        panels[name].fill_between(1e3 * x, -4, 1e6 * loop.problem.profile.at(x), color=RIGID, lw=0)
         panels[name].set(
             xlim=(0, 1e3 * x[-1]), ylim=(-3, 3), yticks=[], xlabel="position (mm)", ylabel="h(x)"
         )

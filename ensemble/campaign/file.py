@@ -279,6 +279,6 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
     for name in (other, *(["stiffness"] if cycle.under_load else [])):
         if getattr(cycle, name) is not None:
             raise InputError(
-                f"{source}: [cycle] {name} is given: with control = \"{cycle.control}\" a path "
+                f'{source}: [cycle] {name} is given: with control = "{cycle.control}" a path '
                 f"turns at {wanted}, so leave {name} out"
             )

@@ -82,9 +82,7 @@ class ProfileTable:
     h_rms: float | None = _key(
         number_in(NORMALISATIONS["h_rms"]), "root mean square height in m", None, axis="m"
     )
-    m2: float | None = _key(
-        number_in(NORMALISATIONS["m2"]), "mean square slope", None, axis="1"
-    )
+    m2: float | None = _key(number_in(NORMALISATIONS["m2"]), "mean square slope", None, axis="1")
     c0: float | None = _key(
         number_in(NORMALISATIONS["c0"]),
         "|a_n0|² in m², the same for every H (C0 of the spectrum)",
@@ -109,9 +107,7 @@ class MaterialTable:
     """``[material]``: the elastic half-space, and the strength of the interface."""
 
     young: float = _key(number_in(YOUNG), "Young's modulus E in Pa", axis="Pa")
-    poisson: float = _key(
-        number_in(POISSON), "Poisson's ratio ν", axis="1"
-    )
+    poisson: float = _key(number_in(POISSON), "Poisson's ratio ν", axis="1")
     adhesion_range: float | None = _key(
         number_in(ADHESION_RANGE),
         "range δ of adhesion in m: patches open from inside at the strength γ/δ; by default zero, "
@@ -127,6 +123,7 @@ class MaterialTable:
     def opens(self) -> bool:
         """Whether patches may open from inside."""
         return not (self.adhesion_range is None and self.strength in (None, math.inf))
+
 
 @dataclass(frozen=True)
 class SweepTable:

@@ -278,9 +278,7 @@ def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
     return list(dict.fromkeys(wanted))
 
 
-def _field_nodes(
-    args: argparse.Namespace, method: Method, penetrations: Sequence[float]
-) -> int:
+def _field_nodes(args: argparse.Namespace, method: Method, penetrations: Sequence[float]) -> int:
     """Nodes of the fields: those asked for, else the method's own, else 32 per shortest wave."""
     nodes = args.field_nodes
     if nodes is None:

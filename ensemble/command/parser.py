@@ -69,9 +69,7 @@ def _whole_number(value: str) -> int:
     try:
         return int(value)
     except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"is {quoted(value)}: it must be a whole number"
-        ) from None
+        raise argparse.ArgumentTypeError(f"is {quoted(value)}: it must be a whole number") from None
 
 
 def _number(value: str) -> float:

@@ -157,4 +157,3 @@ def closure_warning(heights: Array, name: str) -> str | None:
         "period of a profile and the jump counts as roughness; adhesis trace makes a period of a "
         "measured trace"
     )
-

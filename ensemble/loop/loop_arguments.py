@@ -47,9 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     shape.add_argument("--n0", type=int, help=f"lowest harmonic (default {N0})")
     shape.add_argument("--ratio", type=int, help=f"highest over lowest harmonic (default {RATIO})")
-    shape.add_argument(
-        "--h-rms", type=height, metavar="M", help="rms height: 0.5um (default 1um)"
-    )
+    shape.add_argument("--h-rms", type=height, metavar="M", help="rms height: 0.5um (default 1um)")
     shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
     shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
     shape.add_argument("--amplitudes", metavar="KIND", help="deterministic (default) or rayleigh")
@@ -64,9 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact.add_argument(
         "--young", type=stress, metavar="E", help="in Pa, or 1MPa (likewise; with --hurst 1e6)"
     )
-    contact.add_argument(
-        "--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)"
-    )
+    contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
     add_strength_arguments(contact)
     add_cycle_arguments(contact)
     contact.add_argument(
@@ -106,7 +102,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="Δ/h_max of the fields on both branches (default: quarters of --max-penetration)",
     )
     output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
-    output.add_argument(
-        "--strict", action="store_true", help="exit code 1 if the loss is doubtful"
-    )
+    output.add_argument("--strict", action="store_true", help="exit code 1 if the loss is doubtful")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")

@@ -59,6 +59,7 @@ NO_RANGES = (
 )
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
+
 class Results:
     """A results file, read with plain h5py, at any moment of a run.
 

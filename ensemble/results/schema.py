@@ -152,9 +152,7 @@ def shape_of(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:
     return (sizes[dataset.dims[0]], *row_shape(dataset, sizes))
 
 
-def file_size(
-    campaign: Campaign, part: Part = WHOLE, without: frozenset[str] = frozenset()
-) -> int:
+def file_size(campaign: Campaign, part: Part = WHOLE, without: frozenset[str] = frozenset()) -> int:
     """Bytes of a campaign's results file, without headers and the datasets ``without``."""
     sizes = sizes_of(scales(campaign, part))
     return sum(

@@ -348,9 +348,7 @@ class _Session:
         finally:
             progress.close()
 
-    def master(
-        self, channel: MpiChannel, own_rows: bool
-    ) -> tuple[str | None, tuple[int, ...]]:
+    def master(self, channel: MpiChannel, own_rows: bool) -> tuple[str | None, tuple[int, ...]]:
         schedule = self._schedule()
         workers = channel.size - 1
 

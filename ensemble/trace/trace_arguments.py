@@ -87,9 +87,7 @@ def add_strength_arguments(group: argparse._ArgumentGroup) -> None:
         help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
         "(default: zero range, they never do)",
     )
-    group.add_argument(
-        "--strength", type=stress, metavar="S", help="instead, that strength, 10MPa"
-    )
+    group.add_argument("--strength", type=stress, metavar="S", help="instead, that strength, 10MPa")
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:

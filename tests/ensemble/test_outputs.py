@@ -29,9 +29,7 @@ Ask = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def ask(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Ask:
+def ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Ask:
     """Run a command in a folder that holds wave.csv; gives exit code, output and last error."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
@@ -118,9 +116,7 @@ def test_loop_refuses_to_write_over_its_trace(ask: Ask) -> None:
     assert (code, "the file that --trace reads" in error) == (2, True)
 
 
-def test_a_write_protected_file_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_write_protected_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "o.json"
     path.write_text("old")
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everything

@@ -97,7 +97,9 @@ def test_a_cell_is_described_with_quantity_both_ends_and_verdict():
     met, not_met = precision(values, 0.05, "loss"), precision(values, 0.02, "loss")
     assert precision_lines([]) == []
     assert precision_lines([("A", met), ("B", not_met)]) == [
-        "[stop]: 1 of 2 cells met the wanted precision", f"  A: {met}", f"  B: {not_met}",
+        "[stop]: 1 of 2 cells met the wanted precision",
+        f"  A: {met}",
+        f"  B: {not_met}",
     ]
     many = precision_lines([("A", met)] * MOST_LISTED + [("B", not_met)] * (MOST_LISTED + 5))
     assert many[1:-1] == [f"  B: {not_met}"] * MOST_LISTED

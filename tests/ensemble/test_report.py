@@ -297,9 +297,9 @@ def test_the_loading_branch_takes_half_of_the_panel(data, tmp_path):
             figure = loops.loop_against_penetration(averages)
             figure.draw_without_rendering()
         for axes in figure.axes:
-            ends = axes.transLimits.transform(
-                axes.transScale.transform([(0.0, 0.5), (0.9, 0.5)])
-            )[:, 0]
+            ends = axes.transLimits.transform(axes.transScale.transform([(0.0, 0.5), (0.9, 0.5)]))[
+                :, 0
+            ]
             low = min(line.get_xdata().min() for line in axes.lines if line.get_label()[0] == "$")
             assert (axes.get_xscale() == "function") is stretched
             if stretched:

@@ -81,9 +81,7 @@ def test_a_launcher_that_hangs_after_its_ranks_have_ended_is_killed(
 ):
     """The exit code and the message are those that the ranks have passed on."""
     launcher = tmp_path / "mpirun"
-    launcher.write_text(
-        f'#!/bin/sh\nprintf "75\\nstopped" > "${launch.STARTED}"\nexec sleep 60\n'
-    )
+    launcher.write_text(f'#!/bin/sh\nprintf "75\\nstopped" > "${launch.STARTED}"\nexec sleep 60\n')
     launcher.chmod(0o755)
     monkeypatch.setattr(launch, "_LAUNCHER_ENDS", 0.1)
     monkeypatch.setattr(launch, "_LAUNCHER_KILLED", 0.1)

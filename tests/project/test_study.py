@@ -176,10 +176,10 @@ def test_the_maximum_through_the_amplitude_is_located():
 
 def test_a_rise_and_a_fall_through_the_amplitude_are_seen():
     rng = np.random.default_rng(4)
-    (_, row), = amplitude.rows(amplitudes(1.3, (20,) * 5, rng), "loss")
+    ((_, row),) = amplitude.rows(amplitudes(1.3, (20,) * 5, rng), "loss")
     assert row.verdict == "not monotone"
     assert row.p_not_monotone < 1e-6
-    (_, row), = amplitude.rows(amplitudes(30, (20,) * 5, rng), "loss")
+    ((_, row),) = amplitude.rows(amplitudes(30, (20,) * 5, rng), "loss")
     assert row.verdict == "rises"
     assert row.p_monotone < 1e-3
     assert row.p_not_monotone > 0.5
@@ -201,9 +201,7 @@ def test_the_law_of_scaling_decides_no_verdict(study):
         assert found == verdicts
 
 
-@pytest.mark.parametrize(
-    ("name", "kept"), [("amplitude", [0, 1]), ("amplitude_same", [0, 1, 2])]
-)
+@pytest.mark.parametrize(("name", "kept"), [("amplitude", [0, 1]), ("amplitude_same", [0, 1, 2])])
 def test_realisations_that_a_cell_lacks_are_left_out(name, kept):
     """Of two cells and two realisations, one loop failed and one is pending."""
     results = SimpleNamespace(
@@ -296,10 +294,7 @@ def test_a_power_law_with_a_cut_off_is_found():
 
 def test_verdicts_on_monotony_are_those_decided():
     def row(*steps):
-        made = [
-            monotone.Step((0.9, 0.8), 0.1, 0.0, 0.2, rise, fall, 9)
-            for rise, fall in steps
-        ]
+        made = [monotone.Step((0.9, 0.8), 0.1, 0.0, 0.2, rise, fall, 9) for rise, fall in steps]
         return monotone.Row(0.04, 0.8, "loss", tuple(made)).verdict
 
     assert row((0.01, 1.0), (0.02, 1.0)) == "rises"

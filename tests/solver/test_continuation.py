@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from adhesis.solver.model.jump import Branch as BranchName
+from adhesis.solver.sharp.continuation.across_jump import carry_previous
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
@@ -129,6 +130,64 @@ def fixed_predictor(fold_distance: float = np.inf, reach: float = 0.1) -> Any:
         reach=lambda motion, finest: reach,
         across=lambda finest: 1.1 * fold_distance + 0.2 * finest,
     )
+
+
+def _gaps_at(at: float, rates: Any) -> Any:
+    """Three gaps whose edges move outwards with these rates."""
+    gaps = np.array([[0.5, 1.0], [2.0, 2.6], [4.0, 5.0]])
+    return gaps + np.array([1.0, -1.0]) * np.reshape(rates, (3, 2)) * at
+
+
+def _point_of(gaps: Any, at: float, rate: Any) -> Point:
+    return Point(at, cast(Any, SimpleNamespace(gaps=gaps)), np.asarray(rate), 0.0)
+
+
+def test_edges_that_a_jump_hardly_moves_go_on_as_before_it():
+    """The others, and those of a gap that is new, are straight."""
+    rate = np.array([0.1, 0.1, 0.1, 0.2, 0.1, 0.1])
+    earlier = PreviousPoint(1.0, 0.5 * rate, _gaps_at(1.0, rate))
+    before = _point_of(_gaps_at(1.2, rate), 1.2, rate)
+    jumped = before.gaps.copy()
+    jumped[0, 1] -= 0.3  # far
+    jumped[2, 0] += 1e-3  # hardly
+    after = _point_of(
+        np.insert(jumped, 2, [[3.0, 3.1]], axis=0), 1.2, [*rate[:4], 0.05, 0.05, *rate[4:]]
+    )
+    previous = carry_previous(earlier, before, after, 0.01).previous
+    assert previous is not None
+    assert previous.at == pytest.approx(1.0)
+    kept = 0.5
+    assert previous.rate == pytest.approx(
+        [kept * 0.1, 0.1, kept * 0.1, kept * 0.2, 0.05, 0.05, kept * 0.1, kept * 0.1]
+    )
+    motion = np.array([1.0, -1.0]) * after.rate.reshape(-1, 2) * 0.2
+    assert after.gaps - previous.gaps == pytest.approx(motion, abs=1e-12)
+
+
+def test_nothing_is_carried_across_a_jump_that_moved_the_fastest_edge():
+    rate = np.array([0.1, 0.1, 0.1, 0.2, 0.1, 0.1])
+    earlier = PreviousPoint(1.0, rate, _gaps_at(1.0, rate))
+    before = _point_of(_gaps_at(1.2, rate), 1.2, rate)
+    jumped = before.gaps.copy()
+    jumped[1, 1] += 0.3
+    after = _point_of(jumped, 1.2, rate)
+    assert carry_previous(earlier, before, after, 0.01) is after
+
+
+def test_the_edge_with_the_nearest_fold_leads_though_it_is_slower():
+    """One edge goes as sqrt(d - 0.2) with a small factor, the other, faster, straight."""
+
+    def gaps(at: float) -> Any:
+        return np.array([[1 - 0.02 * np.sqrt(at - FOLD), 2.0 + 0.05 * at]])
+
+    def rate(at: float) -> Any:
+        return np.array([-0.01 / np.sqrt(at - FOLD), -0.05])
+
+    here, before = 0.4, 0.5
+    point = _point_of(gaps(here), here, rate(here))
+    ahead = Predictor(point.with_previous(PreviousPoint(before, rate(before), gaps(before))))
+    assert abs(rate(here)[0]) < abs(rate(here)[1])
+    assert ahead.fold_distance == pytest.approx(here - FOLD, rel=0.03)
 
 
 def test_steps_end_at_the_target_and_shrink_after_failures():
@@ -304,7 +363,7 @@ def test_a_trail_begins_anew_at_its_last_point():
 def test_a_jump_is_written_once_and_whole():
     history = History()
     before, after, jump = object(), object(), object()
-    computed = ComputedJump(0.5, cast(Any, (before, after)), cast(Any, jump), None, 0.25)
+    computed = ComputedJump(0.5, cast(Any, (before, after)), cast(Any, jump), None, None, 0.25)
     assert (history.states, history.jumps) == ([], [])
     history.commit(computed)
     assert (history.states, history.jumps, history.misplaced) == ([before, after], [jump], 0.25)

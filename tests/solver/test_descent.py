@@ -159,9 +159,7 @@ class Solved(NamedTuple):
     def model(self) -> EdgeModel:
         """Make the model about the edges."""
         law, panels = self.system.law, self.system.model.panels
-        tangent, _ = edge_tangent(
-            self.forces.solution, self.forces.drift, self.system.model.rules
-        )
+        tangent, _ = edge_tangent(self.forces.solution, self.forces.drift, self.system.model.rules)
         return model_about(self.gaps, self.forces, tangent, law, panels)
 
     def model_openings(self, motion: np.ndarray, steps: int = 400) -> np.ndarray:

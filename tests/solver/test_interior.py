@@ -40,9 +40,7 @@ def method_of(profile: Profile, young: float, gamma: float = 0.04, name="sharp")
 
 @cache
 def loop_of(young: float, ratio: int = 8, seed: int = 0, gamma: float = 0.04) -> LoopResult:
-    return run_loop(
-        method_of(rough(ratio, seed), young, gamma), max_penetration=0.9, load_steps=20
-    )
+    return run_loop(method_of(rough(ratio, seed), young, gamma), max_penetration=0.9, load_steps=20)
 
 
 def two_troughs() -> Profile:

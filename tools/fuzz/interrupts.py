@@ -81,9 +81,7 @@ class Loops:
         self.step = (time.monotonic() - started) / len(self.passed)
 
     def _loop(self, progress: Any = None) -> None:
-        self._run_loop(
-            self.method, max_penetration=0.9, load_steps=LOAD_STEPS, progress=progress
-        )
+        self._run_loop(self.method, max_penetration=0.9, load_steps=LOAD_STEPS, progress=progress)
 
     def _follow(self, first: int, last: int) -> list[Any]:
         """Go on from a load step to another; returns the states there."""

@@ -496,8 +496,7 @@ def machine(study: Study) -> Table:
                 [
                     *(f"{turn:g}", f"{stiffness:.0e}", f"{of.losses.size}", f"{of.failed}"),
                     *(span, mean_text(of.losses), ratio_text(*of.same_far_side[::-1])),
-                    f"{ratio_text(*of.same_penetration[::-1])}, "
-                    f"n = {of.same_penetration.shape[1]}",
+                    f"{ratio_text(*of.same_penetration[::-1])}, n = {of.same_penetration.shape[1]}",
                 ]
             )
     header = ["u_tot/h_max", "k (Pa/m)", "n", "ran away", "Δ~ reached", "W~"]

@@ -6,9 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from adhesis.solver.model.jump import Branch as BranchName
+from adhesis.solver.sharp.continuation.across_jump import carry_previous
 from adhesis.solver.sharp.continuation.corrector import correct
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
+from adhesis.solver.sharp.continuation.history import ComputedJump
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.continuation.step_size import StepSize
@@ -23,6 +27,7 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
+    UNMOVED_BY_JUMP,
     WORK_RESOLVED,
     WORK_STALLED,
 )
@@ -78,6 +83,9 @@ class Branch:
         if before is not None and (point.at - before.at) * (target.at - point.at) < 0:
             point = point.with_previous(None)  # the path turns back
         self.point = self._output = point  # the last one whose state belongs to the path
+        self._passed = [PreviousPoint(point.at, point.rate, point.gaps)]
+        if point.previous is not None:
+            self._passed.insert(0, point.previous)
         self.trail = Trail(point)
         self.steps = StepSize(resolution.jump)
         # straight after a jump or turn: short steps there keep the integral exact
@@ -112,6 +120,25 @@ class Branch:
         fold, beyond = (predictor.point.at + math.copysign(x, way) for x in distances)
         return fold, beyond
 
+    def after_jump(self, jump: ComputedJump) -> Point | None:
+        """Return the point after a jump with one before it, from edges that hardly moved in it.
+
+        That is from the first point of this branch since which no edge has gone further than a step
+        may predict; without one the point has none before it.
+        """
+        before, after = jump.before, jump.point
+        if before is None or after is None:
+            return after
+        longest = PREDICTED_MOTION * self._edges.wave
+        remaining = self._target.at - before.at
+        near = UNMOVED_BY_JUMP * self._edges.wave
+        for earlier in self._passed:
+            if (before.at - earlier.at) * remaining <= 0 or len(earlier.gaps) != len(before.gaps):
+                continue
+            if np.abs(before.gaps - earlier.gaps).max() < longest:
+                return carry_previous(earlier, before, after, near)
+        return after
+
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
         self.trail.add(point, self._closing.over(self.point, point, self._target.branch))
@@ -119,11 +146,9 @@ class Branch:
         self.steps.forget_failures()
 
     def _next_step(self) -> float:
-        edges, predictor = self._edges, self._predictor
-        # where many gaps are solved a longer first step is accurate enough
-        short = predictor.way == 0 and not edges.uses_windows(predictor.point.gaps)
-        motion = FIRST_MOTION if short else PREDICTED_MOTION
-        return self.steps.next(predictor, self._target.at, motion * edges.wave)
+        predictor = self._predictor
+        motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
+        return self.steps.next(predictor, self._target.at, motion * self._edges.wave)
 
     def _correct(self, step: float, at: float) -> Point | None:
         """Return the equilibrium at d = ``at``, if it is within reach."""
@@ -156,6 +181,7 @@ class Branch:
     def _accept(self, event: Accepted, closed: float, step: float) -> None:
         self.trail.add(event.point, closed)
         self.point = event.point
+        self._passed.append(PreviousPoint(event.point.at, event.point.rate, event.point.gaps))
         self._work_before = (0.0, math.inf)
         if event.is_output:
             self._output = event.point

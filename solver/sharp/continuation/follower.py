@@ -96,7 +96,7 @@ class Follower:
                 jump = self._at_point(history, branch, event, target)
             if jump is not None:
                 history.commit(jump)
-                return jump.at, jump.point
+                return jump.at, branch.after_jump(jump)
         self._remember(history, branch)
         return target.at, branch.point
 

@@ -22,6 +22,8 @@ class ComputedJump:
     jump : Jump
     point : Point or None
         The stable point after it; None if no contact is left.
+    before : Point or None
+        The last point of the branch that it ends; None if there was none.
     misplaced : float
         Work in J/m² of nominal area by which it may be wrong, not being at its exact place.
     """
@@ -30,6 +32,7 @@ class ComputedJump:
     states: tuple[ContactState, ...]
     jump: Jump
     point: Point | None
+    before: Point | None
     misplaced: float = 0.0
 
 

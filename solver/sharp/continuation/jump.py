@@ -82,7 +82,7 @@ class Jumps:
         except NoState:  # a comparison that does not come to rest is no failure of the path
             pass
         jump = self.states.jump(before, after, branch, at_stake, barrier)
-        return ComputedJump(at, (after,), jump, point)
+        return ComputedJump(at, (after,), jump, point, known)
 
     def _at_stake(
         self, before: ContactState, point: Point | None, rival: Point | None, at: float

@@ -21,6 +21,7 @@ from adhesis.solver.sharp.tolerances import (
     BEYOND_FOLD,
     CUBIC_OF_OTHERS_TRUSTED,
     CUBIC_TRUSTED,
+    LEADING_SHARE,
     LEAST_LEFT_BEFORE_FOLD,
     LEFT_BEFORE_FOLD,
     PREDICTION_TRUSTED,
@@ -124,10 +125,28 @@ class LeadingEdge(NamedTuple):
 def leading_edge(
     gaps: Array, rate: Array, gaps_before: Array, rate_before: Array, way: float
 ) -> LeadingEdge:
-    """Find the leading edge of two points that are ``way`` apart in d, and the fold ahead."""
-    edge = int(np.argmax(np.abs(rate)))
+    """Find the leading edge of two points that are ``way`` apart in d, and the fold ahead.
+
+    Of the edges that are not much slower than the fastest it is the one that comes to a fold first;
+    the fastest, if none does.
+    """
+    fastest = np.abs(rate).max()
+    leading = _follow_edge(int(np.argmax(np.abs(rate))), gaps, rate, gaps_before, rate_before, way)
+    for edge in range(rate.shape[0]):
+        if abs(rate[edge]) > LEADING_SHARE * fastest:
+            other = _follow_edge(edge, gaps, rate, gaps_before, rate_before, way)
+            if other.fold_distance < leading.fold_distance:
+                leading = other
+    return leading
+
+
+@compiled
+def _follow_edge(
+    edge: int, gaps: Array, rate: Array, gaps_before: Array, rate_before: Array, way: float
+) -> LeadingEdge:
+    """Take d as a polynomial of the motion of one edge."""
     k, side = edge // 2, edge % 2
-    fastest = abs(rate[edge])
+    fastest = np.abs(rate).max()
     gone = (gaps[k, side] - gaps_before[k, side]) * (1 - 2 * side)
     before, here = gone / (way * rate_before[edge]), gone / (way * rate[edge])
     if not (0 < before < np.inf and 0 < here < np.inf):
