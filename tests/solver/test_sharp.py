@@ -254,14 +254,15 @@ def test_ten_thousand_waves():
     assert path.jumps[0].energy_drop > 0
 
 
-def test_hundreds_of_patches_appear_and_grow():
-    """210 equal crests touch together; each carries what one crest in 1/210 of the period does."""
-    waves = 210
+@pytest.mark.parametrize(("waves", "penetration"), [(210, 0.1), (60, 0.1), (60, 0.15)])
+def test_hundreds_of_patches_appear_and_grow(waves, penetration):
+    """Equal crests touch together; each carries what one of as many in the period does."""
     coefficients = np.zeros(waves + 1, dtype=complex)
     coefficients[waves] = 5e-9
     profile = Profile(PERIOD, coefficients)
     method = make_method("sharp", Problem(profile, HALF_SPACE, 0.0), accuracy=1e-2)
-    state = method.follow(method.detached(profile.h_max), 0.9 * profile.h_max).states[-1]
+    separation = (1 - penetration) * profile.h_max
+    state = method.follow(method.detached(profile.h_max), separation).states[-1]
     assert state.patches == waves
     y = np.sin(np.pi * state.contact_fraction / 2) ** 2
     p_star = np.pi * HALF_SPACE.modulus * profile.h_max * waves / PERIOD

@@ -85,6 +85,9 @@ def has_departed(known: Array, row: Array, softness: float, law: EdgeLaw) -> tup
         # not written as > : references that are no numbers are no references
         scale = min(least, REFERENCE_SCALE * law.longest_step)
         allowed = min(np.sqrt(law.field_error * scale) / softness**2, REFERENCE_SHARE * least)
+        if law.critical == 0:
+            # an edge acts on the field to second order only, in which all have the same sign
+            allowed = law.field_error
         if not moved <= max(law.newton_tolerance, allowed):
             changed = True
         if not moved <= REFERENCE_FAR * least:
