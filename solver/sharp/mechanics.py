@@ -8,7 +8,6 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.descent.gradient_flow import AT_REST, NO_FIELD, REJOINED, VANISHED
-from adhesis.solver.sharp.descent.local_descent import KnownState
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
@@ -20,12 +19,12 @@ from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
 from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
+from adhesis.solver.sharp.system.window_descent import KnownState
 from adhesis.solver.sharp.tolerances import (
     DESCENT_LIMIT,
     HIERARCHICAL_FROM,
     LAST_GAP,
     RESTS,
-    SAME_REST,
 )
 
 _ANY = np.empty(0, dtype=np.int64)  # gaps may have any kind
@@ -105,8 +104,7 @@ class EdgeMechanics(EdgeProblem):
         """Return ``point`` as the start of a descent in a window; None for few gaps."""
         if point is None or not self.uses_windows(point.gaps):
             return None
-        leads = int(np.argmax(np.abs(point.rate))) // 2
-        return KnownState(self.responses, point.gaps, point.at, leads)
+        return self._systems[1].start(point)
 
     def forget(self) -> None:
         """Forget what results would depend on within the error of the field."""
@@ -144,54 +142,14 @@ class EdgeMechanics(EdgeProblem):
         # Without adhesion the minimum is unique, and the energy's slope vanishes there twice.
         equal_speeds = equal_speeds or self.critical == 0
         track = track or Track()
-        if start is not None and self.uses_windows(gaps):
-            begun = self._relax_in_window(start, gaps, prescribed, reach, equal_speeds, track)
-            if isinstance(begun, Point):
-                return begun
-            if track.rejoined:
-                return np.empty((0, 2))
-            if begun is not None:
-                gaps = begun
-                rest = without_small(gaps, self.smallest)
-                if rest is not None:
-                    return rest
-        return self._relax(gaps, prescribed, reach, equal_speeds, track)
-
-    def _relax_in_window(
-        self, start: KnownState, gaps: Array, prescribed: float, reach: float, equal_speeds: bool,
-        track: Track,
-    ) -> Point | Array | None:  # fmt: skip
-        """Descend in a window on a known state; return gaps to go on from if that is no end."""
-        track.is_complete = False
-        rest = start.descend(
-            gaps, prescribed, self.law, self.model, self.count, self.smallest,
-            equal_speeds=equal_speeds,
-        )  # fmt: skip
-        if rest is None:
-            return None
-        if rest.event == AT_REST:
-            if not equal_speeds:
-                track.rest = rest.window_gaps
-            elif track.rest is not None and track.rest.shape == rest.window_gaps.shape:
-                apart = np.abs(track.rest - rest.window_gaps).max()
-                track.rejoined = bool(apart < SAME_REST * self.wave)
-            point = None if track.rejoined else self.equilibrium(rest.gaps, prescribed, reach)
-            if point is not None:
-                return point
-        return rest.gaps
-
-    def _relax(
-        self, gaps: Array, prescribed: float, reach: float, equal_speeds: bool, track: Track
-    ) -> Point | Array:
-        """Descend with all gaps."""
         system, law = self.system(gaps), self.law
         left, orders, rests = DESCENT_LIMIT, _ANY, 0
-        rested = np.empty((0, 2))
+        begun, rested = len(gaps), np.empty((0, 2))
         while left > 0 and rests <= 2 * RESTS:
             end = system.descend(
-                gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds
+                gaps, prescribed, left, orders, law, track, equal_speeds=equal_speeds, start=start
             )
-            gaps, orders = end.gaps, end.orders
+            gaps, orders, start = end.gaps, end.orders, None
             left -= end.fields
             if end.event == REJOINED:
                 track.rejoined = True
@@ -202,6 +160,8 @@ class EdgeMechanics(EdgeProblem):
                 rest = without_small(gaps, self.smallest)
                 if rest is not None:
                     return rest
+                if len(gaps) != begun:
+                    return gaps
                 law = law._replace(smallest=self._smallest_of_last_gap(gaps, law.smallest))
             if end.event == AT_REST:
                 # Next to a fold the field's error may hide whether there is a minimum; whatever

@@ -241,7 +241,7 @@ WINDOW_HALF_WIDTH = 4
 """Gaps on each side of the edge that leads."""
 WINDOW_WIDEST = 48
 """Gaps on each side, to which windows double while nothing moves in them."""
-WINDOW_FIELDS = 60
+WINDOW_FIELDS = 300
 """Fields in a window before all gaps are solved again."""
 FAR_FROM_BALANCE = 0.02
 """C_c; above, the edge furthest from balance leads, below, Newton's step."""
@@ -252,16 +252,14 @@ NEWTON_STEPS_IN_A_ROW = 12
 MOST_SHORT_WINDOWS = 50
 """Windows in a row whose edges move by less than a longest step: next to a fold Newton's steps of
 all edges and a window may lead to and fro without end."""
-LOCAL_WINDOW_MARGIN = 4
-"""Gaps on each side of what changed, where a descent begins in a window."""
-LOCAL_WINDOW_WIDEST = 24
+FIRST_WINDOW_MARGIN = 4
+"""Gaps on each side of what changed, where a descent begins."""
+FIRST_WINDOW_WIDEST = 24
 """Gaps; changes further apart are not those of one window."""
-LOCAL_WINDOW_FIELDS = 300
-"""Fields in it before all gaps are solved again."""
-LOCAL_WINDOW_FOLLOWING = 5.0
-"""Longest steps, a quarter of λ_min: where an edge outside would follow further the descent begins
-anew with all gaps. Of 639 windows (40 gaps, waves to m = 10,000) 5 % are; where another patch near
-its fold followed by 6 λ_min, the wrong one vanished, and the loss was wrong by 4e-3."""
+FURTHEST_FOLLOWING = 5.0
+"""Longest steps, a quarter of λ_min: where an edge outside would follow further the window is
+given up. Of 639 windows (40 gaps, waves to m = 10,000) 5 % are; where another patch near its fold
+followed by 6 λ_min, the wrong one vanished, and the loss was wrong by 4e-3."""
 
 # ---------------------------------------------------------------- nucleation
 

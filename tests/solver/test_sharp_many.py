@@ -42,6 +42,7 @@ from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
+from adhesis.solver.sharp.system.window_descent import descend_in_window
 from adhesis.solver.sharp.tolerances import CORRECTED
 from tests.support import next_to_a_fold
 
@@ -518,10 +519,10 @@ def test_outside_a_window_gaps_follow_to_second_order(hierarchical):
         at = point.at - share * 0.02 * edges.wave / np.abs(point.rate).max()
         full = edges.equilibrium(point.extrapolate(at), at, edges.wave)
         response = edges.responses.at(point.gaps, point.at).response
-        window = Window(point.gaps, response, lead - 2, count - 3, edges.law, edges.model)
+        window = Window(point.gaps, response, lead - 2, count - 3, np.inf, edges.law, edges.model)
         local = window.gaps.copy()
         local[:-1] += (full.gaps - point.gaps)[(lead - 2 + np.arange(count - 3)) % count]
-        expected = window.extend(local, window.orders, at)
+        expected, _ = window.extend(local, window.orders, at)
         errors.append(np.abs(expected - full.gaps).max() / edges.wave)
     assert errors[0] < 1e-6
     assert 3 < errors[1] / errors[2] < 5
@@ -532,11 +533,19 @@ def test_a_window_gives_up_where_the_others_would_follow_far(hierarchical):
     """By a quarter of the shortest wave: another place decides there what runs."""
     edges, point = hierarchical
     response = edges.responses.at(point.gaps, point.at).response
-    window = Window(point.gaps, response, 0, len(point.gaps) - 3, edges.law, edges.model)
+    width = len(point.gaps) - 3
+    window = Window(point.gaps, response, 0, width, np.inf, edges.law, edges.model)
     fastest = np.abs(point.rate[2 * len(point.gaps) - 6 :]).max()  # of the others
-    near, far = (point.at + motion * edges.wave / fastest for motion in (0.15, 0.5))
-    assert window.extend(window.gaps, window.orders, near) is not None
-    assert window.extend(window.gaps, window.orders, far) is None
+    for motion, follows in ((0.15, True), (0.5, False)):
+        at = point.at + motion * edges.wave / fastest
+        everywhere, furthest = window.extend(window.gaps, window.orders, at)
+        assert (furthest < 0.25 * edges.wave) == follows
+        # none moves by more than a longest step
+        assert np.abs(everywhere - point.gaps).max() <= edges.longest_step * (1 + 1e-9)
+        found = descend_in_window(
+            window, point.gaps, at, edges, edges.law, equal_speeds=False, is_first=True
+        )
+        assert (found is not None) == follows
 
 
 def test_a_descent_of_many_gaps_does_not_go_to_and_fro_next_to_a_fold():

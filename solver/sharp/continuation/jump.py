@@ -11,13 +11,13 @@ from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.history import ComputedJump
 from adhesis.solver.sharp.continuation.races import RaceCheck
-from adhesis.solver.sharp.descent.local_descent import KnownState
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.output.contact_states import States
+from adhesis.solver.sharp.system.window_descent import KnownState
 from adhesis.solver.sharp.tolerances import (
     CORRECTED,
     MOST_NUCLEATIONS,

@@ -12,7 +12,6 @@ from adhesis.solver.sharp.field.exterior import Exterior
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import Integers
-from adhesis.solver.sharp.tolerances import LOCAL_WINDOW_FOLLOWING
 
 
 class Window:
@@ -26,6 +25,8 @@ class Window:
         About the state; it must not change.
     first, width : int
         First gap of the window, and how many.
+    following : float
+        Edges outside that are out of balance by a longer motion are held; 0 holds all.
     law : EdgeLaw
     model : FieldModel
 
@@ -46,6 +47,7 @@ class Window:
         response: LinearResponse,
         first: int,
         width: int,
+        following: float,
         law: EdgeLaw,
         model: FieldModel,
     ) -> None:
@@ -53,7 +55,7 @@ class Window:
         self.gaps: Array
         self.exterior: Exterior
         self.gaps, self.exterior, self._outside = open_window(
-            response, gaps, first, width, np.inf, law, model
+            response, gaps, first, width, following, law, model
         )
         inside = (first + np.arange(width)) % len(gaps)
         self.orders: Integers = np.append(response.nodes.orders[inside], 0)
@@ -68,23 +70,19 @@ class Window:
         inside = both[(both[:, 0] >= left) & (both[:, 1] <= right)]
         return np.concatenate([inside, self.gaps[-1:]])
 
-    def extend(self, local: Array, orders: Integers, prescribed: float) -> Array | None:
-        """Extend gaps of the window to all gaps, the others following.
+    def extend(self, local: Array, orders: Integers, prescribed: float) -> tuple[Array, float]:
+        """Extend gaps of the window to all gaps, the others following by at most a longest step.
 
-        None if they would move too far for that: next to a fold of others their linear response is
-        that of no edges, and what ran inside was not what runs.
+        Also returns how far the furthest would follow; NaN where the window has no field.
         """
-        longest = self._law.longest_step
         motion = extend_window(
             local, prescribed, orders, self.exterior, self._outside, self._response,
             np.full(self._all.size, np.inf), self._model,
         )  # fmt: skip
-        # not written as > : a motion that is no number is too far
-        if not np.abs(motion).max() <= LOCAL_WINDOW_FOLLOWING * longest:
-            return None
-        limit = step_limits(map_gaps(self._all), longest)
+        limit = step_limits(map_gaps(self._all), self._law.longest_step)
         outside = self._all + np.clip(motion, -limit, limit).reshape(-1, 2) * [1.0, -1.0]
         inside = local[:-1].copy()
         inside[inside.mean(axis=1) > self._end] -= 2 * np.pi
         gaps = np.concatenate([inside, outside[self._outside.gaps]])
-        return np.asarray(gaps[np.argsort(gaps[:, 0], kind="stable")])
+        gaps = gaps[np.argsort(gaps[:, 0], kind="stable")]
+        return np.asarray(gaps), float(np.abs(motion).max())

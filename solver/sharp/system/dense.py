@@ -21,6 +21,7 @@ from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
+from adhesis.solver.sharp.system.window_descent import KnownState
 from adhesis.solver.sharp.tolerances import FASTEST_CLOSING, FINER_FIELD
 
 
@@ -70,6 +71,7 @@ class DenseSystem(EdgeSystem):
         track: Track,
         *,
         equal_speeds: bool,
+        start: KnownState | None = None,
     ) -> Descent:
         """Descend with all edges at once."""
         problem = FlowProblem(law, self._problem.model, NO_EXTERIOR)

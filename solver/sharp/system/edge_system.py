@@ -16,6 +16,7 @@ from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
+from adhesis.solver.sharp.system.window_descent import KnownState
 
 Integers = NDArray[np.int64]
 
@@ -82,10 +83,12 @@ class EdgeSystem(ABC):
         track: Track,
         *,
         equal_speeds: bool,
+        start: KnownState | None = None,
     ) -> Descent:
         """Descend in energy for at most ``most`` steps, by a ``law`` of this problem.
 
-        The track is extended, or with equal speeds compared with.
+        The track is extended, or with equal speeds compared with. A known state from which the gaps
+        differ in one place is the ``start`` of many gaps.
         """
 
     @abstractmethod

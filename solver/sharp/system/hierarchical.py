@@ -9,20 +9,26 @@ from typing import ClassVar
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.descent.edge_forces import FlowProblem
-from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD, OUTGROWN, STEP_LIMIT, Descent
+from adhesis.solver.sharp.descent.gradient_flow import (
+    AT_REST,
+    NO_FIELD,
+    OUTGROWN,
+    REJOINED,
+    STEP_LIMIT,
+    VANISHED,
+    Descent,
+)
+from adhesis.solver.sharp.descent.newton_approach import Approach, approach_minimum
 from adhesis.solver.sharp.descent.track import Track
-from adhesis.solver.sharp.descent.windowed_descent import descend_many
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.edge_interaction import openings_between_edges
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, shortest_length
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
     EquilibriumOfMany,
     equilibrium_many,
 )
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import FieldModel, Solution
@@ -31,6 +37,7 @@ from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
+from adhesis.solver.sharp.system.window_descent import KnownState, Windows
 from adhesis.solver.sharp.tolerances import (
     CLOSING_BY_MOTION,
     CLOSING_OF_MANY,
@@ -102,6 +109,11 @@ class HierarchicalSystem(EdgeSystem):
             near.is_outgrown = True
         return None
 
+    def start(self, point: Point) -> KnownState:
+        """Return a point as the start of a descent."""
+        leading = int(np.argmax(np.abs(point.rate))) // 2
+        return KnownState(self._problem, self.responses, point.gaps, point.at, leading)
+
     def descend(
         self,
         gaps: Array,
@@ -112,29 +124,51 @@ class HierarchicalSystem(EdgeSystem):
         track: Track,
         *,
         equal_speeds: bool,
+        start: KnownState | None = None,
     ) -> Descent:
-        """Descend in windows, one after the other; the track is not known."""
+        """Descend in windows, one after the other; the track is not known.
+
+        The first one is opened on a ``start``, and tells whether the track is met.
+        """
+        problem, count = self._problem, self._problem.count
         track.is_complete = False
-        system = FlowProblem(law, self._problem.model, NO_EXTERIOR)
-        fields = tangents = 0
+        windows = Windows(problem, law, prescribed, equal_speeds)
+        before, begun = count.fields, len(gaps)
+
+        def end(event: int) -> Descent:
+            none = np.empty((0, 0))
+            least = orders if len(orders) == len(gaps) else np.empty(0, dtype=np.int64)
+            return Descent(gaps, event, least, count.fields - before, 0, none, False, none)
+
+        found = None if start is None else windows.first(start, gaps, track)
         while True:
+            if found is not None:
+                gaps = found.gaps
+                if track.rejoined:
+                    return end(REJOINED)
+                if len(gaps) != begun or shortest_length(gaps) < law.smallest:
+                    return end(VANISHED)
+                if windows.is_at_end:
+                    return end(AT_REST)
+            if count.fields - before >= most:
+                return end(STEP_LIMIT)
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
-                none = np.empty((0, 0))
-                return Descent(gaps, NO_FIELD, orders, fields, tangents, none, False, none)
-            found: Descent = descend_many(
-                near.response, gaps, prescribed, most - fields, equal_speeds, system
+                return end(NO_FIELD)
+            approach: Approach = approach_minimum(
+                near.response, gaps, prescribed, law, problem.model
             )
-            self._problem.count.descent(found.fields, found.tangents)
-            fields += found.fields
-            tangents += found.tangents
-            gaps, orders = found.gaps, found.orders
-            if found.event != OUTGROWN:
-                return found._replace(fields=fields, tangents=tangents)
-            near.is_outgrown = True
-            fields += 1
-            if fields >= most:
-                return found._replace(event=STEP_LIMIT, fields=fields, tangents=tangents)
+            count.descent(approach.steps, approach.steps)
+            gaps, orders = approach.gaps, near.response.nodes.orders.copy()
+            found = None
+            if approach.event == OUTGROWN:
+                near.is_outgrown = True
+                continue
+            if approach.event != STEP_LIMIT:
+                return end(approach.event)
+            found = windows.next(near.response, approach)
+            if found is None:
+                return end(NO_FIELD)
 
     def closing_motion(self, before: Array, after: Array) -> float:
         """Motion of the edges of one gap, times how many gaps that concerns."""
