@@ -58,6 +58,17 @@ class EdgeMechanics(EdgeProblem):
         self.count.fields += 1
         return self.solved(gaps, prescribed, self.system(gaps).solution(gaps, prescribed, 1.0, 2))
 
+    def field_again(
+        self, gaps: Array, prescribed: float, pressure: float, separation: float
+    ) -> GapField:
+        """Return the field of gaps that were in equilibrium; of many it is solved when asked for.
+
+        ``pressure`` (p) and ``separation`` (q0 s) are those of the equilibrium.
+        """
+        if self.uses_windows(gaps):
+            return self._systems[1].field_on_demand(gaps, prescribed, pressure, separation)
+        return self.field(gaps, prescribed)
+
     def finer_openings(self, field: GapField) -> Array:
         """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
         self.count.fields += 1

@@ -51,7 +51,8 @@ class Curve:
     def point(self, at: float, clearance: float = 0.0) -> Point:
         """Point of the curve."""
         a = self.half_width(at)
-        field = SimpleNamespace(gaps=np.array([[3 - a, 3 + a]]), pressure=-at * at, separation=at)
+        gaps = np.array([[3 - a, 3 + a]])
+        field = SimpleNamespace(gaps=gaps, nearly=(-at * at, at), separation=at)
         # n is the outward motion of the contact: the gap opens with d
         rate = np.full(2, -self.rate(at))
         return Point(at, cast(Any, field), rate, -2 * at, clearance)

@@ -70,8 +70,8 @@ class Follower:
             return None
         if self._last is not None and self._last[0] is memory:
             return self._last[1]
-        at, rate, slope, previous = memory.course
-        field = self.edges.field(memory.gaps, at)
+        at, nearly, rate, slope, previous = memory.course
+        field = self.edges.field_again(memory.gaps, at, *nearly)
         return Point(at, field, rate, slope, memory.clearance, previous)
 
     def run(self, history: History, point: Point, target: Target) -> tuple[float, Point | None]:
@@ -114,7 +114,7 @@ class Follower:
         memory = Memory(
             point.field.gaps,
             point.clearance,
-            (point.at, point.rate, point.slope, point.previous),
+            (point.at, point.field.nearly, point.rate, point.slope, point.previous),
             self.nucleation.seen,
         )
         # A dense field does not depend on the way to it; a hierarchical one does.

@@ -51,13 +51,13 @@ class Point:
 
     @property
     def pressure(self) -> float:
-        """2p̄/E*."""
-        return self.field.pressure
+        """2p̄/E*, to the accuracy of the equilibrium."""
+        return self.field.nearly[0]
 
     @property
     def separation(self) -> float:
-        """Separation q0 s."""
-        return self.field.separation
+        """Separation q0 s, to the accuracy of the equilibrium."""
+        return self.field.nearly[1]
 
     def with_clearance(self, clearance: float) -> Self:
         """Return this point with its clearance."""

@@ -88,8 +88,8 @@ class GapField:
 
     Attributes
     ----------
-    pressure, separation : float
-        p = 2p̄/E* and q0 s.
+    nearly : tuple of float
+        p = 2p̄/E* and q0 s to the accuracy of an equilibrium, known before a field is solved.
 
     Raises
     ------
@@ -114,8 +114,23 @@ class GapField:
             solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
         if math.isnan(solution.pressure):
             raise FloatingPointError("the matrix of the gaps is not positive definite")
-        self.solution = solution
-        self.pressure, self.separation = solution.pressure, solution.separation
+        self._solution = solution
+        self.nearly = solution.pressure, solution.separation
+
+    @property
+    def solution(self) -> Solution:
+        """Solution of equation (1)."""
+        return self._solution
+
+    @property
+    def pressure(self) -> float:
+        """2p̄/E*."""
+        return self.solution.pressure
+
+    @property
+    def separation(self) -> float:
+        """Separation q0 s."""
+        return self.solution.separation
 
     @property
     def held(self) -> Solution:

@@ -30,16 +30,16 @@ class Memory:
         The ends of its gaps.
     clearance : float
         Of them (``Point.clearance``).
-    course : tuple of float, array, float, PreviousPoint or None, optional
-        Where a path stopped at it: d, dn/dd of every edge, dY/dd and the point before it, as in
-        ``Point``.
+    course : tuple of float, (float, float), array, float, PreviousPoint or None, optional
+        Where a path stopped at it: d, p and q0 s, dn/dd of every edge, dY/dd and the point before
+        it, as in ``Point``.
     seen : Seen
         The gaps as they were when they were last looked at.
     """
 
     gaps: Array
     clearance: float
-    course: tuple[float, Array, float, PreviousPoint | None] | None = None
+    course: tuple[float, tuple[float, float], Array, float, PreviousPoint | None] | None = None
     seen: Seen = NOT_SEEN
 
 

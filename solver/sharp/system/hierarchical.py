@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 from typing import ClassVar
 
@@ -102,12 +103,41 @@ class HierarchicalSystem(EdgeSystem):
             problem.count.newton(found.corrections)
             if found.found:
                 near.settled = found.gaps
-                return PointOfMany(_Found(problem, prescribed, near.response, found))
+                return self._point(prescribed, near.response, found)
             if not found.is_outgrown:
                 break
             start = found.gaps
             near.is_outgrown = True
         return None
+
+    def _point(
+        self, prescribed: float, response: LinearResponse, found: EquilibriumOfMany
+    ) -> Point:
+        """Make the point of an equilibrium."""
+        problem = self._problem
+        # copies, as the response is changed in place
+        table, orders = response.nodes.table.copy(), response.nodes.orders.copy()
+
+        def solve() -> Solution:
+            solution: Solution = solve_separately(
+                found.gaps, table, orders, found.potential, found.pressure, prescribed,
+                problem.model,
+            )  # fmt: skip
+            return solution
+
+        field = FieldOfMany(
+            problem, found.gaps, prescribed, found.pressure, found.separation, solve
+        )
+        return Point(prescribed, field, found.rate, found.slope)
+
+    def field_on_demand(
+        self, gaps: Array, prescribed: float, pressure: float, separation: float
+    ) -> GapField:
+        """Return the field of a known equilibrium, with its p and q0 s; solved when asked for."""
+        return FieldOfMany(
+            self._problem, gaps, prescribed, pressure, separation,
+            lambda: self.solution(gaps, prescribed, 1.0, 2),
+        )  # fmt: skip
 
     def start(self, point: Point) -> KnownState:
         """Return a point as the start of a descent."""
@@ -176,7 +206,40 @@ class HierarchicalSystem(EdgeSystem):
 
 
 class FieldOfMany(GapField):
-    """Field of many gaps, each solved by itself in the potential of the others."""
+    """Field of many gaps in equilibrium, solved when it is asked for.
+
+    Parameters
+    ----------
+    problem : EdgeProblem
+    gaps : array, shape (L, 2)
+    prescribed : float
+        d.
+    pressure, separation : float
+        p and q0 s to the accuracy of the equilibrium.
+    solve : callable
+        Solves the field.
+    """
+
+    def __init__(
+        self,
+        problem: EdgeProblem,
+        gaps: Array,
+        prescribed: float,
+        pressure: float,
+        separation: float,
+        solve: Callable[[], Solution],
+    ) -> None:
+        self.source, self.gaps, self.prescribed = problem.source, gaps, prescribed
+        self.tolerance, self.device = problem.tolerance, problem.model.device
+        self.nearly = pressure, separation
+        self._solve: Callable[[], Solution] | None = solve
+
+    @property
+    def solution(self) -> Solution:
+        """Solution of equation (1), solved at first access."""
+        if self._solve is not None:
+            self._solution, self._solve = self._solve(), None  # it holds a response
+        return self._solution
 
     @cached_property
     def held(self) -> Solution:
@@ -186,60 +249,3 @@ class FieldOfMany(GapField):
         orders = choose_orders(map_gaps(self.gaps), digits, GAUSS_RULES.counts)
         solution: Solution = solve_many(self.gaps, self.prescribed, orders, 1, model)[0]
         return solution
-
-
-class _Found:
-    """An equilibrium, and the field between its edges once it is asked for."""
-
-    def __init__(
-        self, problem: EdgeProblem, at: float, response: LinearResponse, found: EquilibriumOfMany
-    ) -> None:
-        self._problem, self.at, self.equilibrium = problem, at, found
-        # the response will change
-        self._table, self._orders = response.nodes.table.copy(), response.nodes.orders.copy()
-
-    @cached_property
-    def field(self) -> GapField:
-        """Field between the edges."""
-        problem, found = self._problem, self.equilibrium
-        solution: Solution = solve_separately(
-            found.gaps, self._table, self._orders, found.potential, found.pressure,
-            self.at, problem.model,
-        )  # fmt: skip
-        return FieldOfMany(
-            problem.source, found.gaps, self.at, problem.tolerance, problem.model.device, solution
-        )
-
-
-class PointOfMany(Point):
-    """A point of a branch of many gaps, whose field is solved when it is asked for."""
-
-    def __init__(self, found: _Found) -> None:
-        rate, slope = found.equilibrium.rate, found.equilibrium.slope
-        # Point is frozen
-        self.__dict__.update(found=found, at=found.at, rate=rate, slope=slope)
-
-    @property
-    def _found(self) -> _Found:
-        found: _Found = self.__dict__["found"]
-        return found
-
-    @property
-    def field(self) -> GapField:
-        """Field between its edges."""
-        return self._found.field
-
-    @property
-    def gaps(self) -> Array:
-        """Gap ends, shape (L, 2)."""
-        return self._found.equilibrium.gaps
-
-    @property
-    def pressure(self) -> float:
-        """2p̄/E*."""
-        return self._found.equilibrium.pressure
-
-    @property
-    def separation(self) -> float:
-        """Separation q0 s."""
-        return self._found.equilibrium.separation
