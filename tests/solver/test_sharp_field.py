@@ -94,6 +94,22 @@ def test_openings_equal_the_explicit_solution():
         assert np.abs(inside - opening[k, 1:-1]).max() < 1e-10 * np.abs(opening).max()
 
 
+def test_a_narrow_gap_of_many_modes_opens_as_one_of_few(source, separation):
+    """There are sine nodes for all modes; fewer were written beyond the end of their arrays."""
+    gaps = np.array([[0.3, 0.302], [1.0, 2.0]])
+    digits = -np.log(1e-8)
+    openings = []
+    for order in (0, len(GAUSS_RULES.counts) - 1):
+        model = FieldModel(FIXED_SEPARATION, digits, GAUSS_RULES, source.panels)
+        orders = np.maximum(choose_orders(map_gaps(gaps), digits, GAUSS_RULES.counts), order)
+        solution = solve(gaps, separation, orders, 2, model, NO_EXTERIOR)
+        field = GapField(source, gaps, separation, 1e-8, FIXED_SEPARATION, solution)
+        shape = fine_opening(field, 0)
+        assert len(shape.theta) >= GAUSS_RULES.counts[orders[0]]
+        openings.append(np.interp(gaps[0].mean(), shape.theta, shape.opening))
+    assert openings[1] == pytest.approx(openings[0], rel=1e-3)
+
+
 def test_field_converges_with_its_tolerance(source, separation):
     """The error follows the tolerance over six decades, with patches down to 0.16 λ_min."""
     gaps = GAPS.copy()

@@ -9,6 +9,8 @@ import pytest
 
 from adhesis import HalfSpace, Problem, self_affine_profile
 from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD
+from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.edge_interaction import openings_between_edges
 from adhesis.solver.sharp.equilibrium.griffith import (
@@ -507,6 +509,27 @@ def test_a_window_that_comes_to_where_it_has_no_field_is_left():
         ends.append(rest.field.gaps)
     assert ends[0].shape == ends[1].shape == (6, 2)
     assert np.abs(ends[0] - ends[1]).max() < 1e-3 * edges.wave
+
+
+def test_orders_of_other_gaps_that_are_as_many_are_not_taken_over(hierarchical, monkeypatch):
+    """A response is found by the number of gaps; where it does not serve, nor do its orders."""
+    edges, point = hierarchical
+    known = edges.responses.at(point.gaps, point.at)
+    asked = []
+
+    def near(gaps, prescribed, least):
+        asked.append(least)
+        return known if len(asked) == 1 else None
+
+    monkeypatch.setattr(edges.responses, "near", near)
+    others = point.gaps + 3 * edges.wave
+    none = np.empty(0, dtype=np.int64)
+    end = edges.system(others).descend(
+        others, point.at, 10, none, edges.law, Track(), equal_speeds=False
+    )
+    assert known.is_outgrown
+    assert end.event == NO_FIELD
+    assert [len(least) for least in asked] == [0, 0]
 
 
 def test_outside_a_window_gaps_follow_to_second_order(hierarchical):

@@ -76,16 +76,18 @@ def respond_again(
 ) -> tuple[LinearResponse, bool]:
     """Set up the response of gaps of which most are those of another; as :func:`respond`."""
     table = map_gaps(gaps)
-    orders = raise_orders(choose_orders(table, model.digits, model.rules.counts), least)
+    orders = choose_orders(table, model.digits, model.rules.counts)
     source = _known_gaps(known, table, law, model)
     fresh = source < 0
     if not in_order(table) or fresh.sum() > REFERENCE_MOST_FAR * fresh.shape[0]:
-        return respond(gaps, prescribed, orders, law, model)
+        return respond(gaps, prescribed, raise_orders(orders, least), law, model)
     for k in range(source.shape[0]):
         if source[k] < 0:  # where something moves it goes on
             most = model.rules.counts.shape[0] - 1
             orders[k] = min(orders[k] + FURTHER_ORDERS, most)
-        else:
+    orders = raise_orders(orders, least)
+    for k in range(source.shape[0]):
+        if source[k] >= 0:
             table[k] = known.nodes.table[source[k]]
             orders[k] = known.nodes.orders[source[k]]
     nodes, equations = assemble_some(table, orders, source, known.nodes, known.equations, model)

@@ -52,13 +52,17 @@ class GapOpening:
 
 
 @compiled_for_both
-def count_sine_nodes(gap: Array, top: int, per_wave: float) -> int:
-    """Count the sine nodes of a gap of which the shortest wave holds ``per_wave``."""
+def count_sine_nodes(gap: Array, modes: int, top: int, per_wave: float) -> int:
+    """Count the sine nodes of a gap of which the shortest wave holds ``per_wave``.
+
+    There are no fewer than ``modes``, those of its field.
+    """
     widest = 0.0
     for i in range(1, 24):
         t = np.pi * i / 24
         widest = max(widest, theta_at(gap, np.cos(t))[1] * np.sin(t))
-    return fast_size(int(np.ceil(0.5 * per_wave * widest * top)) + FEWEST_SINE_NODES)
+    waves = int(np.ceil(0.5 * per_wave * widest * top)) + FEWEST_SINE_NODES
+    return fast_size(max(waves, modes))
 
 
 @compiled_for_both
@@ -126,13 +130,14 @@ def _work_of_gaps(
     last = 0
     circle = tabulate_circle(4)
     for k in range(table.shape[0]):
-        count = count_sine_nodes(table[k], top, ENERGY_NODES)
+        m = counts[orders[k]]
+        count = count_sine_nodes(table[k], m, top, ENERGY_NODES)
         if count != last:
             circle = tabulate_circle(count + 1)
             last = count
         theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
         _fine_moments(table[k], panels, circle, theta, span, modes)
-        for n in range(counts[orders[k]], count):
+        for n in range(m, count):
             total += modes[n] * modes[n] / (n + 1)
     work = -np.pi / 2 * total
     for i in range(f.shape[0]):
@@ -175,7 +180,8 @@ def open_gap(
 def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> GapOpening:
     """Evaluate the opening T of gap k at fine nodes."""
     state = field.solution
-    count = count_sine_nodes(state.nodes.table[k], field.source.top, per_wave)
+    modes = GAUSS_RULES.counts[state.nodes.orders[k]]
+    count = count_sine_nodes(state.nodes.table[k], modes, field.source.top, per_wave)
     theta, span, opening, modes = open_gap(
         state.nodes, k, state.scaled_opening, tabulate_circle(count + 1), GAUSS_RULES,
         field.source.panels,

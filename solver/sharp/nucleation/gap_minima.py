@@ -94,7 +94,8 @@ def bottoms_of(
     last = 0
     circle = tabulate_circle(4)
     for k in gaps:
-        count = count_sine_nodes(nodes.table[k], top, SHAPE_NODES)
+        modes_of_field = rules.counts[nodes.orders[k]]
+        count = count_sine_nodes(nodes.table[k], modes_of_field, top, SHAPE_NODES)
         if count != last:
             circle = tabulate_circle(count + 1)
             last = count

@@ -189,11 +189,11 @@ class HierarchicalSystem(EdgeSystem):
                 near.response, gaps, prescribed, law, problem.model
             )
             count.descent(approach.steps, approach.steps)
-            gaps, orders = approach.gaps, near.response.nodes.orders.copy()
-            found = None
-            if approach.event == OUTGROWN:
+            gaps, found = approach.gaps, None
+            if approach.event == OUTGROWN:  # maybe as it is of other gaps, as many
                 near.is_outgrown = True
                 continue
+            orders = near.response.nodes.orders.copy()
             if approach.event != STEP_LIMIT:
                 return end(approach.event)
             found = windows.next(near.response, approach)
