@@ -20,7 +20,7 @@ import numpy as np
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.renewal import respond
+from adhesis.solver.sharp.equilibrium.renewal import set_up_response
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
@@ -86,7 +86,7 @@ def main() -> None:
         solve_many(*arguments)
         time, (of, _) = _best(lambda a=arguments: solve_many(*a), given.repetitions)
         new = (gaps, separation, orders, law, model)
-        set_up, (response, _) = _best(lambda a=new: respond(*a), given.repetitions)
+        set_up, (response, _) = _best(lambda a=new: set_up_response(*a), given.repetitions)
         given_response = (response, separation, FIXED_SEPARATION)
         step, _ = _best(lambda a=given_response: solve_response(*a), given.repetitions)
         exponent = ""

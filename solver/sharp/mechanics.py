@@ -89,19 +89,19 @@ class EdgeMechanics(EdgeProblem):
         reach: float,
         orders: Integers = _ANY,
         *,
-        patient: bool = True,
+        strict: bool = True,
     ) -> Point | None:
         """Return the stable equilibrium near these gaps, or None.
 
         None if an edge would move further than ``reach`` (in θ), the iteration stalls, or the
-        equilibrium is not stable. ``orders`` are the least orders of the gaps. If not ``patient``,
-        gaps that are nearly in equilibrium are taken as they are.
+        equilibrium is not stable. ``orders`` are the least orders of the gaps. Unless
+        ``strict``, gaps that are nearly in equilibrium are taken as they are.
         """
         if not shortest_length(gaps) > 0:
             return None
         try:
             return self.system(gaps).equilibrium(
-                gaps, prescribed, max(reach, self.settled), orders, patient=patient
+                gaps, prescribed, max(reach, self.settled), orders, strict=strict
             )
         except np.linalg.LinAlgError:
             return None
@@ -150,7 +150,8 @@ class EdgeMechanics(EdgeProblem):
         FullContact
             If the last gap closes, as it may where the separation is not fixed.
         """
-        # Without adhesion the minimum is unique, and the energy's slope vanishes there twice.
+        # Without adhesion the minimum is unique, and the Hessian vanishes there: linear kinetics
+        # would not come to rest.
         equal_speeds = equal_speeds or self.critical == 0
         track = track or Track()
         system, law = self.system(gaps), self.law
@@ -181,12 +182,12 @@ class EdgeMechanics(EdgeProblem):
                 if gaps.shape == rested.shape and np.abs(gaps - rested).max() < self.settled:
                     rests = max(rests, RESTS + 1)  # no patience changes anything
                 rested = gaps
-                patient = rests <= RESTS
-                point = self.equilibrium(gaps, prescribed, reach, orders, patient=patient)
+                strict = rests <= RESTS
+                point = self.equilibrium(gaps, prescribed, reach, orders, strict=strict)
                 if point is not None:
                     return point
-                if not patient and rests <= 2 * RESTS:
-                    gaps = self._pushed_on(gaps, prescribed, rests - RESTS)
+                if not strict and rests <= 2 * RESTS:
+                    gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
@@ -206,7 +207,7 @@ class EdgeMechanics(EdgeProblem):
             raise FullContact
         return min(smallest, LAST_GAP * float(length[0]))
 
-    def _pushed_on(self, gaps: Array, prescribed: float, times: int) -> Array:
+    def _perturb_most_unbalanced(self, gaps: Array, prescribed: float, times: int) -> Array:
         """Move the most unbalanced edge on by ``times`` half a longest step.
 
         Next to a fold edges may be balanced to the field's error where Newton's iteration finds no

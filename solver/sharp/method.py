@@ -249,7 +249,7 @@ class SharpMethod(Method):
         at = self.states.place(state)
         # the separation of a state at the target, where it is known without rounding
         exact = target.prescribed if control.is_fixed else None
-        point = self.follower.remembered(state.internal)
+        point = self.follower.recall_point(state.internal)
         if not state.patches:
             touch, highest = self.nucleation.first_touch()
             first = 0.0 if control.is_load else touch

@@ -99,9 +99,9 @@ REFERENCE_SCALE = 10.0
 that are longer; its error is the motion squared over it. With one longest step 352 gaps took 17 %
 more CPU time, with the same losses to 2e-5."""
 SOFT_RATE = 2.0
-"""Mean rate of all edges. Faster edges are next to a fold, where their tangent changes fast, too:
-they may leave their reference by less. Without this, descents next to folds went to and fro between
-windows and all gaps, and took half of a loop's time."""
+"""Mean |dn/dd| of all edges, as a unit. A faster edge is taken to be next to a fold, where its
+tangent changes fast, too: it may leave its reference by less. Without this, descents next to folds
+went to and fro between windows and all gaps, and took half of a loop's time."""
 REFERENCE_BALANCE = 0.01
 """C_c. Edges further out of balance in the reference of their gap, in the potentials that it had,
 follow otherwise than its response has it. Without this rates were wrong by 2e-3 after some gaps had

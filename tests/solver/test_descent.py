@@ -47,7 +47,7 @@ from adhesis.solver.sharp.descent.step_size import (
     may_raise,
     model_error,
 )
-from adhesis.solver.sharp.descent.trajectory import Comparison, compared, distance_to
+from adhesis.solver.sharp.descent.trajectory import Comparison, distance_to, update_comparison
 from adhesis.solver.sharp.equilibrium.griffith import edge_tangent
 from adhesis.solver.sharp.field.cholesky import padded
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
@@ -436,7 +436,7 @@ def test_a_descent_has_rejoined_after_so_many_comparisons_on_the_trajectory():
     on, off = np.array([[0.05, 0.01]]), np.array([[0.05, 0.06]])
     matches = []
     for gaps in (on, on, off, on, on, off, on, on, on):
-        comparison = compared(comparison, gaps, 0.1)
+        comparison = update_comparison(comparison, gaps, 0.1)
         matches.append(comparison.matches)
     assert matches == [0, 0, 0, 1, 2, 0, 1, 2, 3]
     assert comparison.matches == COMPARISONS

@@ -21,7 +21,7 @@ from adhesis.solver.sharp.equilibrium.griffith import (
 )
 from adhesis.solver.sharp.equilibrium.linear_exterior import open_window
 from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.response_setup import respond, respond_again
+from adhesis.solver.sharp.equilibrium.response_setup import set_up_response, update_response
 from adhesis.solver.sharp.equilibrium.window import Window
 from adhesis.solver.sharp.field.cholesky import is_definite
 from adhesis.solver.sharp.field.cluster_tree import build_tree, pair_again
@@ -132,7 +132,7 @@ def test_newton_step_and_stability_equal_the_dense_ones(profile):
         assert of.opening.min() > 0
         step = np.linalg.solve(tangent, -residual)
         stable = is_definite(symmetrise(of, tangent, edges.law.overlap_limit)[1])
-        response, has_field = respond(gaps, separation, orders, edges.law, edges.model)
+        response, has_field = set_up_response(gaps, separation, orders, edges.law, edges.model)
         assert has_field
         found = solve_response(response, separation, FIXED_SEPARATION)
         assert np.abs(found.motion - step).max() < 1e-3 * np.abs(step).max()
@@ -160,7 +160,7 @@ def test_gaps_solved_by_themselves_after_a_step_are_wrong_in_second_order(loaded
     wrong, moved = [], []
     for way in (4e-3, 2e-3):
         at = state.separation * method.q0 * (1 - way)
-        response, _ = respond(gaps, at, orders, law, model)
+        response, _ = set_up_response(gaps, at, orders, law, model)
         newton = solve_response(response, at, model.device)
         assert newton.stable
         ends = move_edges(gaps, newton.motion)
@@ -307,7 +307,7 @@ def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
     rng = np.random.default_rng(seed)
     ends = random_gaps(40, 0.4, 0.5, seed)
     orders = choose_orders(map_gaps(ends), edges.model.digits, GAUSS_RULES.counts)
-    response, _ = respond(ends, at, orders, edges.law, edges.model)
+    response, _ = set_up_response(ends, at, orders, edges.law, edges.model)
     for change in ["merge", "merge", "close", "open", "open", "merge", "close", "close", "open"]:
         k = int(rng.integers(1, len(ends) - 1))
         if change == "merge":
@@ -318,7 +318,7 @@ def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
             one, two = ends[k, 0] + np.diff(ends[k]) * [0.4, 0.6]
             ends = np.concatenate([ends[:k], [[ends[k, 0], one], [two, ends[k, 1]]], ends[k + 1 :]])
         none = np.empty(0, dtype=np.int64)
-        response, found = respond_again(response, ends, at, none, edges.law, edges.model)
+        response, found = update_response(response, ends, at, none, edges.law, edges.model)
         assert found
         solve_response(response, at, edges.model.device)
         nodes, count, n = response.nodes, len(ends), len(response.nodes.theta)
@@ -371,7 +371,7 @@ def test_a_window_responds_to_all_other_gaps(loaded, follow):
     first = count - 2
     inside = (first + np.arange(4)) % count  # across the end of the period
     model, panels = edges.model, edges.model.panels
-    response, _ = respond(gaps, separation, orders, edges.law, model)
+    response, _ = set_up_response(gaps, separation, orders, edges.law, model)
     newton = solve_response(response, separation, model.device)
     assert newton.stable
     assert np.abs(newton.motion).max() < 1e-3 * edges.wave  # an equilibrium for the tree, too

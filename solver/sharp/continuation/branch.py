@@ -35,7 +35,7 @@ from adhesis.solver.sharp.tolerances import (
 
 @dataclass(frozen=True)
 class Target:
-    """Where a path goes: d, the same in m or Pa without rounding, and on which branch."""
+    """End of a load step: d, the same value in m or Pa without rounding, and the branch."""
 
     at: float
     prescribed: float
@@ -203,10 +203,9 @@ class Branch:
     def _work_error(self, output: Point, point: Point) -> float:
         """Difference of work and energy since the last output, in units of what is allowed.
 
-        Not asked for in steps much shorter than
-        the resolution of jumps. One that a shorter step has not made smaller is no error of the
-        step: energies differ by it where the number of modes of a gap changes. It is put between
-        two states, and halves no further step.
+        Zero for steps much shorter than the resolution of jumps. A difference that a shorter step
+        does not reduce is no error of the step: energies differ by it where the number of modes of
+        a gap changes. It then lies between two states, and halves no further step.
         """
         span = abs(point.at - output.at)
         short = span < WORK_RESOLVED * self._resolution.jump

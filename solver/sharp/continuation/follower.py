@@ -62,7 +62,7 @@ class Follower:
         self._last: tuple[Memory, Point] | None = None
         self._output: tuple[Point, ContactState] | None = None
 
-    def remembered(self, memory: Memory | None) -> Point | None:
+    def recall_point(self, memory: Memory | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
         self.nucleation.seen = NOT_SEEN if memory is None else memory.seen
         self.openings.healed = []
@@ -91,9 +91,9 @@ class Follower:
         while branch.point.at != target.at:
             event = branch.advance()
             if isinstance(event, Fold):
-                jump = self._at_fold(history, branch, event, target)
+                jump = self._handle_fold(history, branch, event, target)
             else:
-                jump = self._at_point(history, branch, event, target)
+                jump = self._handle_accepted(history, branch, event, target)
             if jump is not None:
                 history.commit(jump)
                 return jump.at, branch.after_jump(jump)
@@ -124,7 +124,7 @@ class Follower:
             self._last = memory, point
         history.states[-1] = with_values(history.states[-1], internal=memory)
 
-    def _at_point(
+    def _handle_accepted(
         self, history: History, branch: Branch, event: Accepted, target: Target
     ) -> ComputedJump | None:
         """Hand out the state of an accepted point; return the jump there, if there is one."""
@@ -148,7 +148,7 @@ class Follower:
         jump = self.jumps.compute(before, event.remaining, point.at, target.branch, known=point)
         return replace(jump, states=states + jump.states)
 
-    def _at_fold(
+    def _handle_fold(
         self, history: History, branch: Branch, fold: Fold, target: Target
     ) -> ComputedJump | None:
         """Return the jump at the end of a branch; None if the branch goes on, or is refined."""
@@ -306,10 +306,10 @@ class Follower:
         displaced = self.states.work(before, after, self._fold_error(point))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
-            misplaced += self._closed_early(before, point, way)
+            misplaced += self._early_closure_error(before, point, way)
         return replace(jump, states=(*states, before, after), misplaced=misplaced), finest
 
-    def _closed_early(self, before: ContactState, point: Point, way: float) -> float:
+    def _early_closure_error(self, before: ContactState, point: Point, way: float) -> float:
         """Bound the work in J/m² that a loop under a load misses, as it is closed before the fold.
 
         It is closed at the separation of the last state (``model.control``), a ``way`` in d or less

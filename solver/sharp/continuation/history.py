@@ -1,4 +1,4 @@
-"""States and jumps of a path, in order; what has been written is never taken back."""
+"""States and jumps of a path, in order; they are only appended."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ComputedJump:
 
 @dataclass
 class History:
-    """What a path has passed.
+    """States and jumps of a path.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ from adhesis.solver.sharp.tolerances import (
 )
 
 Rival = Point | None | FullContact
-"""Where equal speeds led: a minimum, no contact, or full contact (under a load)."""
+"""End of a descent with equal speeds: a minimum, no contact, or full contact (under a load)."""
 
 
 class Jumps:
@@ -62,7 +62,7 @@ class Jumps:
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals, known)
-        point = self._settle(
+        point = self._nucleate_until_clear(
             point,
             at,
             lambda gaps, touching, before: self._descend(gaps, at, touching, rivals, before),
@@ -71,11 +71,11 @@ class Jumps:
         at_stake = None
         try:
             if rivals:
-                rival = self._settle_rival(rivals[0], at)
+                rival = self._end_of_rival(rivals[0], at)
                 at_stake = self._at_stake(before, point, rival, at)
             elif fold is not None:
-                rival = self._beyond(fold, start, known)
-                both = None if point is None else self._beyond(fold, point.gaps, point)
+                rival = self._end_beyond(fold, start, known)
+                both = None if point is None else self._end_beyond(fold, point.gaps, point)
                 at_stake = self._at_stake(before, both, rival, fold)
         except FullContact:  # elsewhere, but with no energy that could be compared
             at_stake = 0.0
@@ -88,7 +88,7 @@ class Jumps:
         self, before: ContactState, point: Point | None, rival: Point | None, at: float
     ) -> float | None:
         """Difference of the energies of two ends in J/m²; None if they are one."""
-        if self._alike(rival, point):
+        if self._is_same_minimum(rival, point):
             return None
         ends = (self._after(before, end, at) for end in (point, rival))
         return self.states.apart(*ends)
@@ -97,11 +97,11 @@ class Jumps:
         """State that a descent led to."""
         return self.states.after_loss(before, at) if point is None else self.states.of_point(point)
 
-    def _settle_rival(self, point: Rival, at: float) -> Point | None:
+    def _end_of_rival(self, point: Rival, at: float) -> Point | None:
         """Go on with equal speeds, from a minimum that they reached, until nothing touches."""
         if isinstance(point, FullContact):
             raise point
-        return self._settle(
+        return self._nucleate_until_clear(
             point,
             at,
             lambda gaps, touching, before: self._relax(
@@ -112,16 +112,16 @@ class Jumps:
             ),
         )
 
-    def _beyond(self, at: float, start: Array, known: Point | None) -> Point | None:
+    def _end_beyond(self, at: float, start: Array, known: Point | None) -> Point | None:
         """Descend at a d next to that of an equilibrium, until nothing touches."""
 
         def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
             gaps = self.nucleation.seeded(gaps, touching) if touching else gaps
             return self._relax(gaps, at, start=self.edges.start(before))
 
-        return self._settle(relaxed(start, [], known), at, relaxed)
+        return self._nucleate_until_clear(relaxed(start, [], known), at, relaxed)
 
-    def _settle(
+    def _nucleate_until_clear(
         self,
         point: Point | None,
         at: float,
@@ -154,7 +154,7 @@ class Jumps:
             point = grown
         raise NoState("surfaces overlap, and no patch comes to rest there", at)
 
-    def _alike(self, one: Point | None, other: Point | None) -> bool:
+    def _is_same_minimum(self, one: Point | None, other: Point | None) -> bool:
         """Whether two descents led to one minimum."""
         if one is None or other is None:
             return one is other
@@ -187,7 +187,7 @@ class Jumps:
         if not rivals and self.races.may_occur(gaps, point, track):
             try:
                 rival = self._relax(gaps, at, equal_speeds=True, track=track, start=start)
-                if not track.rejoined and not self._alike(rival, point):
+                if not track.rejoined and not self._is_same_minimum(rival, point):
                     rivals.append(rival)
             except FullContact as full:
                 rivals.append(full)

@@ -1,4 +1,4 @@
-"""How a branch goes on beyond two of its points: a predictor, and the fold that may lie ahead.
+"""Predict the next points of a branch, and the fold ahead, from two points and their rates.
 
 A branch turns back in d where it folds, while the edge that leads goes on: d is a smooth function
 of how far it has gone, with an extremum at the fold, and so are all other edges. Two points with

@@ -30,10 +30,10 @@ class RaceCheck:
     def may_occur(self, start: Array, end: Point | None, track: Track) -> bool:
         """Whether the order in which edges ran from ``start`` can have decided where they ended.
 
-        It can where they hold each other back: edges that only help each other on reach the same
-        minimum in any order. So the force is asked for that the runners took from each other: to
-        first order in their ways and with the tangent at the end or, where patches or gaps went,
-        along the ``track``, for every set of gaps on it. Of many gaps that is not known.
+        The order matters only if running edges reduce each other's force; edges that increase it
+        reach the same minimum in any order. The reduction is computed to first order in the motions
+        with the tangent at the end or, where patches or gaps have gone, along the ``track``, for
+        every set of gaps on it. For many gaps it is not known there.
         """
         if end is None or end.field.gaps.shape != start.shape:
             return not track.is_complete or any(

@@ -1,4 +1,4 @@
-"""How finely a path is followed."""
+"""Tolerances with which a path is followed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from adhesis.solver.sharp.tolerances import ORDER_RESOLVED
 
 @dataclass(frozen=True)
 class Resolution:
-    """How finely a path is followed; separations as q0 s.
+    """Tolerances with which a path is followed; separations as q0 s.
 
     Attributes
     ----------

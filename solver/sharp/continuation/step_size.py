@@ -9,7 +9,7 @@ from adhesis.solver.sharp.tolerances import FOLD_RESOLVED, STEP_GROWTH, STEP_RED
 
 
 class StepSize:
-    """Controls the step: by the motion of the edges, by the bend of the curve, by failures.
+    """Limit steps by the predicted motion of edges, by the trapezoidal rule and by failures.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point
 
 
 class Trail:
-    """Points from the last search on, which found the first of them clear.
+    """Accepted points since the last search for touches; at the first of them nothing overlaps.
 
     Parameters
     ----------

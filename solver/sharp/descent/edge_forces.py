@@ -59,14 +59,14 @@ class Forces(NamedTuple):
 
 @compiled
 def forces_at(
-    gaps: Array, prescribed: float, orders: Integers, before: Solution, system: FlowProblem
+    gaps: Array, prescribed: float, orders: Integers, before: Solution, problem: FlowProblem
 ) -> Forces:
     """Solve the field of these gaps, and evaluate the forces.
 
     Nodes, moments and kernels of gaps that are as they were in the solution ``before`` are kept.
     """
-    law, panels = system.law, system.model.panels
-    solution = solve_again(gaps, prescribed, orders, system.model, system.exterior, before)
+    law, panels = problem.law, problem.model.panels
+    solution = solve_again(gaps, prescribed, orders, problem.model, problem.exterior, before)
     edges = 2 * gaps.shape[0]
     slope = np.full(edges, np.nan)
     if not np.isfinite(solution.pressure):
@@ -106,11 +106,11 @@ def energy_rises(before: Array, after: Array, step: Array) -> bool:
 
 @compiled
 def slope_along(
-    gaps: Array, step: Array, prescribed: float, orders: Integers, system: FlowProblem
+    gaps: Array, step: Array, prescribed: float, orders: Integers, problem: FlowProblem
 ) -> float:
     """Evaluate the force along ``step`` at these gaps: positive where the energy falls."""
-    of = solve(gaps, prescribed, orders, 1, system.model, system.exterior)
-    residual, _ = imbalance(of, system.law, system.model.panels)
+    of = solve(gaps, prescribed, orders, 1, problem.model, problem.exterior)
+    residual, _ = imbalance(of, problem.law, problem.model.panels)
     force = 0.0
     for e in range(step.shape[0]):
         force -= residual[e] * (2 * of.opening[e] - residual[e]) * step[e]

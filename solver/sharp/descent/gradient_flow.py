@@ -41,9 +41,9 @@ from adhesis.solver.sharp.descent.step_size import (
 from adhesis.solver.sharp.descent.trajectory import (
     Comparison,
     Trajectory,
-    begun,
-    compared,
-    extended,
+    append_point,
+    start_trajectory,
+    update_comparison,
 )
 from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
@@ -129,7 +129,7 @@ def descend(
     most_fields: int,
     least: Integers,
     equal_speeds: bool,
-    system: FlowProblem,
+    problem: FlowProblem,
     comparison: Comparison,
 ) -> Descent:
     """Descend in energy, d being ``prescribed``, until an event.
@@ -137,13 +137,13 @@ def descend(
     No edge moves in a step by more than the reach of the step, or a quarter of the gap or patch
     that it may close. ``least`` are the least orders of the gaps, empty for any.
     """
-    law, model = system.law, system.model
-    trajectory = begun(gaps)
+    law, model = problem.law, problem.model
+    trajectory = start_trajectory(gaps)
     interaction = np.zeros((gaps.size, gaps.size))
     tangent = interaction
     orders = raise_orders(least_orders(gaps, model), least)
     start = no_solution(map_gaps(gaps), np.empty(0, dtype=np.int64), model.device)
-    now = forces_at(gaps, prescribed, orders, start, system)
+    now = forces_at(gaps, prescribed, orders, start, problem)
     fields, tangents, size = 1, 0, initial_size()
     event = STEP_LIMIT if np.isfinite(now.solution.pressure) else NO_FIELD
     accepted, is_long, strongest = True, False, 0.0
@@ -152,7 +152,7 @@ def descend(
         if accepted:
             strongest = max(strongest, norm(now.slope))
             if is_long or fields % 2 == 0:
-                comparison = compared(comparison, gaps, law.longest_step)
+                comparison = update_comparison(comparison, gaps, law.longest_step)
             if comparison.matches == COMPARISONS:
                 event = REJOINED
                 break
@@ -161,16 +161,16 @@ def descend(
         if fields >= most_fields:
             break
         step, tried = next_step(
-            gaps, prescribed, orders, now, tangent, size, strongest, equal_speeds, system
+            gaps, prescribed, orders, now, tangent, size, strongest, equal_speeds, problem
         )
         fields += tried
         is_long = step.flow.points.shape[0] > 0
-        event = event_after(step, law)
+        event = detect_event(step, law)
         if event == STEP_LIMIT:
             orders = raise_orders(least_orders(step.gaps, model), orders)
-            there = forces_at(step.gaps, prescribed, orders, last, system)
+            there = forces_at(step.gaps, prescribed, orders, last, problem)
             fields += 1
-            accepted, size = judged(step, now, there, size, law)
+            accepted, size = judge_step(step, now, there, size, law)
             if np.isfinite(there.solution.pressure):
                 last = there.solution
             elif not is_long:
@@ -178,8 +178,8 @@ def descend(
             if accepted:
                 now = there
         if event != NO_FIELD and (accepted or event != STEP_LIMIT):
-            trajectory = followed(trajectory, step)
-            take(step, interaction)
+            trajectory = extend_by_step(trajectory, step)
+            add_interaction(step, interaction)
             gaps = step.gaps
     points = trajectory.points[: trajectory.length]
     return Descent(gaps, event, orders, fields, tangents, points, comparison.has_left, interaction)
@@ -194,7 +194,7 @@ def least_orders(gaps: Array, model: FieldModel) -> Integers:
 @compiled
 def next_step(
     gaps: Array, prescribed: float, orders: Integers, now: Forces, tangent: Array, size: StepSize,
-    strongest: float, equal_speeds: bool, system: FlowProblem,
+    strongest: float, equal_speeds: bool, problem: FlowProblem,
 ) -> tuple[Step, int]:  # fmt: skip
     """Choose the next step from solved edges; also returns the number of fields that took.
 
@@ -202,7 +202,7 @@ def next_step(
     were as large as ``strongest`` are nearly balanced, and where a gap or patch would be gone: no
     field could judge that.
     """
-    law, panels = system.law, system.model.panels
+    law, panels = problem.law, problem.model.panels
     table = now.solution.nodes.table
     none = np.empty((0, 0))
     if size.reach >= LEAST_REACH and not near_balance(norm(now.slope), strongest, law):
@@ -216,14 +216,14 @@ def next_step(
                 return Step(end, flow.motion, length, flow, none), 0
     limit = step_limits(table, size.share * law.longest_step)
     motion, curvature, tried = short_step(
-        gaps, prescribed, orders, now, tangent, limit, equal_speeds, system
+        gaps, prescribed, orders, now, tangent, limit, equal_speeds, problem
     )
     length = np.abs(motion).max()
     return Step(move_edges(gaps, motion), motion, length, no_flow(), curvature), tried
 
 
 @compiled
-def judged(
+def judge_step(
     step: Step, before: Forces, after: Forces, size: StepSize, law: EdgeLaw
 ) -> tuple[bool, StepSize]:
     """Judge a step by the field at its end: whether it is accepted, and the next step size."""
@@ -239,7 +239,7 @@ def judged(
 
 
 @compiled
-def event_after(step: Step, law: EdgeLaw) -> int:
+def detect_event(step: Step, law: EdgeLaw) -> int:
     """Detect an event after a step; STEP_LIMIT if there is none."""
     if not step.length < np.inf:
         return NO_FIELD
@@ -249,18 +249,18 @@ def event_after(step: Step, law: EdgeLaw) -> int:
 
 
 @compiled
-def followed(trajectory: Trajectory, step: Step) -> Trajectory:
+def extend_by_step(trajectory: Trajectory, step: Step) -> Trajectory:
     """Add the points of a step to a trajectory."""
     points = step.flow.points
     for i in range(points.shape[0]):
-        trajectory = extended(trajectory, points[i])
+        trajectory = append_point(trajectory, points[i])
     if points.shape[0] == 0:
-        trajectory = extended(trajectory, step.gaps.ravel())
+        trajectory = append_point(trajectory, step.gaps.ravel())
     return trajectory
 
 
 @compiled
-def take(step: Step, interaction: Array) -> None:
+def add_interaction(step: Step, interaction: Array) -> None:
     """Add to ``interaction`` what the edges took from each other in a step."""
     if step.flow.points.shape[0] > 0:
         interaction += step.flow.interaction

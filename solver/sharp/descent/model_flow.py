@@ -2,7 +2,7 @@
 
 The flow ṅ = C_c² - C² is integrated by linearly implicit Euler steps, (1/Δτ + H) Δn = force, each
 at most a longest step long; with equal speeds, for comparison, the time Δτ is each edge's own.
-Fields are not solved on the way: how far the model leads is the step-size control's
+Fields are not solved on the way: the step-size control decides how far the model is used
 (``step_size``), which compares its openings with those of the field at the end.
 """
 

@@ -1,4 +1,4 @@
-"""The way off a saddle of the energy, compiled: along the softest modes, one edge leading."""
+"""Leave a saddle of the energy, compiled: along the softest modes, one edge leading."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def step_off_saddle(
     prescribed: float,
     orders: Integers,
     equal_speeds: bool,
-    system: FlowProblem,
+    problem: FlowProblem,
 ) -> tuple[Array, int]:
     """Choose the step from edges without force: off a saddle, or ``step`` where they are stable.
 
-    Both ways off are tried by linear kinetics, and the one on which the energy falls more is taken,
+    Both directions are tried by linear kinetics. The one on which energy falls more is taken,
     of equal ones the outward one. Also returns the number of fields.
     """
     if equal_speeds:
@@ -55,10 +55,10 @@ def step_off_saddle(
         return softest_step(model.matrix, model.values, model.limit), 0
     if not model.values[0] < 0:
         return step, 0
-    order = positions(map_gaps(gaps), system.law.origin)
+    order = positions(map_gaps(gaps), problem.law.origin)
     way = leaving_step(model.values, model.matrix, model.limit, order)
-    onwards = slope_along(move_edges(gaps, way), way, prescribed, orders, system)
-    backwards = slope_along(move_edges(gaps, -way), -way, prescribed, orders, system)
+    onwards = slope_along(move_edges(gaps, way), way, prescribed, orders, problem)
+    backwards = slope_along(move_edges(gaps, -way), -way, prescribed, orders, problem)
     if not max(onwards, backwards) > 0:
         return step, 2
     return (way if onwards >= backwards * (1 - EQUAL_GAINS) else -way), 2

@@ -18,7 +18,7 @@ from adhesis.solver.sharp.gap.quadrature import Integers
 @compiled
 def short_step(
     gaps: Array, prescribed: float, orders: Integers, now: Forces, tangent: Array, limit: Array,
-    equal_speeds: bool, system: FlowProblem,
+    equal_speeds: bool, problem: FlowProblem,
 ) -> tuple[Array, Array, int]:  # fmt: skip
     """Choose a step within the limits: outward motions, curvature of the energy, fields solved.
 
@@ -26,7 +26,7 @@ def short_step(
     speeds, for comparison, edges out of equilibrium run, all at the same speed (their limit), and
     edges near equilibrium follow them by Newton's step.
     """
-    law, opening = system.law, now.solution.opening
+    law, opening = problem.law, now.solution.opening
     curvature = hessian(np.maximum(opening, 0.0), now.residual, now.drift, tangent)
     if equal_speeds:
         values, matrix = symmetrise(now.solution, tangent, law.overlap_limit)
@@ -42,7 +42,7 @@ def short_step(
     close_overlaps(step, opening, limit, law.overlap_limit)
     tried = 0
     if np.abs(step).max() <= law.field_error:
-        step, tried = step_off_saddle(step, model, gaps, prescribed, orders, equal_speeds, system)
+        step, tried = step_off_saddle(step, model, gaps, prescribed, orders, equal_speeds, problem)
     return step, curvature, tried
 
 

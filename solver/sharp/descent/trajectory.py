@@ -52,7 +52,7 @@ class Comparison(NamedTuple):
 
 
 @compiled
-def begun(gaps: Array) -> Trajectory:
+def start_trajectory(gaps: Array) -> Trajectory:
     """Begin a trajectory at these gaps."""
     points = np.empty((64, 2 * gaps.shape[0]))
     points[0] = gaps.ravel()
@@ -60,7 +60,7 @@ def begun(gaps: Array) -> Trajectory:
 
 
 @compiled
-def extended(trajectory: Trajectory, edges: Array) -> Trajectory:
+def append_point(trajectory: Trajectory, edges: Array) -> Trajectory:
     """Add a point to a trajectory."""
     points, length = trajectory.points, trajectory.length
     if length == points.shape[0]:
@@ -72,7 +72,7 @@ def extended(trajectory: Trajectory, edges: Array) -> Trajectory:
 
 
 @compiled
-def compared(comparison: Comparison, gaps: Array, longest: float) -> Comparison:
+def update_comparison(comparison: Comparison, gaps: Array, longest: float) -> Comparison:
     """Compare these gaps with the other trajectory; ``longest`` is the longest step."""
     if comparison.trajectory.shape[0] == 0:
         return comparison

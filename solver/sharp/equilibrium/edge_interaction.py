@@ -1,4 +1,4 @@
-"""What the motion of some edges of many gaps does to others, all edges held; compiled."""
+"""Change of the openings of many gaps by the motion of some edges, all others held; compiled."""
 
 from __future__ import annotations
 

@@ -172,9 +172,9 @@ def _move_gap(
     motion, follows = out.motion[2 * k : 2 * k + 2], out.motion_by_potential[own]
     for side in range(2):
         a, b = compliance[side, 0], compliance[side, 1]
-        out.balancing[2 * k + side] = -(a * residual[0] + b * residual[1])
+        out.isolated_correction[2 * k + side] = -(a * residual[0] + b * residual[1])
         motion[side, 1] = a * opening[0, 1] + b * opening[1, 1]
-        motion[side, 0] = out.balancing[2 * k + side] - motion[side, 1] * pressure
+        motion[side, 0] = out.isolated_correction[2 * k + side] - motion[side, 1] * pressure
         for j in range(potential.shape[0]):
             follows[j, side] = a * by_potential[0, j] + b * by_potential[1, j]
             motion[side, 0] -= follows[j, side] * potential[j]
@@ -219,7 +219,7 @@ def _charge_gap(
             part = strength[side] * (w[i] * solved[3 + side, i] + singular[side, i])
             moving[side, i] = part
             charge[1, first + i] += part * motion[2 * k + side, 1]
-            charge[0, first + i] += part * out.balancing[2 * k + side]
+            charge[0, first + i] += part * out.isolated_correction[2 * k + side]
         charge[0, first + i] -= pressure * charge[1, first + i]
     for i in range(m):
         for j in range(m):

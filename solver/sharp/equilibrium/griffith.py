@@ -26,13 +26,14 @@ class EdgeLaw(NamedTuple):
     newton_tolerance : float
         A correction this small ends Newton's iteration.
     field_error : float
-        The error of the field may move an equilibrium so far; no less than ``newton_tolerance``.
+        Largest displacement of an equilibrium by the error of the field; no less than
+        ``newton_tolerance``.
     rest_step : float
         A descent whose steps are shorter than this is left to Newton's iteration.
     longest_step : float
         Longest short step of an edge in a descent.
     smallest : float
-        Narrower patches and gaps are gone.
+        Narrower patches and gaps are removed.
     overlap_limit : float
         An opening this far below zero is an overlap that descent cannot weigh.
     force_error : float
@@ -148,7 +149,7 @@ def accept_correction(
     """
     travelled += step
     size = np.abs(step).max()
-    # not written as > : a size that is no number is a failure, too
+    # written so that NaN is a failure
     within = size <= reach and size <= longest and np.abs(travelled).max() <= reach
     moved = move_edges(gaps, step)
     return within and shortest_length(moved) > 0, moved

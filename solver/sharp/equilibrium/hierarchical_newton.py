@@ -16,7 +16,11 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     pressure_at,
     solve_response,
 )
-from adhesis.solver.sharp.equilibrium.renewal import departed, move_references, renew_held
+from adhesis.solver.sharp.equilibrium.renewal import (
+    move_references,
+    outdated_references,
+    renew_held,
+)
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.tolerances import (
@@ -67,7 +71,7 @@ def equilibrium_many(
     law: EdgeLaw,
     model: FieldModel,
 ) -> EquilibriumOfMany:
-    """Find the equilibrium next to ``gaps`` on the linear response of about these gaps.
+    """Find the equilibrium next to ``gaps`` on the linear response about nearby gaps.
 
     The references of gaps follow where they move by more than that to which the response is
     accurate. Where the edges are not stable on the way, or the corrections hardly shrink, the
@@ -94,9 +98,9 @@ def equilibrium_many(
         if not np.isfinite(pressure):
             break
         if strict and not now.stable:
-            if judged_again or not departed(response, map_gaps(gaps), law)[0].any():
+            if judged_again or not outdated_references(response, map_gaps(gaps), law)[0].any():
                 break
-            judged_again = True  # before, by a tangent of other edges
+            judged_again = True  # the first time the tangent was that of an outdated reference
             continue
         travelled += step
         # as in ``newton.equilibrium``
@@ -109,7 +113,7 @@ def equilibrium_many(
             break
         gaps = moved
         at_rest = stalled or (not strict and size <= law.rest_step)
-        if at_rest or not departed(response, map_gaps(gaps), law)[0].any():
+        if at_rest or not outdated_references(response, map_gaps(gaps), law)[0].any():
             found = True
             break
         if steps == MOST_CORRECTIONS:

@@ -83,8 +83,8 @@ def open_window(
     outside: Integers = np.arange(first + width, first + count) % count
     held = response.held.copy()
     for k in outside:
-        left, right = abs(response.balancing[2 * k]), abs(response.balancing[2 * k + 1])
-        near = left < longest_motion and right < longest_motion
+        correction = np.abs(response.isolated_correction[2 * k : 2 * k + 2])
+        near = correction[0] < longest_motion and correction[1] < longest_motion
         held[k] = not near or response.factor.negative[k] != 0
     renew_held(response, held, law, model)
     window = np.empty((width + 1, 2))

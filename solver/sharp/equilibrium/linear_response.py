@@ -55,7 +55,7 @@ class LinearResponse(NamedTuple):
         Potentials and p of the references.
     scaled_opening : array, shape (N,)
         f there.
-    residual, balancing : array, shape (2L,)
+    residual, isolated_correction : array, shape (2L,)
         C_e - C_c in the reference, and the motion that would balance its gap by itself.
     motion : array, shape (2L, 2)
         Motions of its edges without potentials and p, and by a unit of p.
@@ -82,7 +82,7 @@ class LinearResponse(NamedTuple):
     about_pressure: Array
     scaled_opening: Array
     residual: Array
-    balancing: Array
+    isolated_correction: Array
     motion: Array
     motion_by_potential: Array
     mean_by_potential: Array
@@ -140,7 +140,7 @@ def allocate_response(
         about_pressure=np.zeros(count),
         scaled_opening=np.zeros(n),
         residual=np.zeros(2 * count),
-        balancing=np.zeros(2 * count),
+        isolated_correction=np.zeros(2 * count),
         motion=np.zeros((2 * count, 2)),
         motion_by_potential=np.zeros((n, 2)),
         mean_by_potential=np.zeros(n),
@@ -176,7 +176,7 @@ def solve_response(
         separation = (mean[0] + pressure * mean[1]) / (2 * np.pi)
     negative = response.factor.negative[-1]
     rates = motion[:, 1] * rate
-    _note_softness(response.softness, rates)
+    _update_softness(response.softness, rates)
     return ResponseSolution(
         motion=motion[:, 0] + pressure * motion[:, 1],
         rate=rates,
@@ -188,7 +188,7 @@ def solve_response(
 
 
 @compiled
-def _note_softness(softness: Array, rate: Array) -> None:
+def _update_softness(softness: Array, rate: Array) -> None:
     """Compute how soft each gap is by its largest rate, or its neighbours'."""
     count = softness.shape[0]
     mean = np.abs(rate).mean()

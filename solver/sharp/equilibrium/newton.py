@@ -78,9 +78,9 @@ def equilibrium(
 ) -> Equilibrium:
     """Find the stable equilibrium C_e = C_c near these gaps, no edge moving further than ``reach``.
 
-    ``least`` are the least orders of the gaps, or empty. If not ``strict``, edges out of
-    equilibrium by no more than ``law.rest_step``, or by forces that are rounding, are taken as they
-    are.
+    ``least`` are the least orders of the gaps, or empty. Unless ``strict``, edges out
+    of equilibrium by no more than ``law.rest_step``, or by forces that are rounding, are taken as
+    they are.
 
     Raises
     ------

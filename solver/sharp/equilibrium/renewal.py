@@ -1,8 +1,9 @@
 """Renewal of a linear response of many gaps where edges have moved; compiled.
 
-A response lasts while edges move little. Where an edge leaves its reference, that of its gap is
-moved to where it is now, in the potential of the last solution, and the runs of the tree that hold
-the gap are computed anew. So a state next to a known one costs what differs, and one pass.
+A response is used while edges stay near their references. A gap whose edge leaves its reference
+is linearised anew where it is now, in the potential of the last solution, and the runs of the tree
+that hold the gap are computed anew. So a state next to a known one costs the changed gaps and one
+pass through the tree.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def factor_runs(response: LinearResponse, changed: Flags) -> None:
 
 
 @compiled
-def linearise_here(
+def linearise_in_current_potential(
     response: LinearResponse, k: int, pressure: float, law: EdgeLaw, model: FieldModel
 ) -> None:
     """Take a gap's potential in the last solution as its reference, and let its edges follow."""
@@ -70,7 +71,7 @@ def linearise_here(
 
 
 @compiled
-def has_departed(known: Array, row: Array, softness: float, law: EdgeLaw) -> tuple[bool, bool]:
+def is_outdated(known: Array, row: Array, softness: float, law: EdgeLaw) -> tuple[bool, bool]:
     """Return whether a gap, by its row of the table, has departed from its reference, and far.
 
     The response is wrong to second order, in which the motion squared over the gap or the patch
@@ -98,17 +99,20 @@ def has_departed(known: Array, row: Array, softness: float, law: EdgeLaw) -> tup
 
 
 @compiled
-def departed(response: LinearResponse, table: Array, law: EdgeLaw) -> tuple[Flags, Flags]:
-    """Mark the gaps whose reference is to be renewed for the edges of a table, and far other ones.
+def outdated_references(
+    response: LinearResponse, table: Array, law: EdgeLaw
+) -> tuple[Flags, Flags]:
+    """Mark the gaps whose references are to be renewed for the edges of a table.
 
-    That is where edges have left it, or were out of balance in it.
+    That is where edges have left them, or were out of balance in them. Returned apart are gaps that
+    have moved so far that the potential in the old gap cannot be taken for that in the new one.
     """
     count = table.shape[0]
     changed = np.zeros(count, dtype=np.bool_)
     far = np.zeros(count, dtype=np.bool_)
     for k in range(count):
         known, softness = response.nodes.table[k], response.softness[k]
-        changed[k], far[k] = has_departed(known, table[k], softness, law)
+        changed[k], far[k] = is_outdated(known, table[k], softness, law)
         # in other potentials than those of its reference its edges follow otherwise
         for e in range(2 * k, 2 * k + 2):
             if abs(response.residual[e]) * softness > REFERENCE_BALANCE * law.critical > 0:
@@ -133,7 +137,7 @@ def move_references(
     """
     table = map_gaps(gaps)
     nodes, counts = response.nodes, model.rules.counts
-    changed, far = departed(response, table, law)
+    changed, far = outdated_references(response, table, law)
     indices = np.flatnonzero(changed)
     if indices.shape[0] == 0:
         return True
@@ -163,7 +167,7 @@ def move_references(
         pressure = solve_response(response, prescribed, model.device).pressure
         for k in range(far.shape[0]):
             if far[k]:
-                linearise_here(response, k, pressure, law, model)
+                linearise_in_current_potential(response, k, pressure, law, model)
         factor_runs(response, far)
     return True
 

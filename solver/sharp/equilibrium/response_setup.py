@@ -17,7 +17,11 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     allocate_response,
     solve_response,
 )
-from adhesis.solver.sharp.equilibrium.renewal import factor_runs, has_departed, linearise_here
+from adhesis.solver.sharp.equilibrium.renewal import (
+    factor_runs,
+    is_outdated,
+    linearise_in_current_potential,
+)
 from adhesis.solver.sharp.field.assembly import assemble_some
 from adhesis.solver.sharp.field.cluster_tree import (
     empty_tree,
@@ -39,7 +43,7 @@ from adhesis.solver.sharp.tolerances import FURTHER_ORDERS, REFERENCE_MOST_FAR
 
 
 @compiled_for_both
-def respond(
+def set_up_response(
     gaps: Array, prescribed: float, orders: Integers, law: EdgeLaw, model: FieldModel
 ) -> tuple[LinearResponse, bool]:
     """Solve the field of these gaps, and linearise about it; returns whether there is a field."""
@@ -66,7 +70,7 @@ def respond(
 
 
 @compiled_for_both
-def respond_again(
+def update_response(
     known: LinearResponse,
     gaps: Array,
     prescribed: float,
@@ -74,15 +78,15 @@ def respond_again(
     law: EdgeLaw,
     model: FieldModel,
 ) -> tuple[LinearResponse, bool]:
-    """Set up the response of gaps of which most are those of another; as :func:`respond`."""
+    """Set up a response as :func:`set_up_response`, of gaps of which most are those of another."""
     table = map_gaps(gaps)
     orders = choose_orders(table, model.digits, model.rules.counts)
     source = _known_gaps(known, table, law, model)
     fresh = source < 0
     if not in_order(table) or fresh.sum() > REFERENCE_MOST_FAR * fresh.shape[0]:
-        return respond(gaps, prescribed, raise_orders(orders, least), law, model)
+        return set_up_response(gaps, prescribed, raise_orders(orders, least), law, model)
     for k in range(source.shape[0]):
-        if source[k] < 0:  # where something moves it goes on
+        if source[k] < 0:  # a gap that has changed is likely to change again
             most = model.rules.counts.shape[0] - 1
             orders[k] = min(orders[k] + FURTHER_ORDERS, most)
     orders = raise_orders(orders, least)
@@ -122,7 +126,7 @@ def respond_again(
         return out, False
     for k in range(fresh.shape[0]):
         if fresh[k]:
-            linearise_here(out, k, pressure, law, model)
+            linearise_in_current_potential(out, k, pressure, law, model)
     factor_runs(out, fresh)
     return out, True
 
@@ -140,7 +144,7 @@ def _known_gaps(known: LinearResponse, table: Array, law: EdgeLaw, model: FieldM
         wanted = model.digits / convergence_rate(table[k])
         if counts[order] < wanted and order < counts.shape[0] - 1:
             continue
-        changed, _ = has_departed(rows[j], table[k], 1.0, law)
+        changed, _ = is_outdated(rows[j], table[k], 1.0, law)
         if not changed:
             found[k] = j
     return found
@@ -184,7 +188,7 @@ def _copy_run(known: LinearResponse, old: int, out: LinearResponse, new: int) ->
 
 @compiled
 def _copy_gap(known: LinearResponse, j: int, out: LinearResponse, k: int) -> None:
-    """Copy how the edges of a gap respond, and its reference."""
+    """Copy how the edges of a gap set_up_response, and its reference."""
     square, here = run_span(known.tree.response_start, j), run_span(out.tree.response_start, k)
     _copy(known.inverse, square, out.inverse, here)
     out.held[k] = known.held[j]
@@ -195,7 +199,10 @@ def _copy_gap(known: LinearResponse, j: int, out: LinearResponse, k: int) -> Non
     _copy(known.mean_by_potential, theirs, out.mean_by_potential, own)
     for side in range(2):
         e, f = 2 * j + side, 2 * k + side
-        out.residual[f], out.balancing[f] = known.residual[e], known.balancing[e]
+        out.residual[f], out.isolated_correction[f] = (
+            known.residual[e],
+            known.isolated_correction[e],
+        )
         for column in range(2):
             out.motion[f, column] = known.motion[e, column]
     for i in range(own.stop - own.start):

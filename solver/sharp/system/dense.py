@@ -49,12 +49,12 @@ class DenseSystem(EdgeSystem):
         return point.field.derivatives[0][np.ix_(edges, edges)]
 
     def equilibrium(
-        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
+        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, strict: bool
     ) -> Point | None:
         """Iterate for the equilibrium near these gaps, by the matrix of all edges."""
         problem = self._problem
         found, at, solution, rate, slope, steps = equilibrium(
-            gaps, prescribed, reach, orders, patient, problem.law, problem.model, NO_EXTERIOR
+            gaps, prescribed, reach, orders, strict, problem.law, problem.model, NO_EXTERIOR
         )
         problem.count.newton(steps)
         if not found:

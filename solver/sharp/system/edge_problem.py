@@ -30,7 +30,7 @@ from adhesis.solver.sharp.tolerances import (
 
 
 class EdgeProblem:
-    """What fields, equilibria and descents of one problem have in common.
+    """Material law, tolerances and counters of one problem.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class EdgeProblem:
     settled : float
         A correction this small ends Newton's iteration.
     coarse : float
-        How far an equilibrium may move with the error of the field.
+        Displacement of an equilibrium that the error of the field can cause.
     smallest : float
         Narrower patches and gaps are removed.
     law : EdgeLaw

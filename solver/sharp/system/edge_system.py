@@ -57,7 +57,7 @@ class EdgeSystem(ABC):
 
     @abstractmethod
     def equilibrium(
-        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
+        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, strict: bool
     ) -> Point | None:
         """Iterate for the equilibrium near these gaps.
 

@@ -88,7 +88,7 @@ class HierarchicalSystem(EdgeSystem):
         return by_edge
 
     def equilibrium(
-        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, patient: bool
+        self, gaps: Array, prescribed: float, reach: float, orders: Integers, *, strict: bool
     ) -> Point | None:
         """Iterate for the equilibrium near these gaps, the edges of each gap eliminated."""
         problem = self._problem
@@ -98,7 +98,13 @@ class HierarchicalSystem(EdgeSystem):
             if near is None:
                 break
             found: EquilibriumOfMany = equilibrium_many(
-                near.response, start, prescribed, reach, patient, problem.law, problem.model
+                near.response,
+                start,
+                prescribed,
+                reach,
+                strict,
+                problem.law,
+                problem.model,
             )
             problem.count.newton(found.corrections)
             if found.found:

@@ -7,7 +7,7 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.equilibrium.renewal import settle_response
-from adhesis.solver.sharp.equilibrium.response_setup import respond, respond_again
+from adhesis.solver.sharp.equilibrium.response_setup import set_up_response, update_response
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
@@ -39,7 +39,7 @@ class KeptResponse:
 class KeptResponses:
     """The last linear responses of one problem, each with another number of gaps.
 
-    A jump leads from one number to another, is compared with its rival, and goes on from either.
+    A jump changes the number of gaps, and the end to which equal speeds lead is computed, too.
 
     Parameters
     ----------
@@ -85,12 +85,12 @@ class KeptResponses:
         problem.count.fields += 1
         if self._kept:
             last = self._kept[-1].response
-            response, has_field = respond_again(last, gaps, prescribed, least, law, model)
+            response, has_field = update_response(last, gaps, prescribed, least, law, model)
         else:
             orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
             if len(least) == len(orders):
                 orders = np.maximum(orders, least)
-            response, has_field = respond(gaps, prescribed, orders, law, model)
+            response, has_field = set_up_response(gaps, prescribed, orders, law, model)
         return response if has_field else None
 
     def at(self, gaps: Array, prescribed: float) -> KeptResponse | None:

@@ -101,7 +101,7 @@ def descend_in_window(
         if found.event == NO_FIELD:
             return reached
         everywhere, following = window.extend(inside, orders, prescribed)
-        # not written as > : a motion that is no number is too far
+        # written so that NaN is too far
         is_linear = following <= FURTHEST_FOLLOWING * law.longest_step
         if not (is_linear or (reached is None and not is_first and math.isfinite(following))):
             return reached
