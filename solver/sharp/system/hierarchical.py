@@ -68,7 +68,7 @@ class HierarchicalSystem(EdgeSystem):
     def finer_openings(self, field: GapField) -> Array:
         """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
         if isinstance(field, FieldOfMany):
-            opening = field.held.opening  # a fold needs its responses, too
+            opening = field.fixed_edge_solution.opening  # a fold needs its responses, too
         else:
             opening = self.solution(field.gaps, field.prescribed, FINER_FIELD, 1).opening
         return opening.reshape(-1, 2)
@@ -92,7 +92,7 @@ class HierarchicalSystem(EdgeSystem):
             found: EquilibriumOfMany = equilibrium_many(
                 near.response, start, prescribed, reach, patient, problem.law, problem.model
             )
-            problem.count.newton(found.corrections)
+            problem.count.add_newton(found.corrections)
             if found.found:
                 near.settled = found.gaps
                 return PointOfMany(_Found(problem, prescribed, near.response, found))
@@ -125,7 +125,7 @@ class HierarchicalSystem(EdgeSystem):
             found: Descent = descend_many(
                 near.response, gaps, prescribed, most - fields, equal_speeds, system
             )
-            self._problem.count.descent(found.fields, found.tangents)
+            self._problem.count.add_descent(found.fields, found.tangents)
             fields += found.fields
             tangents += found.tangents
             gaps, orders = found.gaps, found.orders
@@ -145,7 +145,7 @@ class FieldOfMany(GapField):
     """Field of many gaps, each solved by itself in the potential of the others."""
 
     @cached_property
-    def held(self) -> Solution:
+    def fixed_edge_solution(self) -> Solution:
         """Solution of all gaps together, for the responses at held edges, and more accurate."""
         digits = -math.log(FINER_FIELD * self.tolerance)
         model = FieldModel(self.device, digits, GAUSS_RULES, self.source.panels)
