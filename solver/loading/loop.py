@@ -244,7 +244,7 @@ def unload(
         if end < -_FARTHEST * unit:
             raise PathError(
                 f"unloading does not end: surfaces are still in contact at "
-                f"{problem.place(problem.prescribed(end))}, {_FARTHEST:g} times the natural range "
+                f"{problem.describe_prescribed(problem.prescribed(end))}, {_FARTHEST:g} times the natural range "
                 "of the profile; check the units of work_of_adhesion, young and the heights, or "
                 "try the other method"
             )

@@ -305,7 +305,7 @@ class _PathRunner:
                 unit = "Pa" if self.problem.control.is_load else "h_max"
                 raise PathError(
                     f"contact is lost on the way to {point:g} {unit}, at "
-                    f"{self.problem.place(self.problem.prescribed(drive))}, before the path has "
+                    f"{self.problem.describe_prescribed(self.problem.prescribed(drive))}, before the path has "
                     "ended: choose a turning point at which contact lasts, or end the path with out"
                 )
         self.drive = point
