@@ -46,7 +46,7 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.peaks import highest_peaks, parabola_vertex
 from adhesis.solver.runtime.threads import new_lock
 from adhesis.solver.values import ByValue
-from adhesis.solver.views import Shown
+from adhesis.solver.views import NotebookDisplay
 
 __all__ = [
     "BRANCHES",
@@ -182,7 +182,7 @@ class MethodReport:
     chosen: str | None
 
 
-class Method(Shown, ABC):
+class Method(NotebookDisplay, ABC):
     """Base of methods that follow contact states of one problem; see the module's contract.
 
     Parameters

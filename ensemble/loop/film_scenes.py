@@ -14,6 +14,7 @@ import numpy as np
 from adhesis.solver.checks import Bounds, function, whole
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
+from adhesis.solver.loading.path_record import states_before_jumps
 from adhesis.solver.method import ContactState, Method
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Array
@@ -130,17 +131,9 @@ def scenes_of(
 
 def jump_places(result: LoopResult | PathResult) -> list[int]:
     """Return the number of the state before each jump; the next one is that after it."""
-    places = []
-    start = 0
-    here = list(
-        zip(result.branch, result.separation.tolist(), result.contact_fraction, strict=True)
+    return states_before_jumps(
+        result.jumps, result.branch, result.separation, result.contact_fraction
     )
-    for jump in result.jumps:
-        wanted = (jump.branch, jump.separation, jump.contact_before)
-        start = next(k for k in range(start, len(here) - 1) if here[k] == wanted)
-        places.append(start)
-        start += 1
-    return places
 
 
 def _chosen(

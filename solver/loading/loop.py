@@ -36,7 +36,7 @@ Progress = Callable[[Branch, float, ContactState], None]
 
 @contextmanager
 def progress_of(progress: Progress | bool | None, top: float) -> Iterator[Progress | None]:
-    """Return what is called after each load step: what was given, or for True a progress bar.
+    """Return the function to call after each load step: the given one, or for True a bar.
 
     Parameters
     ----------
@@ -242,11 +242,11 @@ def unload(
         i -= stride
         end = axis(i)
         if end < -_FARTHEST * unit:
+            where = problem.describe_prescribed(problem.prescribed(end))
             raise PathError(
-                f"unloading does not end: surfaces are still in contact at "
-                f"{problem.describe_prescribed(problem.prescribed(end))}, {_FARTHEST:g} times the natural range "
-                "of the profile; check the units of work_of_adhesion, young and the heights, or "
-                "try the other method"
+                f"unloading does not end: surfaces are still in contact at {where}, {_FARTHEST:g} "
+                "times the natural range of the profile; check the units of work_of_adhesion, "
+                "young and the heights, or try the other method"
             )
         if first - i >= _STROKES_AT_STEP * axis.load_steps:
             wanted = _LONG_STEP * max(unit, -end) / (axis(i + 1) - end)

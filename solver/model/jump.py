@@ -26,7 +26,7 @@ import numpy as np
 
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.profile import Array, Integers
-from adhesis.solver.views import Shown
+from adhesis.solver.views import NotebookDisplay
 
 Branch = Literal["loading", "unloading"]
 BRANCHES: tuple[Branch, ...] = get_args(Branch)
@@ -39,7 +39,7 @@ SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
 
 
 @dataclass(frozen=True)
-class Jump(Shown):
+class Jump(NotebookDisplay):
     """One jump, at a fixed prescribed value.
 
     Attributes
