@@ -14,7 +14,6 @@ import numpy as np
 from adhesis.solver.checks import Bounds, function, whole
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
-from adhesis.solver.loading.path_record import states_before_jumps
 from adhesis.solver.method import ContactState, Method
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Array
@@ -131,9 +130,7 @@ def scenes_of(
 
 def jump_places(result: LoopResult | PathResult) -> list[int]:
     """Return the number of the state before each jump; the next one is that after it."""
-    return states_before_jumps(
-        result.jumps, result.branch, result.separation, result.contact_fraction
-    )
+    return result.states_before_jumps()
 
 
 def _chosen(

@@ -78,11 +78,7 @@ class Steps:
         self.energy = self.lattice.energy
         self.period = problem.profile.period
         self.problem = problem
-        control, h_max = problem.control, problem.profile.h_max
-        # Range of the prescribed value.
-        self.scale = h_max if control.is_fixed else problem.stress_scale
-        if not (control.is_fixed or control.is_load):
-            self.scale = h_max + problem.stress_scale / control.stiffness
+        self.scale = problem.prescribed_range
         self.adhesion_scale = problem.work_of_adhesion * self.period
         self.openings = Openings(problem, relaxation)
         # Relative error of a drop.

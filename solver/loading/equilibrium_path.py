@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.path_record import Record
+from adhesis.solver.loading.path_record import Record, states_before_jumps
 from adhesis.solver.loading.zero_range import (
     InteriorTension,
     interior_tension,
@@ -157,6 +157,10 @@ class EquilibriumPath(ByValue, ResultViews):
     def energy_at_stake(self) -> float:
         """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
+
+    def states_before_jumps(self) -> list[int]:
+        """Return the index of the state before each jump; the next one is that after it."""
+        return states_before_jumps(self.jumps, self.branch, self.separation, self.contact_fraction)
 
     def range_summary(self) -> str:
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,14 +113,9 @@ class Record:
 
     def copy(self) -> Record:
         """Return a copy with lists of its own."""
-        return Record(
-            self.on_state,
-            list(self.branches),
-            list(self.on_axis),
-            list(self.states),
-            list(self.jumps),
-            self.error,
-        )
+        copied = replace(self, branches=[*self.branches], on_axis=[*self.on_axis])
+        copied.states, copied.jumps = [*self.states], [*self.jumps]
+        return copied
 
     def work(self, problem: Problem) -> float:
         """Compute the work of the driving device, -∫ Y dx over the states, in J/m².

@@ -186,6 +186,12 @@ class Problem(ByValue):
         """
         return -drive if self.control.is_load else self.separation(drive)
 
+    @property
+    def prescribed_range(self) -> float:
+        """Range of x that the profile alone sets, in m, for a load in Pa."""
+        h_max, stiffness = self.profile.h_max, self.control.stiffness
+        return self.stress_scale if self.control.is_load else h_max + self.stress_scale / stiffness
+
     def prescribed_in(self, state: ContactState) -> float:
         """Compute the prescribed value x of the control in a state: in m, for a load in Pa."""
         return self.control.prescribed(state.separation, state.mean_stress)

@@ -95,16 +95,6 @@ def _adhesion_ratio(profile: Profile, critical: float) -> float:
     return float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
 
 
-def _weakness(profile: Profile, critical: float) -> float:
-    """Compute the factor by which weak adhesion needs a finer field: the adhesion ratio, at most 1.
-
-    If it is small, the critical opening is a small difference of the openings caused by roughness,
-    and the loss, of the order of its square, a small difference of two works: the field, and the
-    integral along a branch (of fourth order), have to be as much finer.
-    """
-    return min(1.0, _adhesion_ratio(profile, critical)) if critical > 0 else 1.0
-
-
 class SharpMethod(Method):
     """Contact states with real-valued edges.
 
@@ -135,7 +125,11 @@ class SharpMethod(Method):
         self.q0 = profile.q0
         h_max = profile.h_max * self.q0
         critical = float(4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus)))
-        weak = _weakness(profile, critical)
+        ratio = _adhesion_ratio(profile, critical)
+        # If adhesion is weak, C_c is a small difference of the openings caused by roughness, and
+        # the loss, of the order of its square, a small difference of two works: the field, and the
+        # integral along a branch (of fourth order), have to be as much finer.
+        weak = min(1.0, ratio) if ratio > 0 else 1.0
         # Under a load s goes like a square root before a fold, and the loss of contact depends on
         # it.
         load = problem.control.is_load
@@ -143,7 +137,6 @@ class SharpMethod(Method):
         tolerance = FIELD_ACCURACY * accuracy * weak**2 * finer
         tolerance = float(np.clip(tolerance, LEAST_FIELD_TOLERANCE, LARGEST_FIELD_TOLERANCE))
         # The profile alone fixes the position of a last gap, by openings so much smaller than C_c.
-        ratio = _adhesion_ratio(profile, critical)
         if ratio > 0:
             tolerance = max(min(tolerance, PLACED_BY_PROFILE / ratio), LEAST_FIELD_TOLERANCE)
         # Steps whose work is compared with the energy need an energy that is as exact.
