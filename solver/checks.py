@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,7 +194,7 @@ def number_of(value: object) -> float | int | None:
         if value.ndim > 0 or np.ma.is_masked(value):
             return None
         value = value.item()
-    if isinstance(value, bool | np.bool_):
+    if _is_bool(value):
         return None
     if isinstance(value, numbers.Integral):
         return int(value)
@@ -247,7 +247,7 @@ def whole(name: str, value: object, bounds: Bounds) -> int:
 
 def flag(name: str, value: object) -> bool:
     """Return True or False; TypeError for anything else."""
-    if not isinstance(value, bool | np.bool_):
+    if not _is_bool(value):
         raise TypeError(_sentence(name, value, "True or False"))
     return bool(value)
 
@@ -314,12 +314,12 @@ def row(
             "fill what is missing first"
         )
     if isinstance(values, list | tuple):  # to NumPy [True, 2] is [1, 2], and ["1", 2] are texts
-        for place, value in enumerate(values):
+        for index, value in enumerate(values):
             of_row = isinstance(value, list | tuple | np.ndarray) and np.ndim(value) > 0
             if not of_row and number_of(value) is None:
                 if imaginary and isinstance(value, numbers.Complex) and not _is_bool(value):
                     continue
-                raise TypeError(_sentence(f"{name}[{place}]", value, "a real number"))
+                raise TypeError(_sentence(f"{name}[{index}]", value, "a real number"))
     try:
         array = np.asarray(values)
     except ValueError:
@@ -329,8 +329,8 @@ def row(
     if array.dtype.kind == "O":
         found = [number_of(value) for value in array]
         if None in found:
-            place = found.index(None)
-            raise TypeError(_sentence(f"{name}[{place}]", array[place], "a real number"))
+            index = found.index(None)
+            raise TypeError(_sentence(f"{name}[{index}]", array[index], "a real number"))
         return np.array(found, dtype=np.float64)
     if array.dtype.kind not in ("fiuc" if imaginary else "fiu"):
         kinds = {"b": "booleans", "c": "complex numbers", "U": "texts", "S": "texts"}
@@ -371,7 +371,7 @@ def finite_row(name: str, values: object, *, entry: str = "value") -> NDArray[np
     return array
 
 
-def _is_bool(value: object) -> bool:
+def _is_bool(value: object) -> TypeGuard[bool | np.bool_]:
     return isinstance(value, bool | np.bool_)
 
 

@@ -1,4 +1,4 @@
-"""Crack that opens a patch from inside, where the tension of an interface reaches its strength.
+"""Choose the crack that opens a patch from inside, where tension reaches the strength.
 
 With adhesion of zero range a gap inside a patch grows only beyond a length. On a flat piece under a
 uniform tension σ that is the length of Griffith's crack,
@@ -8,7 +8,7 @@ uniform tension σ that is the length of Griffith's crack,
 from which on G = K²/(2E*) exceeds γ, K² = πσ²l/2. Up to there the energy rises by γl/2: a barrier,
 which an interface of finite range does not have.
 
-Put into a patch is the shortest crack whose G exceeds γ by a tenth at both tips, so that it grows.
+The shortest crack is put into a patch whose G exceeds γ by a tenth at both tips, so that it grows.
 G is that of the field with the crack, all other edges being held: other gaps and the control change
 it, and so does a tension that falls away from its maximum. Both conditions have to hold, strength
 and growth, as in finite fracture mechanics (D. Leguillon, Eur. J. Mech. A 21, 61, 2002). Where no
@@ -26,7 +26,7 @@ import numpy as np
 
 GROWTH = 1.1
 """G/γ of the crack that is put into a patch."""
-LONGEST = 0.25
+LONGEST_TRIAL_HALF_LENGTH = 0.25
 """Half-length of the longest crack, in shortest waves: it is then as long as half a wave."""
 IN_PATCH = 0.8
 """Half-length of the longest crack, over the distance of its middle from the nearest edge."""
@@ -36,6 +36,12 @@ NEAR_STRENGTH = 0.8
 """Smaller maxima of tension, in units of the strength, are not judged."""
 HEALED_TENSION = 1.01
 """A crack that closed again is tried again from this multiple of its tension on."""
+HEALED_PLACE = 0.05
+"""A maximum within so many shortest waves of a crack that closed again is at the same place."""
+MOST_MAXIMA = 32
+"""Maxima of tension of one field that are refined."""
+MOST_OPENINGS = 1000
+"""Openings one after the other at one prescribed value; more are an endless loop."""
 
 _RATIO = 1.1  # of the lengths of cracks that are tried one after the other
 
@@ -52,9 +58,9 @@ class Crack:
     tension : float
         In units of the strength.
     value : float
-        What is left before it opens, in units of the strength: not positive when it is time.
+        Margin before it opens, in units of the strength; not positive if it opens.
     length : float
-        Of the crack; 0 where none is known.
+        Of the crack; 0 if it does not open.
     barrier : float
         Energy per unit depth from the closed patch up to the crack at which G = γ, in units of γ
         times the unit of length.
@@ -82,7 +88,7 @@ def judge_maximum(
     shortest: float,
     longest: float,
 ) -> Crack:
-    """Judge a maximum of tension inside a patch: whether it opens, and with which crack.
+    """Judge whether a patch opens at a maximum of tension, and with which crack.
 
     Parameters
     ----------
@@ -97,7 +103,7 @@ def judge_maximum(
     release : callable
         Returns G/γ of the crack of a half-length, the smaller of those at its two tips.
     shortest, longest : float
-        Half-lengths between which a crack is looked for.
+        Least and largest half-length of a crack.
     """
     share = tension / strength
     first = max(shortest, GROWTH * balanced / tension**2)
@@ -122,20 +128,20 @@ def _barrier(half: list[float], rate: list[float]) -> float:
     """Integrate 2(1 - G/γ) over the half-length of a crack, up to that at which G = γ."""
     last = int(np.argmax(np.array(rate) >= 1))
     share = (1 - rate[last - 1]) / (rate[last] - rate[last - 1])
-    way = [*half[:last], half[last - 1] + share * (half[last] - half[last - 1])]
-    return 2 * float(np.trapezoid([1 - g for g in rate[:last]] + [0.0], way))
+    lengths = [*half[:last], half[last - 1] + share * (half[last] - half[last - 1])]
+    return 2 * float(np.trapezoid([1 - g for g in rate[:last]] + [0.0], lengths))
 
 
 def largest_excess(cracks: list[Crack]) -> list[Crack]:
-    """Return the crack that opens first, and those that equal it; none if none is to open."""
+    """Return the crack that opens first, and those that equal it; none if none opens."""
     least = min((crack.value for crack in cracks), default=1.0)
     return [crack for crack in cracks if crack.value <= min(least + EQUAL_TENSIONS, 0.0)]
 
 
 def has_healed(crack: Crack, healed: list[Crack], near: float, period: float) -> bool:
-    """Whether a crack closed again within ``near`` of this one, at hardly a smaller tension."""
+    """Return whether a crack closed again within ``near`` of this one, at about its tension."""
     for other in healed:
-        apart = (crack.position - other.position + period / 2) % period - period / 2
-        if abs(apart) < near and crack.tension < HEALED_TENSION * other.tension:
+        distance = (crack.position - other.position + period / 2) % period - period / 2
+        if abs(distance) < near and crack.tension < HEALED_TENSION * other.tension:
             return True
     return False

@@ -13,8 +13,9 @@ To add a method, subclass :class:`Method` and keep these promises:
     separation the state only settles (first touch at s = h_max is such a case).
 3.  The path obeys the rules of evolution (docs/methods.md): contact nucleates only where surfaces
     touch; it grows and recedes by energy descent at fixed separation, never over an energy
-    maximum, never leaping over a neighbouring minimum; inside a contact nothing opens; gaps may
-    close, patches merge and vanish.
+    maximum, never leaping over a neighbouring minimum; inside a patch nothing opens unless the
+    tension reaches a finite strength (``Problem.strength``); gaps may close, patches merge and
+    vanish.
 4.  Where the path jumps, ``follow`` returns the states just before and just after, both at the
     separation of the jump as the method located it, and a :class:`~adhesis.solver.model.jump.Jump`
     whose energy drop is computed from the two energies, not from the load curve. Outside jumps the
@@ -42,10 +43,10 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.model.jump import BRANCHES, Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.peaks import highest_peaks
+from adhesis.solver.peaks import highest_peaks, parabola_vertex
 from adhesis.solver.runtime.threads import new_lock
 from adhesis.solver.values import ByValue
-from adhesis.solver.views import Shown
+from adhesis.solver.views import NotebookDisplay
 
 __all__ = [
     "BRANCHES",
@@ -60,8 +61,8 @@ __all__ = [
 ]
 
 
-# Nodes of fields in which tension is looked for, where a method has no grid of its own.
-_PER_WAVE, _FEWEST = 16, 256
+# Nodes of fields in which tension is searched, where a method has no grid of its own.
+_NODES_PER_WAVE, _FEWEST_NODES = 16, 256
 
 
 class PathError(RuntimeError):
@@ -181,7 +182,7 @@ class MethodReport:
     chosen: str | None
 
 
-class Method(Shown, ABC):
+class Method(NotebookDisplay, ABC):
     """Base of methods that follow contact states of one problem; see the module's contract.
 
     Parameters
@@ -230,7 +231,7 @@ class Method(Shown, ABC):
         return partial(type(self), *args, **options)
 
     def __repr__(self) -> str:
-        """One line: the name, and what it solves."""
+        """Return one line with the name and the problem."""
         return f"<method {self.name!r} for {self.problem!r}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -294,7 +295,7 @@ class Method(Shown, ABC):
             None if no state has one: tension falls from the edges inwards, or there is none.
         """
         waves = self.problem.profile.highest_harmonic
-        n = self.nodes or max(_FEWEST, 1 << (_PER_WAVE * waves - 1).bit_length())
+        n = self.nodes or max(_FEWEST_NODES, 1 << (_NODES_PER_WAVE * waves - 1).bit_length())
         best: PatchTension | None = None
         for number, state in enumerate(states):
             fields = self.fields(state, n)
@@ -309,11 +310,11 @@ class Method(Shown, ABC):
 
     def detached(self, separation: float) -> ContactState:
         """Return the state without contact at ``separation`` (m)."""
-        return ContactState(separation, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+        return ContactState.detached(separation)
 
 
 def _maximum_at_nodes(fields: Fields) -> tuple[float, float] | None:
-    """Return place and value of the largest local maximum of tension inside patches.
+    """Return position and value of the largest local maximum of tension inside patches.
 
     A parabola through the node and its neighbours, all of them in contact, refines it.
     """
@@ -322,7 +323,5 @@ def _maximum_at_nodes(fields: Fields) -> tuple[float, float] | None:
     if not found:
         return None
     i = found[0]
-    before, here, after = tension[i - 1], tension[i], tension[(i + 1) % len(tension)]
-    shift = 0.5 * (before - after) / (before - 2 * here + after)
-    position = fields.x[i] + shift * (fields.x[1] - fields.x[0])
-    return float(position), float(here - 0.25 * (before - after) * shift)
+    shift, highest = parabola_vertex(tension[i - 1], tension[i], tension[(i + 1) % len(tension)])
+    return float(fields.x[i] + shift * (fields.x[1] - fields.x[0])), highest

@@ -1,4 +1,4 @@
-"""Local maxima of a periodic row of values that stand out from what lies beside them."""
+"""Find local maxima of a periodic row of values that stand out from their surroundings."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 
 LEAST_PROMINENCE = 0.01
-"""A maximum stands out by this share of its height at least: above the errors of the values."""
+"""Least prominence of a maximum, over its height; smaller ones may be errors of the values."""
 
 
 def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
-    """Return the places of the highest maxima above ``least``, the highest first.
+    """Return the indices of the highest maxima above ``least``, the highest first.
 
     The height of a maximum is that of the parabola through it and its neighbours: where values have
     large and steep minima a maximum can lie well above all values. The prominence of a maximum is
@@ -21,9 +21,9 @@ def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
     Parameters
     ----------
     values : array, shape (n,)
-        Periodic; NaN where there is nothing.
+        Periodic; NaN where there is no value.
     most : int
-        So many maxima at most.
+        Largest number of maxima.
     least : float
         Not negative.
     """
@@ -47,8 +47,19 @@ def highest_peaks(values: Array, most: int, least: float = 0.0) -> list[int]:
     return found
 
 
+def parabola_vertex(before: float, here: float, after: float) -> tuple[float, float]:
+    """Find the maximum of the parabola through three equally spaced values.
+
+    Returns its distance from the middle one, in spacings, and its height; without a maximum 0 and
+    the middle value.
+    """
+    bend = before - 2 * here + after
+    shift = 0.5 * (before - after) / bend if bend < 0 else 0.0
+    return float(shift), float(here - 0.25 * (before - after) * shift)
+
+
 def _least_before_higher(values: Array, height: float) -> float:
-    """Return the least value before one that is higher than ``height``, or is none."""
+    """Return the least value before the first that exceeds ``height`` or is NaN."""
     ends = ~(values <= height)
     stop = int(ends.argmax()) if ends.any() else len(values)
     return float(values[:stop].min(initial=height))

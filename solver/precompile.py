@@ -86,7 +86,7 @@ def warm(
 
 @contextmanager
 def _without_garbage_collection() -> Iterator[None]:
-    """Suspend the search for cycles, which is slow among millions of objects of the compiler."""
+    """Suspend garbage collection, which is slow among millions of objects of the compiler."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -140,7 +140,7 @@ def small_problem(work_of_adhesion: float) -> Problem:
 
 
 def _hierarchical() -> SharpMethod:
-    """Build a method that uses its hierarchical solver from 6 gaps on, and a profile with more."""
+    """Build a method that uses its hierarchical solver from 6 gaps on, for a profile with more."""
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=10, ratio=4, seed=1, h_rms=1e-6)
     method = SharpMethod(Problem(profile, HalfSpace(young=1e6, poisson=0.5), 0.004))
     method.edges.many = 6

@@ -1,4 +1,4 @@
-"""Common base of the dataclasses that hold inputs and results."""
+"""Base of the dataclasses of inputs and results."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from adhesis.solver.views import Shown
+from adhesis.solver.views import NotebookDisplay
 
 T = TypeVar("T", bound="ByValue")
 
-_MANY = 4  # entries of a tuple that are shown
+_LONGEST_TUPLE = 4  # entries of a tuple that are shown in full
 
 
 def finite(value: float) -> float | None:
@@ -20,7 +20,7 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-class ByValue(Shown):
+class ByValue(NotebookDisplay):
     """Read-only arrays, equality by value and a short repr, for a frozen dataclass.
 
     The dataclass is declared with ``eq=False, repr=False``. Two objects are equal if they have the
@@ -99,7 +99,7 @@ def brief(value: Any) -> str:
     """Return a value as text, of arrays and long tuples only the size."""
     if isinstance(value, np.ndarray):
         return f"<array of {' × '.join(map(str, value.shape))}>"
-    if isinstance(value, tuple) and len(value) > _MANY:
+    if isinstance(value, tuple) and len(value) > _LONGEST_TUPLE:
         return f"<{len(value)} in all>"
     if isinstance(value, float):
         return f"{value:.6g}"

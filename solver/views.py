@@ -1,4 +1,4 @@
-"""Figures, films, tables and files of results, and displays: declared here, made elsewhere.
+"""Declare figures, films, tables, files and displays of results, which another module makes.
 
 ``adhesis`` names the module that makes them in :data:`maker` when it is imported; that module, and
 matplotlib with it, is loaded when a result is first shown.
@@ -19,15 +19,15 @@ maker: Callable[[], Any] = _unset
 """Return the module that makes them; ``adhesis/__init__.py`` sets it."""
 
 
-class Shown:
-    """Display in a notebook."""
+class NotebookDisplay:
+    """Base of objects that a notebook displays as HTML."""
 
     def _repr_html_(self) -> str:
         """Return the main numbers, and the figure if there is one, for notebooks."""
         return str(maker().page(self))
 
 
-class Viewed(Shown):
+class ResultViews(NotebookDisplay):
     """Figure, film, tables and file of a loop or path."""
 
     def plot(self) -> Any:

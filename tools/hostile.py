@@ -20,7 +20,7 @@ from adhesis import (
 )
 from adhesis.solver.loading.zero_range import DOUBTFUL_EXCESS
 from adhesis.solver.method import ContactState, PathError
-from adhesis.solver.model.problem import LONGEST_CRACK
+from adhesis.solver.model.problem import LONGEST_GRIFFITH_CRACK
 from adhesis.solver.model.profile import Amplitudes
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.registry import MethodName
@@ -106,7 +106,7 @@ def weakened(scene: Scene) -> Scene:
         max_penetration=scene.max_penetration,
         load_steps=scene.load_steps,
     ).largest_interior_tension
-    longest = LONGEST_CRACK * problem.profile.shortest_wavelength * (1 - 1e-9)
+    longest = LONGEST_GRIFFITH_CRACK * problem.profile.shortest_wavelength * (1 - 1e-9)
     modulus, gamma = problem.half_space.modulus, problem.work_of_adhesion
     least = max(float(np.sqrt(4 * modulus * gamma / (np.pi * longest))), _DECADES * inside)
     if inside <= least:
@@ -196,8 +196,8 @@ def tension_of(
     openings.healed = []
     largest = late = 0.0
     for state in _staying(loop, states):
-        field = method.edges.field(state.internal.gaps, method.states.place(state))
-        least, found = openings.least(field)
+        field = method.edges.field(state.internal.gaps, method.states.prescribed_of(state))
+        least, found = openings.minimum(field)
         largest = max([largest, *(crack.tension for crack in found)])
         late = max(late, -least)
     return largest, late

@@ -130,17 +130,7 @@ def scenes_of(
 
 def jump_places(result: LoopResult | PathResult) -> list[int]:
     """Return the number of the state before each jump; the next one is that after it."""
-    places = []
-    start = 0
-    here = list(
-        zip(result.branch, result.separation.tolist(), result.contact_fraction, strict=True)
-    )
-    for jump in result.jumps:
-        wanted = (jump.branch, jump.separation, jump.contact_before)
-        start = next(k for k in range(start, len(here) - 1) if here[k] == wanted)
-        places.append(start)
-        start += 1
-    return places
+    return result.states_before_jumps()
 
 
 def _chosen(

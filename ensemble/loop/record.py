@@ -18,7 +18,6 @@ from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
-from adhesis.solver.loading.zero_range import range_summary
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Fields, Method
 
 
@@ -137,7 +136,7 @@ def loop_summary(result: LoopResult) -> str:
 
 
 def _range(result: LoopResult | PathResult) -> str:
-    return f"range       {range_summary(result)}"
+    return f"range       {result.range_summary()}"
 
 
 def _audit(result: LoopResult | PathResult) -> str:

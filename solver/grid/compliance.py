@@ -1,4 +1,4 @@
-"""Local compliance S of a node at the edge of a patch.
+"""Compute the local compliance S of a node at the edge of a patch.
 
 Adding the free node j with gap t_j to the contact set costs the elastic energy ½ dx t_j²/S, and
 removing the contact node i with stress σ_i releases ½ dx σ_i² S, both exactly, with
@@ -82,7 +82,6 @@ class EdgeCompliance:
 
     def __init__(self, kernel: Array) -> None:
         self.n = kernel.size
-        self._self = float(kernel[0])
         # Second antidifference F of the kernel, F(k+1) - 2F(k) + F(k-1) = V_k, F even: the sum of
         # V over two blocks of nodes is then a combination of four values of F.
         slope = np.concatenate(([0.5 * kernel[0]], 0.5 * kernel[0] + np.cumsum(kernel[1:])))

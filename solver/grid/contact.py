@@ -1,12 +1,12 @@
-"""Stress of a given set of contact nodes, by preconditioned conjugate gradients.
+"""Solve the stress of a given set of contact nodes by preconditioned conjugate gradients.
 
 With the contact set Ω given, the stress solves V_ΩΩ σ = (h - s)_Ω. V is positive definite on every
 Ω that leaves a node free. The opposite-order operator E*|q|/2, restricted to Ω, is the
 preconditioner: with it the number of iterations grows only like log n (see e.g. Rey, Anciaux &
 Molinari, Comput. Mech. 60 (2017) for FFT contact solvers). Two pairs of transforms an iteration.
 
-If the separation is not fixed (``control``), a second solution, V_ΩΩ σ₁ =
-1, gives the change of the stress with s: σ = σ₀ - (s - s₀) σ₁, with s from the prescribed value.
+If the separation is not fixed (``control``), a second solution, V_ΩΩ σ₁ = 1, gives the change of
+the stress with s: σ = σ₀ - (s - s₀) σ₁, with s from the prescribed value.
 """
 
 from __future__ import annotations

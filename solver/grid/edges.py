@@ -1,4 +1,4 @@
-"""Edges of a contact set, and the energy of moving each of them by one node."""
+"""Compute the energy of moving each edge of a contact set by one node."""
 
 from __future__ import annotations
 
@@ -7,22 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.grid.contact import Contact, Mask
-from adhesis.solver.grid.kernels import edges_of, patches_of
+from adhesis.solver.grid.contact import Contact
+from adhesis.solver.grid.kernels import edges_of, patch_ranges
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.model.profile import Array
 
 Indices = NDArray[np.intp]
-
-
-def patch_ranges(mask: Mask) -> tuple[Indices, Indices]:
-    """Find first node and number of nodes of every patch of a contact set, shape (patches,) each.
-
-    Sorted by the first node; a patch may extend across the end of the period. A contact set without
-    a free node is one patch that starts at node 0.
-    """
-    first, width = patches_of(mask)
-    return first, width
 
 
 @dataclass(frozen=True)
@@ -96,7 +86,7 @@ def survey(contact: Contact, lattice: Lattice, overlap_below: float) -> Edges:
         factor, opening = lattice.extra_compliance(contact, outer)
         s_grow += factor * opening**2
         s_recede += factor * opening**2  # with the opening of the free node next to the one removed
-    t = contact.displacement[outer] - lattice.height[outer] + contact.separation
+    t = lattice.gap(contact, outer)
     growth = dx * (0.5 * t**2 / s_grow - adhesion[outer])
     overlap = t < overlap_below
     # The last free node never joins: the mean gap is the separation, and it is positive.

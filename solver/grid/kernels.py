@@ -9,10 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.model.profile import Array
+from adhesis.solver.model.profile import Array, Integers
 from adhesis.solver.runtime.jit import compiled, compiled_finite_sums
-
-Indices = NDArray[np.int64]
 
 
 @compiled_finite_sums
@@ -114,8 +112,12 @@ def inverse_form(matrix: Array, vector: Array) -> float:
 
 
 @compiled
-def patches_of(mask: NDArray[np.bool_]) -> tuple[Indices, Indices]:
-    """As ``edges.patch_ranges``."""
+def patch_ranges(mask: NDArray[np.bool_]) -> tuple[Integers, Integers]:
+    """Find first node and number of nodes of every patch of a contact set, shape (patches,) each.
+
+    Sorted by the first node; a patch may extend across the end of the period. A contact set without
+    a free node is one patch that starts at node 0.
+    """
     n = mask.size
     count = 0
     for i in range(n):
@@ -137,8 +139,8 @@ def patches_of(mask: NDArray[np.bool_]) -> tuple[Indices, Indices]:
 
 @compiled
 def edges_of(
-    first: Indices, width: Indices, n: int
-) -> tuple[Indices, Indices, Indices, Indices, Indices]:
+    first: Integers, width: Integers, n: int
+) -> tuple[Integers, Integers, Integers, Integers, Integers]:
     """Return side, inner and outer node, width and gap of every edge, as ``edges.Edges``."""
     count = first.size
     out = np.empty((5, 2 * count), dtype=np.int64)

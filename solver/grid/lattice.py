@@ -94,9 +94,9 @@ class Lattice:
         mean_stress = total(contact.stress) / self.n
         return self.control.conjugate(contact.separation, mean_stress, self.h_max)
 
-    def gap(self, contact: Contact) -> Array:
-        """Compute the gap t = v - h + s in m at every node."""
-        return contact.displacement - self.height + contact.separation
+    def gap(self, contact: Contact, nodes: NDArray[np.intp] | slice = slice(None)) -> Array:
+        """Compute the gap t = v - h + s in m at some nodes, by default at all."""
+        return contact.displacement[nodes] - self.height[nodes] + contact.separation
 
     def adhesion_energy(self, contact: Contact) -> float:
         """Compute -Σ γ sqrt(1 + h'²) dx over the contact nodes, in J/m."""

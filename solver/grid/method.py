@@ -16,7 +16,7 @@ from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.path import Counters, Steps
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import mask_of
-from adhesis.solver.method import Branch, ContactState, Fields, Method, MethodReport, Opening, Path
+from adhesis.solver.method import ContactState, Fields, Method, MethodReport, Opening, Path
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.observables import openings_between
 from adhesis.solver.runtime.threads import one_at_a_time
@@ -71,8 +71,6 @@ class GridMethod(Method):
         Least number of nodes per shortest wave. Default: 0.032/accuracy (32 at 1e-3), from 8 to
         256; at 256 the discretisation error is about 1e-4, also for a smaller accuracy. The number
         of nodes is rounded up to a power of two, by default at least 1024.
-    nodes : int, optional
-        Number of nodes, even, instead of the above.
     chosen : str, optional
         See ``method.Method``.
 
@@ -84,6 +82,7 @@ class GridMethod(Method):
     """
 
     name: ClassVar[str] = "grid"
+    nodes: int
     # For smaller γ the loss is below the errors of the two works of which it is the difference;
     # above 1e12 contact lasts to 1e6 h_max, where the gap no longer depends on the profile.
     resolved_adhesion: ClassVar[tuple[float, float]] = (1e-8, 1e12)
@@ -94,7 +93,6 @@ class GridMethod(Method):
         *,
         accuracy: float = 1e-3,
         nodes_per_wave: int | None = None,
-        nodes: int | None = None,
         chosen: str | None = None,
     ) -> None:
         super().__init__(problem, chosen=chosen)
@@ -102,9 +100,8 @@ class GridMethod(Method):
             raise ValueError(f"accuracy is {accuracy!r}: it must lie between 0 and 1")
         profile = problem.profile
         self.accuracy = accuracy
-        self.n = n = _node_count(profile.highest_harmonic, accuracy, nodes_per_wave, nodes)
-        self.nodes = n
-        self.lattice = lattice = Lattice.of(problem, n)
+        self.nodes = _node_count(profile.highest_harmonic, accuracy, nodes_per_wave)
+        self.lattice = lattice = Lattice.of(problem, self.nodes)
         closing = lattice.closing_gap(problem.work_of_adhesion, float(np.sqrt(profile.m4)))
         self.solver = ContactSolver(lattice.elastic, lattice.height, closing, problem.control)
         self.relaxation = Relaxation(
@@ -125,14 +122,12 @@ class GridMethod(Method):
         A state without contact stays without contact down to s = h_max, where the surfaces touch.
         """
         control = self.problem.control
-        branch: Branch = "unloading"
-        if prescribed <= self.problem.prescribed_in(state):
-            branch = "loading"
+        branch = self.problem.branch_to(state, prescribed)
         steps = Steps(self.problem, self.relaxation, self.accuracy, branch, self.count)
         h_max = self.problem.profile.h_max
         if state.patches == 0:
             if prescribed > control.prescribed(h_max, 0.0):
-                apart = state.separation if control.is_load else prescribed
+                apart = self.problem.detached_separation(state, prescribed)
                 return Path((self.detached(apart),), (), 0.0)
             contact = steps.first_touch(h_max)
         else:
@@ -149,10 +144,10 @@ class GridMethod(Method):
         ValueError
             If n does not divide the number of nodes.
         """
-        if n < 1 or self.n % n:
-            raise ValueError(f"fields on {n} nodes: the grid has {self.n}, n must divide that")
+        if n < 1 or self.nodes % n:
+            raise ValueError(f"fields on {n} nodes: the grid has {self.nodes}, n must divide that")
         contact = self._contact(state)
-        pick = slice(None, None, self.n // n)
+        pick = slice(None, None, self.nodes // n)
         gap = self.lattice.gap(contact)
         gap[contact.mask] = 0.0
         return Fields(
@@ -172,7 +167,7 @@ class GridMethod(Method):
         slope = profile.at(state.edges, derivative=1)
         toughness = gamma * np.sqrt(1 + slope**2)
         coefficient = 4 * np.sqrt(toughness / (np.pi * self.problem.half_space.modulus))
-        fields = self.fields(state, self.n)
+        fields = self.fields(state, self.nodes)
         return openings_between(state.edges, fields, coefficient, profile.period)
 
     def report(self) -> GridReport:
@@ -180,8 +175,8 @@ class GridMethod(Method):
         return GridReport(
             name=self.name,
             chosen=self.chosen,
-            nodes=self.n,
-            nodes_per_wave=self.n / max(self.problem.profile.highest_harmonic, 1),
+            nodes=self.nodes,
+            nodes_per_wave=self.nodes / max(self.problem.profile.highest_harmonic, 1),
             accuracy=self.accuracy,
             longest_step=self.relaxation.longest_step,
             sweeps=self.relaxation.sweeps,
@@ -205,24 +200,14 @@ class GridMethod(Method):
         return contact
 
 
-def _node_count(
-    harmonic: int, accuracy: float, nodes_per_wave: int | None, nodes: int | None
-) -> int:
+def _node_count(harmonic: int, accuracy: float, nodes_per_wave: int | None) -> int:
     """Compute the number of nodes of the grid.
 
     Raises
     ------
     ValueError
-        If it is odd or too coarse.
+        If the grid is too coarse.
     """
-    least = _FEWEST_NODES_PER_WAVE * harmonic
-    if nodes is not None:
-        if nodes != int(nodes) or nodes % 2 or nodes < least:
-            raise ValueError(
-                f"nodes is {nodes!r}: the grid needs an even number of at least {least} nodes, "
-                f"{_FEWEST_NODES_PER_WAVE} per shortest wave (harmonic {harmonic})"
-            )
-        return int(nodes)
     if nodes_per_wave is None:
         per_wave = min(max(_FIRST_ORDER / accuracy, _FEWEST_NODES_PER_WAVE), _MOST_NODES_PER_WAVE)
         wanted = max(round(per_wave) * harmonic, _FEWEST_NODES)

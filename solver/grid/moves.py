@@ -29,8 +29,8 @@ class Motion(NamedTuple):
     carried: float
 
 
-Memory = dict[tuple[int, int], Motion]
-"""Motion of the edge with this side and contact node."""
+EdgeMotions = dict[tuple[int, int], Motion]
+"""Last motion of each edge, by its side and contact node."""
 
 
 class Move(NamedTuple):
@@ -53,7 +53,7 @@ def edge_moves(
     edges: Edges,
     lattice: Lattice,
     longest: int,
-    memory: Memory,
+    motions: EdgeMotions,
     blocked: set[Key],
     caution: int,
     equal_speeds: bool,
@@ -74,7 +74,7 @@ def edge_moves(
         key = (side, inner, direction)
         if key in blocked:
             continue
-        before = memory.get((side, inner))
+        before = motions.get((side, inner))
         same = before is not None and before.direction == direction
         length = 2 * before.length if before is not None and same else 1
         available = int(edges.gap[k] if outwards else edges.width[k])
@@ -135,11 +135,11 @@ def _position(edges: Edges, edge: int, lattice: Lattice) -> int:
     return (int(edges.inner[edge]) - lattice.origin) % lattice.n
 
 
-def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[Memory, int]:
+def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[EdgeMotions, int]:
     """Move the edges; return the motion by edge at its new node, and the number of flips."""
     mask, stress = contact.mask, contact.stress
     n = mask.size
-    memory: Memory = {}
+    motions: EdgeMotions = {}
     flips = 0
     for move in moves:
         side = int(edges.side[move.edge])
@@ -154,13 +154,13 @@ def apply_moves(contact: Contact, edges: Edges, moves: list[Move]) -> tuple[Memo
             length = int(np.argmin(np.append(stress[nodes] < 0, False)))
             mask[nodes[:length]] = False
         moved = (inner + move.direction * side * length) % n
-        memory[(side, moved)] = Motion(move.direction, length, move.carried)
+        motions[(side, moved)] = Motion(move.direction, length, move.carried)
         flips += length
     # The last free node never joins.
     if mask.all():
         joined = next(m.edge for m in moves if m.direction > 0 and m.length)
         mask[edges.outer[joined]] = False
-    return memory, flips
+    return motions, flips
 
 
 def join_overlaps(contact: Contact, edges: Edges, lattice: Lattice, longest: int) -> int:

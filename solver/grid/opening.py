@@ -1,4 +1,4 @@
-"""Where patches open inside on a grid: nodes that leave contact, the mirror of nodes that touch."""
+"""Locate cracks that open inside patches of a grid, and insert them by removing nodes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from adhesis.solver.crack import (
+    HEALED_PLACE,
     IN_PATCH,
-    LONGEST,
+    LONGEST_TRIAL_HALF_LENGTH,
+    MOST_MAXIMA,
     NEAR_STRENGTH,
     Crack,
     has_healed,
@@ -21,14 +23,11 @@ from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import EDGE_OFFSET
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.peaks import highest_peaks
-
-_MOST_MAXIMA = 32
-_HEALED_PLACE = 0.05  # of the shortest wave
+from adhesis.solver.peaks import highest_peaks, parabola_vertex
 
 
 class Openings:
-    """Finds maxima of tension inside patches that reach the strength, and opens patches there.
+    """Openings of patches where a maximum of tension inside them reaches the strength.
 
     Parameters
     ----------
@@ -50,22 +49,22 @@ class Openings:
 
     @property
     def is_possible(self) -> bool:
-        """Whether anything opens at all."""
+        """Whether patches may open: the strength is finite."""
         return math.isfinite(self._strength)
 
-    def least(self, contact: Contact) -> tuple[float, list[Crack]]:
+    def minimum(self, contact: Contact) -> tuple[float, list[Crack]]:
         """Return the least value of all maxima of tension of a solved contact, and these maxima."""
         far = 1 - NEAR_STRENGTH
         if not self.is_possible or not contact.mask.any():
             return far, []
         tension = np.where(contact.mask, -contact.stress, np.nan)
-        nodes = highest_peaks(tension, _MOST_MAXIMA, NEAR_STRENGTH * self._strength)
+        nodes = highest_peaks(tension, MOST_MAXIMA, NEAR_STRENGTH * self._strength)
         cracks = [self._crack_at(contact, tension, node) for node in nodes]
-        near, period = _HEALED_PLACE * self._wave, self._lattice.elastic.period
+        near, period = HEALED_PLACE * self._wave, self._lattice.elastic.period
         cracks = [c for c in cracks if not has_healed(c, self.healed, near, period)]
         return min((crack.value for crack in cracks), default=far), cracks
 
-    def seeded(self, contact: Contact, cracks: list[Crack]) -> Contact:
+    def insert_seeds(self, contact: Contact, cracks: list[Crack]) -> Contact:
         """Return an unsolved copy without the nodes of the cracks that open first."""
         opened = contact.copy()
         for crack in largest_excess(cracks):
@@ -80,8 +79,7 @@ class Openings:
     def _crack_at(self, contact: Contact, tension: Array, node: int) -> Crack:
         """Judge the maximum of tension at a node; a parabola through its neighbours refines it."""
         dx, n = self._lattice.dx, self._lattice.n
-        before, here, after = tension[node - 1], tension[node], tension[(node + 1) % n]
-        shift = 0.5 * (before - after) / (before - 2 * here + after)
+        shift, highest = parabola_vertex(tension[node - 1], tension[node], tension[(node + 1) % n])
         # nodes from the middle to the nearest edge
         turned = np.roll(contact.mask, -node)
         free = np.flatnonzero(~turned)
@@ -90,13 +88,13 @@ class Openings:
         position = (node + shift) * dx
         return judge_maximum(
             position,
-            float(here - 0.25 * (before - after) * shift),
+            highest,
             self._strength,
             balanced=2 * self._modulus * self._gamma * toughness / math.pi,
             toughness=toughness,
             release=lambda half: self._release(contact, position, half),
             shortest=(0.5 + EDGE_OFFSET) * dx,
-            longest=min(LONGEST * self._wave, IN_PATCH * edge * dx),
+            longest=min(LONGEST_TRIAL_HALF_LENGTH * self._wave, IN_PATCH * edge * dx),
         )
 
     def _nodes(self, position: float, length: float) -> Indices:

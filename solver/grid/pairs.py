@@ -1,4 +1,4 @@
-"""Pairs of edges that move together: the least stable motions of a contact set.
+"""Compute the energies of pairs of edges that move together, the least stable motions.
 
 Where a patch is about to vanish or a gap to close, its two edges move together; each one alone is
 stabilised by the other, and single moves would follow with a delay of a fraction of a node. The
@@ -36,25 +36,23 @@ class Pair:
         return int(edges.inner[one]), int(edges.inner[two]), self.direction
 
 
-def pairs(
-    contact: Contact, edges: Edges, lattice: Lattice, coupling: float = COUPLING
-) -> list[Pair]:
+def pairs(contact: Contact, edges: Edges, lattice: Lattice) -> list[Pair]:
     """Compute the energies released by the pairs of edges of every patch and gap (J/m).
 
-    Pairs that cannot release energy, even with a relative ``coupling`` in S, are skipped.
+    Pairs that cannot release energy with any possible coupling in S are skipped.
     """
     count = edges.side.size // 2
     dx, adhesion, compliance = lattice.dx, lattice.adhesion, lattice.compliance
     width, left, right = edges.width[:count], edges.gap[:count], edges.gap[count:]
-    t = contact.displacement[edges.outer] - lattice.height[edges.outer] + contact.separation
+    t = lattice.gap(contact, edges.outer)
     pull = contact.stress[edges.inner]
     factor, opening = lattice.extra_compliance(contact, edges.outer)
     found: list[Pair] = []
 
     def may_release(one: int, two: int, cost: Array, nodes: Indices) -> bool:
-        """Return False if the pair cannot release energy with a coupling up to ``coupling``."""
+        """Return False if the pair cannot release energy with a coupling up to ``COUPLING``."""
         adhesive = adhesion[nodes[one]] + adhesion[nodes[two]]
-        return bool(cost[one] + cost[two] < coupling * dx * adhesive)
+        return bool(cost[one] + cost[two] < COUPLING * dx * adhesive)
 
     def add(one: int, two: int, direction: int, s: Array) -> None:
         nodes = edges.outer if direction > 0 else edges.inner

@@ -1,14 +1,14 @@
-"""Follow the path of the method ``grid`` between two separations and locate its jumps."""
+"""Follow the path of the method ``grid`` to a prescribed value, and locate its jumps."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from adhesis.solver.crack import largest_excess
+from adhesis.solver.crack import MOST_OPENINGS, largest_excess
 from adhesis.solver.grid.contact import Contact, Mask
-from adhesis.solver.grid.edges import patch_ranges
+from adhesis.solver.grid.kernels import patch_ranges
 from adhesis.solver.grid.opening import Openings
 from adhesis.solver.grid.relax import Relaxation
 from adhesis.solver.grid.states import state_of
@@ -21,11 +21,10 @@ from adhesis.solver.model.problem import Problem
 _COARSE = 0.6
 _OVERLAP = 1e-6  # of h_max: a smaller overlap counts as touch
 _NEAREST = 1e-8  # of the range: resolution of the location of first touch
-_APART = 0.1  # shortest waves between edges of different minima
-_FEWEST_APART = 2  # nodes
+_LEAST_DISPLACEMENT = 0.1  # shortest waves between edges of different minima
+_FEWEST_NODES_APART = 2
 _STRENGTH_EXCEEDED = 1e-3  # of the strength: by so much a tension may exceed it when it opens
 _LONGEST = 0.05  # of the range: jumps hide in longer steps, where D is smooth by chance
-_MOST_OPENINGS = 1000  # one after the other at one place of a path; more are an endless loop
 
 
 @dataclass
@@ -79,23 +78,19 @@ class Steps:
         self.energy = self.lattice.energy
         self.period = problem.profile.period
         self.problem = problem
-        control, h_max = problem.control, problem.profile.h_max
-        # Range of the prescribed value.
-        self.scale = h_max if control.is_fixed else problem.stress_scale
-        if not (control.is_fixed or control.is_load):
-            self.scale = h_max + problem.stress_scale / control.stiffness
+        self.scale = problem.prescribed_range
         self.adhesion_scale = problem.work_of_adhesion * self.period
-        # Relative error of a drop.
         self.openings = Openings(problem, relaxation)
+        # Relative error of a drop.
         self.coarse = (
             min(1.0, _COARSE * self.lattice.dx / first_width(problem))
             if self.adhesion_scale
             else 0.0
         )
-        # Number of nodes beyond which the displacement of an edge is a run, and that between edges
-        # of two states makes them different minima.
+        # Displacement, in nodes, beyond which an edge has run and two end states are different
+        # minima.
         wave = self.profile.shortest_wavelength / self.lattice.dx
-        self.apart = max(_FEWEST_APART, _APART * wave)
+        self.min_displacement = max(_FEWEST_NODES_APART, _LEAST_DISPLACEMENT * wave)
 
     def first_touch(self, separation: float) -> Contact:
         """Return the contact at the separation at which the highest crests touch."""
@@ -142,7 +137,7 @@ class Steps:
                 self.count.bisections += 1
                 step *= self.share
                 continue
-            excess, _ = self.openings.least(after)
+            excess, _ = self.openings.minimum(after)
             if not located and self._is_late(excess, abs(step)):
                 self.count.bisections += 1
                 step *= min(max(left / (left - excess), 0.02), 0.98) if left > 0 else 0.5
@@ -160,24 +155,24 @@ class Steps:
             self._append(contact)
 
     def _is_late(self, excess: float, stride: float) -> bool:
-        """Whether a step passed an opening, and a shorter one would locate it better."""
+        """Return whether a step passed an opening, and a shorter one would locate it better."""
         return excess < -_STRENGTH_EXCEEDED and stride > 0.05 * self.accuracy * self.scale
 
     def _open(self, contact: Contact) -> tuple[float, Contact]:
-        """Let patches open inside where the tension has reached the strength, one after the other.
+        """Open patches inside where the tension has reached the strength, one after the other.
 
-        Returns the least value of all maxima of tension that is left, and the contact.
+        Returns the least value of all remaining maxima of tension, and the contact.
 
         Raises
         ------
         PathError
             If patches open and close without end.
         """
-        for _ in range(_MOST_OPENINGS):
-            least, cracks = self.openings.least(contact)
+        for _ in range(MOST_OPENINGS):
+            least, cracks = self.openings.minimum(contact)
             if least > 0:
                 return least, contact
-            opened = self.openings.seeded(contact, cracks)
+            opened = self.openings.insert_seeds(contact, cracks)
             self.solver.solve(opened, self.relaxation.tight)
             relaxed = self.relaxation.relax(opened)
             assert relaxed is not None
@@ -214,6 +209,7 @@ class Steps:
         noise = 1e-5 * accuracy * self.adhesion_scale
 
         def jumped(now: float, relaxing: Contact) -> bool:
+            """Return whether the new contact set has less energy already before the step."""
             change = abs(conjugate - self.lattice.conjugate(relaxing))
             return energy - now - work * change > noise
 
@@ -284,32 +280,33 @@ class Steps:
         share = (start[over] + 0.5 * most) / (start[over] - end[over])
         return float(np.clip(share.min(), 0.01, 0.95))
 
-    def _rival(self, start: Contact, after: Contact) -> Contact | None:
-        """Find the minimum under equal edge speeds; None if it is the same one.
+    def _alternative(self, start: Contact, after: Contact) -> Contact | None:
+        """Find the end state reached with equal speeds; None if it is the same minimum.
 
         It can differ only if several edges ran, or surfaces touched.
         """
         if start.mask.any():
             ran = patch_ranges(start.mask ^ after.mask)
-            touched = any(self._apart_from(start.mask, *run) for run in zip(*ran, strict=True))
-            if np.count_nonzero(ran[1] > self.apart) < 2 and not touched:
+            touched = any(self._is_isolated(start.mask, *run) for run in zip(*ran, strict=True))
+            if np.count_nonzero(ran[1] > self.min_displacement) < 2 and not touched:
                 return None
         other = self.relaxation.relax(
-            start, lambda _, running: self._near(running, after), equal_speeds=True
+            start, lambda _, running: self._is_same_minimum(running, after), equal_speeds=True
         )
-        return None if other is None or self._near(other, after) else other
+        return None if other is None or self._is_same_minimum(other, after) else other
 
-    def _near(self, one: Contact, other: Contact) -> bool:
+    def _is_same_minimum(self, one: Contact, other: Contact) -> bool:
         """Return True if no edge is far from its position in the other contact set."""
-        return bool(patch_ranges(one.mask ^ other.mask)[1].max(initial=0) <= self.apart)
+        return bool(patch_ranges(one.mask ^ other.mask)[1].max(initial=0) <= self.min_displacement)
 
     @staticmethod
-    def _apart_from(mask: Mask, first: int, width: int) -> bool:
+    def _is_isolated(mask: Mask, first: int, width: int) -> bool:
         """Return True if a run of joined nodes is not adjacent to a patch of ``mask``."""
         n = mask.size
         return not (mask[first] or mask[first - 1] or mask[(first + width) % n])
 
     def _append(self, contact: Contact) -> ContactState:
+        """Append the state of a relaxed contact, and return it."""
         state = state_of(self.lattice, contact)
         self.states.append(state)
         self.reached = contact.prescribed
@@ -322,7 +319,7 @@ class Steps:
 
         ``barrier`` in J/m² is that of an opening.
         """
-        other = self._rival(start, after)
+        other = self._alternative(start, after)
         lost = self.lattice.control.is_load and not after.mask.any()
         if lost:
             after.separation = before.separation
@@ -332,10 +329,7 @@ class Steps:
             at_stake = abs(self.energy(other) - self.energy(after)) / self.period
         jump = Jump.between(
             before, end, self.branch, self.period, raced=other is not None, at_stake=at_stake,
-            barrier=barrier,
+            barrier=barrier, falls_off=lost,
         )  # fmt: skip
-        if lost:
-            # The work of the load is not counted (adhesis.solver.model.control).
-            jump = replace(jump, energy_drop=before.energy / self.period)
         self.error += self.coarse * abs(jump.energy_drop)
         self.jumps.append(jump)

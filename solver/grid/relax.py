@@ -21,8 +21,8 @@ from adhesis.solver.grid.contact import Contact, ContactSolver
 from adhesis.solver.grid.edges import Edges, Indices, survey
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.moves import (
+    EdgeMotions,
     Key,
-    Memory,
     Move,
     apply_moves,
     edge_moves,
@@ -153,7 +153,7 @@ class Relaxation:
         if nodes.size == 0:
             return False
         lattice = self.lattice
-        gap = contact.displacement[nodes] - lattice.height[nodes] + contact.separation
+        gap = lattice.gap(contact, nodes)
         cost = 0.5 * np.maximum(gap, 0.0) ** 2 / lattice.compliance(0, lattice.n, None)
         nodes = nodes[cost < lattice.adhesion[nodes]]
         contact.mask[nodes] = True
@@ -162,7 +162,14 @@ class Relaxation:
 
 
 class _Descent:
-    """State of one relaxation: present contact, last admissible one, and moves tried from it."""
+    """State of one relaxation: present contact, last admissible one, and moves tried from it.
+
+    Attributes
+    ----------
+    caution : int
+        0: all edges move by their own steps; 1: by one node; k ≥ 2: only the share 2^(1-k) of them
+        that releases most energy.
+    """
 
     def __init__(
         self, rules: Relaxation, contact: Contact, abort: Abort | None, equal_speeds: bool
@@ -176,7 +183,7 @@ class _Descent:
         self.anchor_energy = np.inf
         self.tight_energy = np.inf
         self.tolerance = rules.loose
-        self.memory: Memory = {}
+        self.motions: EdgeMotions = {}
         self.blocked: set[Key] = set()
         self.caution = 0
         self.moves: list[Move] = []
@@ -264,7 +271,7 @@ class _Descent:
             edges,
             self.lattice,
             self.rules.longest_step,
-            self.memory,
+            self.motions,
             self.blocked,
             self.caution,
             self.equal_speeds,
@@ -275,7 +282,7 @@ class _Descent:
             self.paired = bool(self.moves)
         if not self.moves:
             return False
-        self.memory, flips = apply_moves(self.current, edges, self.moves)
+        self.motions, flips = apply_moves(self.current, edges, self.moves)
         self.rules.flips += flips
         return True
 
@@ -295,6 +302,6 @@ class _Descent:
         self.solver.solve(self.current, self.tolerance)
         self.anchor = None
         self.tight_energy = np.inf
-        self.memory.clear()
+        self.motions.clear()
         self.blocked.clear()
         return False

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.edges import Indices, patch_ranges
-from adhesis.solver.grid.kernels import total
+from adhesis.solver.grid.edges import Indices
+from adhesis.solver.grid.kernels import patch_ranges, total
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.method import ContactState
 
@@ -30,7 +30,7 @@ def state_of(lattice: Lattice, contact: Contact) -> ContactState:
     """Make the contact state of a solved contact."""
     first, width = patch_ranges(contact.mask)
     if first.size == 0:
-        return ContactState(contact.separation, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+        return ContactState.detached(contact.separation)
     dx = lattice.dx
     inset = EDGE_OFFSET - 0.5
     left = (first + inset) * dx

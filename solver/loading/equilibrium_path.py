@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from time import process_time
@@ -10,26 +11,25 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.loading.path_record import Record
+from adhesis.solver.checks import counted
+from adhesis.solver.loading.path_record import Record, states_before_jumps
 from adhesis.solver.loading.zero_range import (
     InteriorTension,
-    edge_range,
     interior_tension,
     narrowest_length,
-    valid_range,
 )
 from adhesis.solver.method import ContactState, Method, MethodReport
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue, finite
-from adhesis.solver.views import Viewed
+from adhesis.solver.views import ResultViews
 
 _OF_PROFILE = ("period", "h_max", "h_rms", "m0", "m2", "m4")
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class EquilibriumPath(ByValue, Viewed):
+class EquilibriumPath(ByValue, ResultViews):
     """The states of a path in its order, and the jumps between them; arrays of shape (states,).
 
     Immutable; two results are equal if all fields except ``seconds``, ``method``,
@@ -128,12 +128,15 @@ class EquilibriumPath(ByValue, Viewed):
 
         Infinite if no patch is in tension inside (docs/zero-range.md).
         """
-        return valid_range(self.problem, self.interior)
+        if self.interior is None:
+            return math.inf
+        return self.problem.work_of_adhesion / self.interior.tension
 
     @property
     def edge_range(self) -> float:
         """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
-        return edge_range(self.problem, self.narrowest_length)
+        gamma, modulus = self.problem.work_of_adhesion, self.problem.half_space.modulus
+        return math.sqrt(4 * gamma * self.narrowest_length / (math.pi * modulus))
 
     @property
     def races(self) -> int:
@@ -154,6 +157,31 @@ class EquilibriumPath(ByValue, Viewed):
     def energy_at_stake(self) -> float:
         """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
+
+    def states_before_jumps(self) -> list[int]:
+        """Return the index of the state before each jump; the next one is that after it."""
+        return states_before_jumps(self.jumps, self.branch, self.separation, self.contact_fraction)
+
+    def range_summary(self) -> str:
+        """Return one line for a terminal on the ranges for which the zero-range limit holds."""
+        interior = self.interior
+        strength = self.problem.strength
+        if math.isfinite(strength):
+            range_ = self.problem.work_of_adhesion / strength
+            largest = 0.0 if interior is None else interior.tension
+            return (
+                f"adhesion of a range of {range_:.3g} m: patches open from inside at "
+                f"{strength:.3g} Pa, {counted(self.openings, 'opening')} with barriers of "
+                f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; at "
+                f"edges {self.edge_range:.3g} m"
+            )
+        if interior is None:
+            return "no tension inside patches"
+        return (
+            f"adhesion of a range below {self.valid_range:.3g} m is of zero range here: largest "
+            f"tension inside patches {interior.tension:.3g} Pa, on {interior.branch} at Δ/h_max = "
+            f"{interior.penetration:.4g}; at edges {self.edge_range:.3g} m"
+        )
 
     # ------------------------------------------------------------------ for tables and files
 
@@ -197,8 +225,8 @@ class EquilibriumPath(ByValue, Viewed):
 
     def jump_rows(self) -> list[dict[str, Any]]:
         """Return the jumps with their penetration Δ/h_max, a dictionary for each, in SI units."""
-        place = self.problem.penetration
-        return [asdict(jump) | {"penetration": place(jump.separation)} for jump in self.jumps]
+        penetration = self.problem.penetration
+        return [asdict(jump) | {"penetration": penetration(jump.separation)} for jump in self.jumps]
 
 
 def path_fields(method: Method, record: Record, started: float) -> dict[str, Any]:

@@ -36,7 +36,7 @@ Progress = Callable[[Branch, float, ContactState], None]
 
 @contextmanager
 def progress_of(progress: Progress | bool | None, top: float) -> Iterator[Progress | None]:
-    """Return what is called after each load step: what was given, or for True a progress bar.
+    """Return the function to call after each load step: the given one, or for True a bar.
 
     Parameters
     ----------
@@ -68,9 +68,7 @@ _LONG_STEP = 0.02
 _FARTHEST = 1e7
 
 
-def check_cycle(
-    turning_point: float, load_steps: int, control: Control | None = None
-) -> tuple[float, int]:
+def check_cycle(turning_point: float, load_steps: int, control: Control) -> tuple[float, int]:
     """Check a cycle; return its turning point and load steps as float and int.
 
     Raises
@@ -81,7 +79,6 @@ def check_cycle(
     TypeError
         If one of them is not a number.
     """
-    control = control or Control()
     name, bounds = "max_penetration", FAR_DISPLACEMENT
     if control.is_fixed:
         bounds = MAX_PENETRATION
@@ -237,16 +234,16 @@ def unload(
     first = i = axis.above(turn)
     stride = 1
     ahead = sorted(mark for mark in marks if mark < turn)
-    unit = _natural_range(problem)
+    unit = problem.prescribed_range / (1.0 if problem.control.is_load else problem.profile.h_max)
     while state.patches:
         i -= stride
         end = axis(i)
         if end < -_FARTHEST * unit:
+            where = problem.describe_prescribed(problem.prescribed(end))
             raise PathError(
-                f"unloading does not end: surfaces are still in contact at "
-                f"{problem.place(problem.prescribed(end))}, {_FARTHEST:g} times the natural range "
-                "of the profile; check the units of work_of_adhesion, young and the heights, or "
-                "try the other method"
+                f"unloading does not end: surfaces are still in contact at {where}, {_FARTHEST:g} "
+                "times the natural range of the profile; check the units of work_of_adhesion, "
+                "young and the heights, or try the other method"
             )
         if first - i >= _STROKES_AT_STEP * axis.load_steps:
             wanted = _LONG_STEP * max(unit, -end) / (axis(i + 1) - end)
@@ -260,10 +257,3 @@ def unload(
             state = step(drive)
             if not state.patches:
                 break
-
-
-def _natural_range(problem: Problem) -> float:
-    """Compute the range of the prescribed value set by the profile alone, in h_max or Pa."""
-    if problem.control.is_load:
-        return problem.stress_scale
-    return 1.0 + problem.stress_scale / (problem.control.stiffness * problem.profile.h_max)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from adhesis.solver.checks import choice, counted, reals
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.loading.zero_range import opening_warnings, range_summary, range_warnings
+from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
 from adhesis.solver.method import Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch
@@ -155,7 +155,7 @@ class LoopResult(EquilibriumPath):
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
                 f"sum of drops {self.loss_from_drops:.5g} J/m²",
-                f"range      {range_summary(self)}",
+                f"range      {self.range_summary()}",
                 f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
                 f"pull-off   {self.pull_off_stress:.4g} Pa, "
                 f"out of contact at Δ/h_max = {self.pull_off_penetration:.4g}",

@@ -1,4 +1,4 @@
-"""Loading paths with several turning points, and the minor loops that they close.
+"""Follow loading paths with several turning points, and the minor loops that they close.
 
 A path starts at first touch, goes from one turning point to the next, loading and unloading in
 turn, and ends at the last one or out of contact. A leg that comes back to the start of the previous
@@ -31,14 +31,14 @@ from adhesis.solver.method import ContactState, Method, PathError
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
-from adhesis.solver.views import Shown
+from adhesis.solver.views import NotebookDisplay
 
 _SHOWN = 6  # turning points of a path in its repr
 _SAME = 1e-6  # least change of stress or contact, relative to its range on the loop, that counts
 
 
 @dataclass(frozen=True)
-class MinorLoop(Shown):
+class MinorLoop(NotebookDisplay):
     """Part of a path that leaves a turning point and comes back to it.
 
     Attributes
@@ -139,7 +139,7 @@ class PathResult(EquilibriumPath):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what makes the work doubtful; none for most paths."""
+        """Reasons to doubt the work, one sentence each; none for most paths."""
         lost = self.loss_from_drops
         found = range_warnings(self.problem, self.valid_range, lost, self.contact_fraction)
         return (*found, *opening_warnings(self.jumps, lost))
@@ -181,7 +181,7 @@ class PathResult(EquilibriumPath):
 def check_path(
     turning_points: Sequence[float], load_steps: int, problem: Problem, out: bool = False
 ) -> tuple[float, ...]:
-    """Check a path and return its turning points; ``out`` says that it ends out of contact.
+    """Check a path, which ends out of contact if ``out``, and return its turning points.
 
     Raises
     ------
@@ -225,7 +225,7 @@ def run_path(
     progress: Progress | bool | None = None,
     on_state: Callable[[Branch, ContactState], None] | None = None,
 ) -> PathResult:
-    """Follow a path from first touch through the turning points, and out of contact.
+    """Follow a path from first touch through the turning points, and unload until detached.
 
     Parameters
     ----------
@@ -262,14 +262,14 @@ def run_path(
     with progress_of(progress, max(points)) as report:
         runner = _PathRunner(method, Axis(max(points), load_steps), Record(on_state), report)
         for point in points:
-            runner.to(point)
+            runner.follow_leg(point)
         if out:
-            runner.out()
+            runner.unload()
     return runner.result(points, load_steps, started)
 
 
 @dataclass
-class _Turn:
+class _OpenTurn:
     """A turning point that a later leg may come back to, with the index of its state."""
 
     drive: float
@@ -288,32 +288,33 @@ class _PathRunner:
         self.jump_legs: list[int] = []
         self.jump_steps: list[int] = []  # for each jump, the states before its load step
         self.minor: list[MinorLoop] = []
-        self.open: list[_Turn] = []
+        self.open_turns: list[_OpenTurn] = []
         self.leg = -1
         self.drive = 0.0
         self.state = method.detached(method.problem.profile.h_max)
 
-    def to(self, point: float) -> None:
-        """Follow one leg."""
+    def follow_leg(self, point: float) -> None:
+        """Follow one leg, to the turning point ``point``."""
         branch: Branch = "loading" if point > self.drive or self.leg < 0 else "unloading"
         self._begin(branch)
-        marks = [turn.drive for turn in self.open]
+        marks = [turn.drive for turn in self.open_turns]
         drives = self.axis.between(self.drive, point, marks)
         for drive in drives[1:] if self.leg else drives:  # the first leg begins with first touch
             self._step(branch, drive)
             if not self.state.patches and self.leg > 0:
                 unit = "Pa" if self.problem.control.is_load else "h_max"
+                where = self.problem.describe_prescribed(self.problem.prescribed(drive))
                 raise PathError(
-                    f"contact is lost on the way to {point:g} {unit}, at "
-                    f"{self.problem.place(self.problem.prescribed(drive))}, before the path has "
-                    "ended: choose a turning point at which contact lasts, or end the path with out"
+                    f"contact is lost on the way to {point:g} {unit}, at {where}, before the path "
+                    "has ended: choose a turning point at which contact lasts, or end the path "
+                    "with out"
                 )
         self.drive = point
 
-    def out(self) -> None:
+    def unload(self) -> None:
         """Unload until contact is lost, as a loop does."""
         self._begin("unloading")
-        marks = [turn.drive for turn in self.open[:-1]]
+        marks = [turn.drive for turn in self.open_turns[:-1]]
         unload(
             self.problem,
             self.axis,
@@ -327,11 +328,12 @@ class _PathRunner:
         """Start a leg with the state at the turning point, which belongs to both legs."""
         self.leg += 1
         if self.record.states:
-            self.open.append(_Turn(self.drive, len(self.record.states)))
+            self.open_turns.append(_OpenTurn(self.drive, len(self.record.states)))
         self.record.visit(branch, self.leg > 0, self.state)
         self.legs.append(self.leg)
 
     def _step(self, branch: Branch, drive: float) -> ContactState:
+        """Follow one load step, and record the minor loops that it closes."""
         path = self.method.follow(self.state, self.problem.prescribed(drive))
         self.jump_steps += [len(self.record.states)] * len(path.jumps)
         self.jump_legs += [self.leg] * len(path.jumps)
@@ -339,12 +341,12 @@ class _PathRunner:
         self.legs += [self.leg] * len(path.states)
         if self.progress is not None:
             self.progress(branch, drive, self.state)
-        while len(self.open) > 1 and drive == self.open[-2].drive:
-            self._close(self.open[-2], self.open[-1])
-            del self.open[-2:]
+        while len(self.open_turns) > 1 and drive == self.open_turns[-2].drive:
+            self._close(self.open_turns[-2], self.open_turns[-1])
+            del self.open_turns[-2:]
         return self.state
 
-    def _close(self, start: _Turn, turn: _Turn) -> None:
+    def _close(self, start: _OpenTurn, turn: _OpenTurn) -> None:
         """Record the minor loop from ``start`` over ``turn`` to the last state."""
         record, period = self.record, self.problem.profile.period
         part = record.slice(start.state)

@@ -1,12 +1,13 @@
-"""Record of a path: its states in order, its jumps, and the work along it."""
+"""Record the states and jumps of a path in order, and compute the work along it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.solver.method import ContactState, Path, PathError
 from adhesis.solver.model.jump import Branch, Jump
@@ -96,6 +97,11 @@ class Record:
         """Return one attribute of every state, shape (states,)."""
         return np.array([getattr(state, name) for state in self.states])
 
+    def before_jumps(self) -> list[int]:
+        """Return the index of the state before each jump; the next one is that after it."""
+        separation, contact = self.column("separation"), self.column("contact_fraction")
+        return states_before_jumps(self.jumps, self.branches, separation, contact)
+
     def slice(self, first: int, stop: int | None = None) -> Record:
         """Return a record of the states from index ``first`` up to ``stop``, without jumps."""
         part = slice(first, stop)
@@ -107,14 +113,9 @@ class Record:
 
     def copy(self) -> Record:
         """Return a copy with lists of its own."""
-        return Record(
-            self.on_state,
-            list(self.branches),
-            list(self.on_axis),
-            list(self.states),
-            list(self.jumps),
-            self.error,
-        )
+        copied = replace(self, branches=[*self.branches], on_axis=[*self.on_axis])
+        copied.states, copied.jumps = [*self.states], [*self.jumps]
+        return copied
 
     def work(self, problem: Problem) -> float:
         """Compute the work of the driving device, -∫ Y dx over the states, in J/m².
@@ -141,6 +142,27 @@ class Record:
             control.conjugate(separation, mean_stress, h_max),
             self.column("stiffness"),
         )
+
+
+def states_before_jumps(
+    jumps: Sequence[Jump],
+    branch: Sequence[str] | NDArray[np.str_],
+    separation: Array,
+    contact: Array,
+) -> list[int]:
+    """Return the index of the state before each jump of a path; the next one is that after it.
+
+    ``contact`` is A/A0; it, the branch and the separation have the shape (states,).
+    """
+    before = (np.asarray(column).tolist() for column in (branch, separation, contact))
+    pairs = list(zip(*before, np.asarray(contact)[1:].tolist(), strict=False))
+    found = [0]
+    for jump in jumps:
+        wanted = (jump.branch, jump.separation, jump.contact_before, jump.contact_after)
+        found.append(
+            next((k for k in range(found[-1], len(pairs)) if pairs[k] == wanted), len(pairs) - 1)
+        )
+    return found[1:]
 
 
 def integral(prescribed: Array, conjugate: Array, stiffness: Array) -> float:

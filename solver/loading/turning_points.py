@@ -21,7 +21,7 @@ from adhesis.solver.model.jump import Branch
 
 
 class LoadingBranch:
-    """Loading branch followed on demand, from whose turning points loops unload.
+    """Loading branch that is followed on demand, with loops that unload from its turning points.
 
     A loop depends on the turning points and marks of the branch, but not on which of them are used,
     nor on earlier computations.
@@ -76,7 +76,7 @@ class LoadingBranch:
         self._seconds = 0.0
         self._error: PathError | None = None
 
-    def to(self, turn: float, progress: Progress | None = None) -> None:
+    def advance_to(self, turn: float, progress: Progress | None = None) -> None:
         """Follow the branch to a turning point, unless it is already there or beyond.
 
         Raises
@@ -137,7 +137,7 @@ class LoadingBranch:
         PathError
             As in :func:`adhesis.solver.loading.loop.run_loop`.
         """
-        self.to(turn, progress)
+        self.advance_to(turn, progress)
         if self._drives[self._passed - 1] != turn:
             raise ValueError(f"this loading branch has passed {turn!r}")
         started = process_time() - self._seconds

@@ -1,4 +1,4 @@
-"""Where the zero-range limit ends: the largest tension inside patches, and the ranges it allows.
+"""Compute the limits of the zero-range model: tension inside patches, and the ranges it allows.
 
 A zero range of adhesion is an infinite strength: inside a contact nothing opens, whatever the
 tension there. An interface of range δ gives way near σ_th = γ/δ. So with σ_in the largest local
@@ -22,14 +22,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.checks import counted
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.method import ContactState, Method
+from adhesis.solver.method import Method
 from adhesis.solver.model.jump import Branch, Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
@@ -42,13 +41,13 @@ DOUBTFUL_LOSS = 20.0
 
 DOUBTFUL_EXCESS = 1.01
 """Tension inside patches over a finite strength above which a loss is doubtful: a hundredth is
-what a crack that closed again waits for (``solver.crack.HEALED_TENSION``)."""
+the excess at which a crack that closed again is retried (``solver.crack.HEALED_TENSION``)."""
 
 DOUBTFUL_BARRIER = 0.1
 """Barriers of all openings over the loss above which a loss is doubtful (docs/zero-range.md)."""
 
-# Tension is looked at before so many jumps of unloading, those with the largest drops: what carries
-# the largest tension is what gives way with a large drop. And at so many states of the whole path.
+# Number of jumps of unloading before which tension is searched, those with the largest drops: where
+# tension is largest, contact is lost with a large drop. And number of states of the whole path.
 _JUMPS, _SAMPLES = 16, 6
 _MOST_OF_LOSS = 0.9
 _SAME = 1e-9  # of the period: edges that differ by less have not moved
@@ -84,89 +83,69 @@ def interior_tension(method: Method, record: Record) -> InteriorTension | None:
     """Find the largest tension inside patches on a path; None if there is none.
 
     With zero range the states before the sixteen jumps of unloading with the largest drops are
-    looked at, and six states evenly spaced on the path. At a finite strength it is all states but
-    those that a jump led to and from which patches open at once. Without adhesion nothing is in
+    searched, and six states evenly spaced on the path. At a finite strength all states are searched
+    but those at the end of a jump from which patches open at once. Without adhesion nothing is in
     tension.
     """
     if method.problem.work_of_adhesion == 0:
         return None
     opens = math.isfinite(method.problem.strength)
-    places = _without_passed(method.problem, record) if opens else _sampled(record)
-    places = [place for place in places if record.states[place].patches]
-    found = method.largest_tension([record.states[place] for place in places])
+    indices = _persistent_states(method.problem, record) if opens else _sampled(record)
+    indices = [index for index in indices if record.states[index].patches]
+    found = method.largest_tension([record.states[index] for index in indices])
     if found is None:
         return None
-    place = places[found.state]
-    separation = record.states[place].separation
+    index = indices[found.state]
+    separation = record.states[index].separation
     return InteriorTension(
         tension=found.tension,
         position=found.position,
-        branch=record.branches[place],
+        branch=record.branches[index],
         penetration=float(method.problem.penetration(separation)),
     )
 
 
 def _sampled(record: Record) -> list[int]:
-    """Return the places of the states that are looked at where nothing opens."""
+    """Return the indices of the states that are searched where nothing opens."""
     starts = [
-        (jump.energy_drop, place)
-        for jump, place in zip(record.jumps, jump_places(record), strict=True)
+        (jump.energy_drop, index)
+        for jump, index in zip(record.jumps, record.before_jumps(), strict=True)
         if jump.branch == "unloading"
     ]
     starts.sort(key=lambda entry: -entry[0])
     spaced = np.linspace(0, len(record.states) - 1, _SAMPLES + 2)[1:-1].astype(int)
-    return sorted({*(place for _, place in starts[:_JUMPS]), *spaced.tolist()})
+    return sorted({*(index for _, index in starts[:_JUMPS]), *spaced.tolist()})
 
 
-def _without_passed(problem: Problem, record: Record) -> list[int]:
-    """Return the places of all states but those at which a path does not stay.
+def _persistent_states(problem: Problem, record: Record) -> list[int]:
+    """Return the indices of the states that are not left at the same prescribed value.
 
-    A jump led to them, and an opening starts from them at the same prescribed value.
+    The others are the end of a jump and the start of an opening at once.
     """
     opened = {(j.separation, j.contact_before) for j in record.jumps if j.kind == "opening"}
     out = []
     before = math.nan
-    for place, state in enumerate(record.states):
+    for index, state in enumerate(record.states):
         prescribed = problem.prescribed_in(state)
         stays = (state.separation, state.contact_fraction) not in opened
         if stays or not math.isclose(before, prescribed, rel_tol=_ROUNDED):
-            out.append(place)
+            out.append(index)
         before = prescribed
     return out
-
-
-def jump_places(record: Record) -> list[int]:
-    """Return the place among the states of the one from which each jump starts."""
-    out = []
-    place = 0
-    states = record.states
-    for jump in record.jumps:
-        while place < len(states) - 2 and not _joins(jump, states[place], states[place + 1]):
-            place += 1
-        out.append(place)
-    return out
-
-
-def _joins(jump: Jump, before: ContactState, after: ContactState) -> bool:
-    return (
-        before.contact_fraction == jump.contact_before
-        and after.contact_fraction == jump.contact_after
-        and before.separation == jump.separation
-    )
 
 
 def narrowest_length(problem: Problem, record: Record) -> float:
     """Return the shortest length in m that decides where edges stand; see the module."""
     shortest = problem.profile.shortest_wavelength
     order = sorted(
-        zip(record.jumps, jump_places(record), strict=True), key=lambda one: -one[0].energy_drop
+        zip(record.jumps, record.before_jumps(), strict=True), key=lambda one: -one[0].energy_drop
     )
     rest = _MOST_OF_LOSS * sum(jump.energy_drop for jump, _ in order)
-    for jump, place in order:
+    for jump, index in order:
         if rest <= 0:
             break
         rest -= jump.energy_drop
-        before, after = record.states[place].edges, record.states[place + 1].edges
+        before, after = record.states[index].edges, record.states[index + 1].edges
         shortest = min(shortest, _narrowest_moved(before, after, problem.profile.period))
     return shortest
 
@@ -175,14 +154,14 @@ def _narrowest_moved(before: Array, after: Array, period: float) -> float:
     """Return the least length of the patches and gaps of ``before`` beside edges that move."""
     if not len(before):
         return math.inf
-    places = np.sort(after.ravel() % period)
-    places = np.concatenate([places[-1:] - period, places, places[:1] + period])
+    others = np.sort(after.ravel() % period)
+    others = np.concatenate([others[-1:] - period, others, others[:1] + period])
     edges = before.ravel() % period
-    right = np.searchsorted(places, edges).clip(1, max(len(places) - 1, 1))
-    if len(places) < 2:
+    right = np.searchsorted(others, edges).clip(1, max(len(others) - 1, 1))
+    if len(others) < 2:
         moved = np.ones(edges.shape, dtype=bool)
     else:
-        nearest = np.minimum(np.abs(edges - places[right - 1]), np.abs(edges - places[right]))
+        nearest = np.minimum(np.abs(edges - others[right - 1]), np.abs(edges - others[right]))
         moved = nearest > _SAME * period
     patch = before[:, 1] - before[:, 0]
     gap = np.append(before[1:, 0], before[0, 0] + period) - before[:, 1]  # right of each patch
@@ -191,76 +170,8 @@ def _narrowest_moved(before: Array, after: Array, period: float) -> float:
     return float(np.concatenate(lengths).min(initial=math.inf))
 
 
-def valid_range(problem: Problem, interior: InteriorTension | None) -> float:
-    """Return γ/σ_in in m; infinite without tension inside patches."""
-    return math.inf if interior is None else problem.work_of_adhesion / interior.tension
-
-
-def edge_range(problem: Problem, narrowest: float) -> float:
-    """Return the range in m whose cohesive zone is as long as ``narrowest`` (m)."""
-    return math.sqrt(
-        4 * problem.work_of_adhesion * narrowest / (math.pi * problem.half_space.modulus)
-    )
-
-
-class HasRanges(Protocol):
-    """A loop or a path."""
-
-    @property
-    def problem(self) -> Problem:
-        """What was solved."""
-        ...
-
-    @property
-    def openings(self) -> int:
-        """Number of openings from inside."""
-        ...
-
-    @property
-    def barrier(self) -> float:
-        """Sum of their barriers, in J/m²."""
-        ...
-
-    @property
-    def interior(self) -> InteriorTension | None:
-        """Largest tension inside patches."""
-        ...
-
-    @property
-    def valid_range(self) -> float:
-        """Range allowed by it, in m."""
-        ...
-
-    @property
-    def edge_range(self) -> float:
-        """Range allowed at edges, in m."""
-        ...
-
-
-def range_summary(result: HasRanges) -> str:
-    """Return in a line for a terminal below which ranges of adhesion the zero-range limit holds."""
-    interior = result.interior
-    strength = result.problem.strength
-    if math.isfinite(strength):
-        range_ = result.problem.work_of_adhesion / strength
-        largest = 0.0 if interior is None else interior.tension
-        return (
-            f"adhesion of a range of {range_:.3g} m: patches open from inside at {strength:.3g} "
-            f"Pa, {counted(result.openings, 'opening')} with barriers of {result.barrier:.2g} "
-            f"J/m²; largest tension inside patches {largest:.3g} Pa; at edges "
-            f"{result.edge_range:.3g} m"
-        )
-    if interior is None:
-        return "no tension inside patches"
-    return (
-        f"adhesion of a range below {result.valid_range:.3g} m is of zero range here: largest "
-        f"tension inside patches {interior.tension:.3g} Pa, on {interior.branch} at Δ/h_max = "
-        f"{interior.penetration:.4g}; at edges {result.edge_range:.3g} m"
-    )
-
-
 def opening_warnings(jumps: Sequence[Jump], loss: float) -> list[str]:
-    """Return the sentence of doubt where barriers of openings are not small beside the loss.
+    """Return a warning if the barriers of openings are not small beside the loss.
 
     Parameters
     ----------
@@ -286,7 +197,7 @@ def beyond_limit(
     strength: Any = math.inf,
     barrier: Any = 0.0,
 ) -> NDArray[np.bool_]:
-    """Return which losses zero range alone makes so large; values or arrays of one shape.
+    """Mark the losses that zero range alone makes so large; values or arrays of one shape.
 
     Their valid range is below :data:`DOUBTFUL_RANGE`, or they are more than :data:`DOUBTFUL_LOSS`
     times the work of adhesion of the largest contact. At a finite strength it is those at which
@@ -305,7 +216,7 @@ def beyond_limit(
 def range_warnings(
     problem: Problem, range_: float, loss: float, contact_fraction: Sequence[float] | Array
 ) -> list[str]:
-    """Return the sentences of doubt where a loss is that of the zero-range limit alone.
+    """Return warnings if a loss is that of the zero-range limit alone.
 
     At a finite strength patches open from inside; doubtful is then a tension that exceeds it where
     no crack grows.

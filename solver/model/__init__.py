@@ -1,4 +1,4 @@
-"""The scene and its states: profile, half-space, control, problem, contact state, jump.
+"""Problem and its states: profile, half-space, control, problem, contact state, jump.
 
 Import from its modules.
 """

@@ -1,9 +1,11 @@
-"""Equilibrium contact states, as returned by every method."""
+"""Equilibrium contact state, as returned by every method."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.values import ByValue
@@ -50,6 +52,11 @@ class ContactState(ByValue):
     stiffness: float = float("nan")
     hold_energy: float = 0.0
     internal: Any = field(default=None, repr=False, compare=False)
+
+    @classmethod
+    def detached(cls, separation: float) -> ContactState:
+        """Make the state without contact at ``separation`` (m)."""
+        return cls(separation, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
 
     @property
     def patches(self) -> int:

@@ -28,13 +28,13 @@ from typing import TypeVar
 
 from adhesis.solver.checks import STIFFNESS, real
 from adhesis.solver.model.profile import Array
-from adhesis.solver.views import Shown
+from adhesis.solver.views import NotebookDisplay
 
 Value = TypeVar("Value", float, Array)
 
 
 @dataclass(frozen=True)
-class Control(Shown):
+class Control(NotebookDisplay):
     """Choice of the prescribed value of a path.
 
     Parameters

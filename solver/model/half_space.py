@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adhesis.solver.checks import LENGTH, POISSON, YOUNG, real
-from adhesis.solver.views import Shown
+from adhesis.solver.views import NotebookDisplay
 
 
 @dataclass(frozen=True)
-class HalfSpace(Shown):
+class HalfSpace(NotebookDisplay):
     """Linear elastic, homogeneous, isotropic half-space in plane strain.
 
     Parameters

@@ -23,14 +23,10 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesis.solver.model.contact_state import ContactState
-from adhesis.solver.model.profile import Array
-from adhesis.solver.views import Shown
-
-Integers = NDArray[np.int64]
-
+from adhesis.solver.model.profile import Array, Integers
+from adhesis.solver.views import NotebookDisplay
 
 Branch = Literal["loading", "unloading"]
 BRANCHES: tuple[Branch, ...] = get_args(Branch)
@@ -43,7 +39,7 @@ SMALL_SCALE: frozenset[JumpKind] = frozenset({"spreading", "receding"})
 
 
 @dataclass(frozen=True)
-class Jump(Shown):
+class Jump(NotebookDisplay):
     """One jump, at a fixed prescribed value.
 
     Attributes
@@ -101,6 +97,7 @@ class Jump(Shown):
         raced: bool = False,
         at_stake: float = 0.0,
         barrier: float = 0.0,
+        falls_off: bool = False,
     ) -> Jump:
         """Make the jump from one contact state to another at the same prescribed value.
 
@@ -112,6 +109,9 @@ class Jump(Shown):
             λ in m.
         raced, at_stake, barrier
             As in the class; a jump with a barrier is an opening.
+        falls_off : bool
+            Whether the solid falls off under a load, whose own work is then not counted: the drop
+            is U before (:mod:`adhesis.solver.model.control`).
         """
         kind, length = classify(before.edges, after.edges, period)
         if barrier > 0:
@@ -119,7 +119,8 @@ class Jump(Shown):
         return cls(
             branch=branch,
             separation=before.separation,
-            energy_drop=(before.potential - after.potential) / period,
+            energy_drop=(before.energy if falls_off else before.potential - after.potential)
+            / period,
             kind=kind,
             patches_before=before.patches,
             patches_after=after.patches,

@@ -21,6 +21,8 @@ CONTINUATIONS: tuple[Continuation, ...] = get_args(Continuation)
 # Bands of the averaged spectrum per factor of two in wavelength.
 _BANDS_PER_OCTAVE = 4
 
+_HIGHEST_FORM = 12  # degree up to which a form stands out from roughness
+
 # Least ratio of the mean power in the last quarter of the band to the quarter before that counts as
 # white noise (ratio 1). The power of roughness falls at least as 1/q (ratio at most 0.7).
 _FLAT = 0.8
@@ -43,13 +45,13 @@ def polynomial_form(heights: Array, degree: int) -> Array:
     return np.asarray(legendre.legval(x, series))
 
 
-def form_shares(heights: Array, most: int = 12) -> Array:
-    """Compute the mean square height in m² of each Legendre polynomial of degree 0 … most.
+def form_shares(heights: Array) -> Array:
+    """Compute the mean square height in m² of each Legendre polynomial of degree 0 … 12.
 
     The coefficients are those of one least-squares fit; a form (tilt, bow) stands out at its
     degree, roughness is spread over the high degrees.
     """
-    degree = min(most, heights.size - 2)
+    degree = min(_HIGHEST_FORM, heights.size - 2)
     series = legendre.legfit(np.linspace(-1.0, 1.0, heights.size), heights, degree)
     return np.asarray(series**2 / (2 * np.arange(degree + 1) + 1))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import InitVar, dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -17,15 +17,15 @@ from adhesis.solver.checks import (
     plain,
     real,
 )
+from adhesis.solver.crack import griffith_length
 from adhesis.solver.model.contact_state import ContactState
-from adhesis.solver.model.control import Control
+from adhesis.solver.model.control import Control, Value
 from adhesis.solver.model.half_space import HalfSpace
-from adhesis.solver.model.profile import Array, Profile
+from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.profile import Profile
 from adhesis.solver.values import ByValue
 
-Value = TypeVar("Value", float, Array)
-
-LONGEST_CRACK = 0.25
+LONGEST_GRIFFITH_CRACK = 0.25
 """Length of the longest Griffith crack that may open a patch, in shortest waves."""
 
 # Rounding of a separation over h_max: smaller penetrations count as 0.
@@ -131,7 +131,7 @@ class Problem(ByValue):
 
     def _check_strength(self, adhesion_range: float | None) -> None:
         """Refuse a strength at which a crack as long as the waves would have to be put."""
-        most = LONGEST_CRACK * self.profile.shortest_wavelength
+        most = LONGEST_GRIFFITH_CRACK * self.profile.shortest_wavelength
         if math.isinf(self.strength) or self.critical_crack <= most:
             return
         least = math.sqrt(4 * self.half_space.modulus * self.work_of_adhesion / (math.pi * most))
@@ -152,8 +152,7 @@ class Problem(ByValue):
 
         Under a uniform tension σ_th a longer gap inside a patch grows, a shorter one closes.
         """
-        modulus = self.half_space.modulus
-        return 4 * modulus * self.work_of_adhesion / (math.pi * self.strength**2)
+        return griffith_length(self.strength, self.half_space.modulus, self.work_of_adhesion)
 
     @property
     def stress_scale(self) -> float:
@@ -187,22 +186,39 @@ class Problem(ByValue):
         """
         return -drive if self.control.is_load else self.separation(drive)
 
+    @property
+    def prescribed_range(self) -> float:
+        """Range of x that the profile alone sets, in m, for a load in Pa."""
+        h_max, stiffness = self.profile.h_max, self.control.stiffness
+        return self.stress_scale if self.control.is_load else h_max + self.stress_scale / stiffness
+
     def prescribed_in(self, state: ContactState) -> float:
         """Compute the prescribed value x of the control in a state: in m, for a load in Pa."""
         return self.control.prescribed(state.separation, state.mean_stress)
+
+    def branch_to(self, state: ContactState, prescribed: float) -> Branch:
+        """Return the branch of a path from a state to x = ``prescribed``."""
+        return "loading" if prescribed <= self.prescribed_in(state) else "unloading"
+
+    def detached_separation(self, state: ContactState, prescribed: float) -> float:
+        """Compute s in m at x = ``prescribed`` of a path that is out of contact in ``state``.
+
+        A load is not carried at any separation, so the state stays where it is.
+        """
+        return state.separation if self.control.is_load else prescribed
 
     def full_contact(self, prescribed: float) -> str:
         """Return the message for a contact that runs into full contact before x = prescribed."""
         first = self.control.prescribed(self.profile.h_max, 0.0)
         at_touch = prescribed >= first
-        where = "at first touch" if at_touch else f"before {self.place(prescribed)}"
+        where = "at first touch" if at_touch else f"before {self.describe_prescribed(prescribed)}"
         turn = "" if at_touch else "the turning point or "
         return (
             f"the contact runs into full contact {where}: there is no state with a gap; prescribe "
             f"the separation or a larger stiffness, or reduce {turn}work_of_adhesion"
         )
 
-    def place(self, prescribed: float) -> str:
+    def describe_prescribed(self, prescribed: float) -> str:
         """Format x = prescribed for a message, in the units of the turning points and in m."""
         if self.control.is_load:
             return f"a mean stress of {0.0 - prescribed:g} Pa"

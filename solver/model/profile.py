@@ -1,4 +1,4 @@
-"""Rough periodic profiles: generation by the spectral method or from heights, and statistics.
+"""Generate rough periodic profiles, by the spectral method or from heights, and their statistics.
 
 A profile is a band-limited real function of period λ, held as its Fourier coefficients
 
@@ -42,6 +42,7 @@ from adhesis.solver.checks import (
 from adhesis.solver.values import ByValue
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Amplitudes = Literal["deterministic", "rayleigh"]
 
 _HEIGHT_OR_NONE = Bounds(0.0, HEIGHT.high, unit="m")

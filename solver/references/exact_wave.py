@@ -7,7 +7,7 @@ the profile, as ``problem.Problem`` defines it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -22,7 +22,7 @@ from adhesis.solver.method import (
     Path,
     PathError,
 )
-from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.references.single_wave import SingleWave, WaveLoop
@@ -71,13 +71,11 @@ class ExactWave(Method):
     def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the stable branch; see ``method.Method``."""
         control, amplitude = self.problem.control, self.wave.amplitude
-        branch: Branch = "unloading"
-        if prescribed <= self.problem.prescribed_in(state):
-            branch = "loading"
+        branch = self.problem.branch_to(state, prescribed)
         states: list[ContactState] = []
         jumps: list[Jump] = []
         first = control.prescribed(amplitude, 0.0)
-        apart = state.separation if control.is_load else prescribed
+        apart = self.problem.detached_separation(state, prescribed)
         if not state.patches:
             if prescribed > first or self._contact_width(prescribed) == 0:
                 return Path((self.detached(apart),), ())
@@ -101,10 +99,8 @@ class ExactWave(Method):
             if not control.is_load:
                 states.append(self.detached(prescribed))
             if before.patches:
-                jump = Jump.between(before, after, branch, self.wave.period)
-                if control.is_load:  # the load's own work is not counted (model.control)
-                    jump = replace(jump, energy_drop=before.energy / self.wave.period)
-                jumps.append(jump)
+                period, falls_off = self.wave.period, control.is_load
+                jumps.append(Jump.between(before, after, branch, period, falls_off=falls_off))
         else:
             states.append(self._state(a_to, prescribed if control.is_fixed else None))
         return Path(tuple(states), tuple(jumps))
@@ -140,7 +136,7 @@ class ExactWave(Method):
         return self.wave.loop if control.is_fixed else self.wave.loop_under(control.stiffness)
 
     def _contact_width(self, prescribed: float) -> float:
-        """Compute the half-width at x = ``prescribed``, beyond the end of the branch that there.
+        """Compute the half-width at x = ``prescribed``; beyond the branch, that at its end.
 
         Raises
         ------

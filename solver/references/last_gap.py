@@ -79,7 +79,7 @@ class LastGap:
         return float(np.pi * self._mean(tension * unit * weight) / period)
 
     def tension(self, b: float, x: float) -> float:
-        """Compute the tension in Pa at a place x (m) outside the gap, in that equilibrium."""
+        """Compute the tension in Pa at x (m) outside the gap, in that equilibrium."""
         period, beta = self.profile.period, self._beta(b)
         angle, inside = self._nodes(b)
         pressure = self.mean_stress(b)
@@ -97,7 +97,7 @@ class LastGap:
         return float(np.pi * b / self.profile.period)
 
     def _nodes(self, b: float) -> tuple[Array, Array]:
-        """Return Gauss nodes φ from 0 to π/2, and the places inside the gap that belong to them."""
+        """Return Gauss nodes φ from 0 to π/2, and their positions x inside the gap."""
         nodes, _ = _gauss()
         angle = np.pi / 4 * (nodes + 1)
         inside = np.arcsin(np.sin(self._beta(b)) * np.sin(angle))

@@ -190,11 +190,6 @@ class SingleWave:
             term = np.where(y > 0, self.mean_stress(a) / self.full_contact_stress * log, 0.0)
         return np.asarray(self.amplitude * (1 - y + term))
 
-    def stress_intensity(self, a: ArrayLike) -> Array:
-        """Compute K(a) in Pa·sqrt(m) at equilibrium: K²/(2E*) = γ' at the edge."""
-        psi, _, _ = self._angle(a)
-        return np.asarray(self.adhesive_tension(a) * np.sqrt(self.period / np.tan(psi)))
-
     def separation_slope(self, a: ArrayLike) -> Array:
         """Compute ds/da along the equilibrium branch; negative where it is stable at fixed s."""
         psi, _, log = self._angle(a)
@@ -214,12 +209,6 @@ class SingleWave:
         _, y, log = self._angle(a)
         ratio = np.asarray(s, dtype=float) / self.amplitude - 1 + y
         return np.asarray(self.full_contact_stress * ratio / log)
-
-    def stress_intensity_at(self, a: ArrayLike, s: ArrayLike) -> Array:
-        """Compute K in Pa·sqrt(m) with half-width a at separation s; negative if they overlap."""
-        psi, y, _ = self._angle(a)
-        p1 = self.full_contact_stress * y - self.mean_stress_at(a, s)
-        return np.asarray(p1 * np.sqrt(self.period / np.tan(psi)))
 
     def elastic_energy_at(self, a: ArrayLike, s: ArrayLike) -> Array:
         """Compute ½∫σ(h - s)dx in J/m with half-width a at separation s."""

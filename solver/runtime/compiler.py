@@ -1,4 +1,4 @@
-"""numba's compiler, changed in three places; beside ``jit`` the only module that imports numba.
+"""Adapt numba's compiler in three respects; only this module and ``jit`` import numba.
 
 Results are boxed by C code alone, the message for slices of different shapes is a short one, and
 references are counted only to arrays that a function makes or returns.
@@ -112,7 +112,7 @@ class _Lower(_NumbaLower):  # type: ignore[misc]  # numba has no types
         self._uncounted = self.context.subtarget(enable_nrt=False)
 
     def _borrows(self, value: Any, owning: set[str]) -> bool:
-        """Whether a value borrows if the variables that are not ``owning`` do."""
+        """Return whether a value borrows if the variables that are not ``owning`` do."""
         if isinstance(value, ir.Var):
             return value.name not in owning
         if isinstance(value, ir.Expr):
@@ -120,7 +120,7 @@ class _Lower(_NumbaLower):  # type: ignore[misc]  # numba has no types
         return isinstance(value, ir.Arg | ir.Const | ir.Global | ir.FreeVar)
 
     def _is_view(self, made: Any) -> bool:
-        """Whether an array that an expression gives is kept by its operands."""
+        """Return whether the result of an expression is kept by its operands."""
         if made.op == "call":
             called = self.fndesc.typemap[made.func.name]
             return isinstance(called, types.BoundFunction) and called.key[0] == "array.reshape"
@@ -131,7 +131,7 @@ class _Lower(_NumbaLower):  # type: ignore[misc]  # numba has no types
         return made.op in _VIEWS
 
     def _has_own(self, made: Any, owning: set[str]) -> bool:
-        """Whether an operand has arrays that are this function's own."""
+        """Return whether an operand has arrays that are this function's own."""
         models, types_of = self.context.data_model_manager, self.fndesc.typemap
         names = (operand.name for operand in made.list_vars())
         return any(
@@ -162,7 +162,7 @@ class _Lowering(NativeLowering):
 
     @property
     def lowering_class(self) -> type[_Lower]:
-        """Return what writes it."""
+        """Return the class that writes it."""
         return _Lower
 
 

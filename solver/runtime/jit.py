@@ -126,7 +126,7 @@ def processor() -> str:
 
 
 def settings() -> dict[str, str]:
-    """Return what machine code depends on besides its sources and the processor's name."""
+    """Return the settings that change machine code, besides its sources and the processor."""
     features = config.CPU_FEATURES
     if features is None:
         features = binding.get_host_cpu_features().flatten()

@@ -34,7 +34,7 @@ class _Worker(threading.Thread):
 def signals_held() -> Iterator[None]:
     """Hold back the signals that Python handles until the block has ended.
 
-    What a handler raises then arrives from here. Inside code that drops exceptions, as the
+    The exception of a handler then arrives from here. Inside code that drops exceptions, as the
     callbacks of weak references in h5py and :mod:`threading` are, it would be lost.
     """
     handled = {each for each in signal.valid_signals() if callable(signal.getsignal(each))}

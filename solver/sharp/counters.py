@@ -16,14 +16,14 @@ class Counters:
     newton_steps: int = 0
     descent_steps: int = 0
 
-    def newton(self, steps: int) -> None:
-        """Count the steps of a Newton iteration."""
+    def add_newton(self, steps: int) -> None:
+        """Add the steps of a Newton iteration."""
         self.newton_steps += steps
         self.fields += steps
         self.derivatives += steps
 
-    def descent(self, fields: int, tangents: int) -> None:
-        """Count the steps of a descent, of which some had a tangent of their own."""
+    def add_descent(self, fields: int, tangents: int) -> None:
+        """Add the fields and the tangents of a descent."""
         self.descent_steps += fields
         self.fields += fields
         self.derivatives += tangents

@@ -1,4 +1,4 @@
-"""Ends of a path that are not jumps."""
+"""Errors that end a path: full contact, or no state."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from adhesis.solver.method import PathError
 
 
 class FullContact(Exception):
-    """The last gap of the period closes: no state of gaps is left."""
+    """Error raised when the last gap of the period closes: no state with a gap is left."""
 
 
 class NoState(PathError):
-    """The path has no state at d = ``at``; the text is the reason."""
+    """Error raised when the path has no state at d = ``at``; the text is the reason."""
 
     def __init__(self, reason: str, at: float) -> None:
         super().__init__(reason)

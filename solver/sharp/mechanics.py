@@ -13,7 +13,7 @@ from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import imbalance, shortest_length
 from adhesis.solver.sharp.errors import FullContact, NoState
 from adhesis.solver.sharp.field.dense_solver import GapField
-from adhesis.solver.sharp.gap.ends import outward, widths, without_small
+from adhesis.solver.sharp.gap.ends import lengths_of, outward, without_small
 from adhesis.solver.sharp.system.dense import DenseSystem
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.edge_system import EdgeSystem, Integers
@@ -202,7 +202,7 @@ class EdgeMechanics(EdgeProblem):
         """
         if len(gaps) > 1:
             return smallest
-        length, _ = widths(gaps)
+        length, _ = lengths_of(gaps)
         if length[0] < self.smallest and self.model.device.compliance > 0:
             raise FullContact
         return min(smallest, LAST_GAP * float(length[0]))
@@ -215,7 +215,7 @@ class EdgeMechanics(EdgeProblem):
         """
         residual, _ = imbalance(self.field(gaps, prescribed).solution, self.law, self.source.panels)
         e = int(np.argmax(np.abs(residual)))
-        length, patch = widths(gaps)
+        length, patch = lengths_of(gaps)
         beside = patch[e // 2 - 1 if e % 2 == 0 else e // 2]
         step = np.zeros(gaps.size)
         step[e] = min(0.5 * times * self.law.longest_step, 0.25 * length[e // 2], 0.25 * beside)

@@ -1,10 +1,9 @@
 """Method ``sharp``: contact edges are real numbers; no grid in the mechanics.
 
-The elastic field of given edges is that of ``dense_solver``. Along a
-stable branch (``branch``) the method steps in the separation
-with a tangent predictor and Newton's corrector; where the corrector finds no stable equilibrium
-within reach, the step is cut down to the wanted resolution of a jump, and the edges then descend in
-energy at fixed separation (``jump``).
+The elastic field is solved by dense matrices for few gaps and on a tree of clusters for many
+(``mechanics``). Stable branches are followed by predictor and corrector (``continuation``); where
+no stable equilibrium is found within the largest correction, the step is reduced to the resolution
+of a jump, and the edges descend in energy at a fixed prescribed value (``descent``).
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from adhesis.solver.method import (
     Path,
     PathError,
 )
-from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.runtime.malloc import keep_freed
@@ -43,7 +41,7 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
-from adhesis.solver.sharp.output.contact_states import States, hold_of
+from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 from adhesis.solver.sharp.output.interior_tension import largest_tension
 from adhesis.solver.sharp.tolerances import (
@@ -92,23 +90,13 @@ class SharpReport(MethodReport):
     descent_steps: int
 
 
-def _strength(profile: Profile, critical: float) -> float:
-    """How strong adhesion is: critical opening over what roughness makes, h' sqrt(λ_min)."""
+def _adhesion_ratio(profile: Profile, critical: float) -> float:
+    """Compute the critical opening over the opening caused by roughness, h' sqrt(λ_min)."""
     return float(critical / np.sqrt(profile.m2 * 2 * np.pi / profile.highest_harmonic))
 
 
-def _weakness(profile: Profile, critical: float) -> float:
-    """How weak adhesion is: its strength, at most 1.
-
-    The critical opening is then a small difference of the openings that roughness makes, of the
-    size h' sqrt(λ_min), and the loss, of the order of its square, a small difference of two works:
-    the field, and the integral along a branch (of fourth order), have to be as much finer.
-    """
-    return min(1.0, _strength(profile, critical)) if critical > 0 else 1.0
-
-
 class SharpMethod(Method):
-    """Real-valued edges; see the module's text.
+    """Contact states with real-valued edges.
 
     Parameters
     ----------
@@ -124,7 +112,7 @@ class SharpMethod(Method):
     # Measured on a wave and self-affine profiles at accuracy 1e-3. Below, the loss, 0.6 g^(4/3) of
     # the energy of full contact at g of it, is no larger than the rounding of the two works whose
     # difference it is, some 1e-11; above, Newton's iteration does not converge, as the profile is
-    # too small in the openings to place the last gap.
+    # too small in the openings to fix the position of the last gap.
     resolved_adhesion: ClassVar[tuple[float, float]] = (1e-8, 1e10)
 
     def __init__(
@@ -137,16 +125,20 @@ class SharpMethod(Method):
         self.q0 = profile.q0
         h_max = profile.h_max * self.q0
         critical = float(4 * np.sqrt(self.q0 * problem.work_of_adhesion / (np.pi * modulus)))
-        weak = _weakness(profile, critical)
-        # Under a load s goes like a square root before a fold, and where contact is lost it counts.
+        ratio = _adhesion_ratio(profile, critical)
+        # If adhesion is weak, C_c is a small difference of the openings caused by roughness, and
+        # the loss, of the order of its square, a small difference of two works: the field, and the
+        # integral along a branch (of fourth order), have to be as much finer.
+        weak = min(1.0, ratio) if ratio > 0 else 1.0
+        # Under a load s goes like a square root before a fold, and the loss of contact depends on
+        # it.
         load = problem.control.is_load
         finer = FINER_UNDER_LOAD if load else 1.0
         tolerance = FIELD_ACCURACY * accuracy * weak**2 * finer
         tolerance = float(np.clip(tolerance, LEAST_FIELD_TOLERANCE, LARGEST_FIELD_TOLERANCE))
-        # The profile alone holds a last gap in its place, by openings so much smaller than C_c.
-        strength = _strength(profile, critical)
-        if strength > 0:
-            tolerance = max(min(tolerance, PLACED_BY_PROFILE / strength), LEAST_FIELD_TOLERANCE)
+        # The profile alone fixes the position of a last gap, by openings so much smaller than C_c.
+        if ratio > 0:
+            tolerance = max(min(tolerance, PLACED_BY_PROFILE / ratio), LEAST_FIELD_TOLERANCE)
         # Steps whose work is compared with the energy need an energy that is as exact.
         work = math.inf
         if math.isfinite(problem.strength):
@@ -155,7 +147,7 @@ class SharpMethod(Method):
             exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
             tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance)
-        self.edges = EdgeMechanics(source, critical, tolerance, hold_of(problem))
+        self.edges = EdgeMechanics(source, critical, tolerance, loading_device(problem))
         self.states = States(problem, source, self.edges.count)
         finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)
         self.resolution = Resolution(
@@ -174,10 +166,10 @@ class SharpMethod(Method):
             self.edges, self.nucleation, Openings(problem, self.edges), self.states, self.jumps,
             self.resolution,
         )  # fmt: skip
-        self._loaded: list[ContactState] = []  # without adhesion: the way back
+        self._loaded: list[ContactState] = []  # without adhesion unloading goes back through them
 
     def report(self) -> SharpReport:
-        """Accuracy, tolerances and counters."""
+        """Return accuracy, tolerances and counters."""
         return SharpReport(
             name=self.name,
             chosen=self.chosen,
@@ -190,38 +182,31 @@ class SharpMethod(Method):
     @one_at_a_time
     @on_one_thread
     def fields(self, state: ContactState, n: int) -> Fields:
-        """Stress, displacement and gap of ``state`` on n nodes, by quadrature over the gaps."""
-        field = None
-        if state.patches:
-            field = self.edges.field(state.internal.gaps, self.states.place(state))
+        """Compute stress, displacement and gap of ``state`` on n nodes, by quadrature over gaps."""
+        field = self._field(state) if state.patches else None
         return fields_of(self.problem, field, state.separation, n)
 
     @one_at_a_time
     @on_one_thread
     def largest_tension(self, states: Sequence[ContactState]) -> PatchTension | None:
         """Find the largest local maximum of tension inside patches; see the contract."""
-
-        def field_of(number: int) -> GapField:
-            state = states[number]
-            return self.edges.field(state.internal.gaps, self.states.place(state))
-
-        return largest_tension(self.problem, field_of, len(states))
+        return largest_tension(self.problem, lambda i: self._field(states[i]), len(states))
 
     @one_at_a_time
     def openings(self, state: ContactState) -> list[Opening]:
-        """Openings of all gaps from their series."""
-        if not state.patches:
-            return []
-        return openings_of(self.edges.field(state.internal.gaps, self.states.place(state)), self.q0)
+        """Evaluate the openings of all gaps from their series."""
+        return openings_of(self._field(state), self.q0) if state.patches else []
+
+    def _field(self, state: ContactState) -> GapField:
+        """Solve the field of a state in contact."""
+        return self.edges.field(state.internal.gaps, self.states.prescribed_of(state))
 
     @one_at_a_time
     @on_one_thread
     def follow(self, state: ContactState, prescribed: float) -> Path:
         """Follow the quasi-static path; see the contract."""
-        branch: Branch = "unloading"
-        if prescribed <= self.problem.prescribed_in(state):
-            branch = "loading"
-        target = Target(self.states.at(prescribed), prescribed, branch)
+        branch = self.problem.branch_to(state, prescribed)
+        target = Target(self.states.to_field_units(prescribed), prescribed, branch)
         try:
             if self.problem.work_of_adhesion == 0:
                 return self._follow_reversibly(state, target)
@@ -229,24 +214,24 @@ class SharpMethod(Method):
         except FullContact:
             raise PathError(self.problem.full_contact(prescribed)) from None
         except NoState as failed:
-            place = self.problem.place(self.states.prescribed(failed.at))
+            where = self.problem.describe_prescribed(self.states.to_si(failed.at))
             raise PathError(
-                f"method 'sharp' finds no state at {place}: {failed}; the method 'grid', another "
+                f"method 'sharp' finds no state at {where}: {failed}; the method 'grid', another "
                 "accuracy or other load steps may get past it"
             ) from failed
         return Path(tuple(history.states), tuple(history.jumps), self._error(history))
 
     def _error(self, history: History) -> float:
-        """Estimate the error of the loss, in J/m²: jumps not at their places, and the field's."""
+        """Estimate the error of the loss, in J/m²: of the location of jumps, and of the field."""
         drops = sum(abs(jump.energy_drop) for jump in history.jumps)
         return history.misplaced + self.resolution.field_share * drops
 
     def _history(self, state: ContactState, target: Target) -> History:
-        """States and jumps from ``state`` to the target."""
+        """Follow the path from ``state`` to the target."""
         history = History()
         self.edges.forget()
         control = self.problem.control
-        at = self.states.place(state)
+        at = self.states.prescribed_of(state)
         # the separation of a state at the target, where it is known without rounding
         exact = target.prescribed if control.is_fixed else None
         point = self.follower.recall_point(state.internal)
@@ -254,7 +239,7 @@ class SharpMethod(Method):
             touch, highest = self.nucleation.first_touch()
             first = 0.0 if control.is_load else touch
             if target.branch == "unloading" or target.at > first:
-                apart = state.separation if control.is_load else target.prescribed
+                apart = self.problem.detached_separation(state, target.prescribed)
                 history.states.append(self.detached(apart))
                 return history
             at = first
@@ -268,7 +253,7 @@ class SharpMethod(Method):
                 if point is not None:
                     point = point.with_clearance(state.internal.clearance)
             else:
-                at = point.at  # but for rounding the place of the state
+                at = point.at  # that of the state but for rounding
             if point is None:
                 before = self.states.of_field(self.edges.field(gaps, at))
                 history.states.append(before)
@@ -292,30 +277,31 @@ class SharpMethod(Method):
         target: Target,
         touches: list[Touch] | None = None,
     ) -> Point | None:
-        """Jump from a state that no branch led to; return the point after it."""
+        """Compute the jump from a state that no branch led to, and return the point after it."""
         jump = self.jumps.compute(before, gaps, at, target.branch, touches)
         history.commit(jump)
         return jump.point
 
     def _follow_reversibly(self, state: ContactState, target: Target) -> Path:
-        """Without adhesion the state is unique, and nothing jumps.
+        """Follow a path without adhesion, whose states are unique and do not jump.
 
         On loading patches appear, grow and merge smoothly. Unloading goes back through the states
-        of loading; a state that is missing is loaded to from a lighter one.
+        of loading; a missing state is reached by loading from a lighter one.
         """
-        place = self.problem.prescribed_in
+        prescribed_in = self.problem.prescribed_in
         if target.branch == "loading":
             states = self._history(state, target).states
             self._loaded += states
             return Path(tuple(states), ())
-        lighter = [s for s in self._loaded if place(s) >= target.prescribed]
-        back = [s for s in self._loaded if place(state) < place(s) < target.prescribed]
+        lighter = [s for s in self._loaded if prescribed_in(s) >= target.prescribed]
+        start = prescribed_in(state)
+        back = [s for s in self._loaded if start < prescribed_in(s) < target.prescribed]
         h_max = self.problem.profile.h_max
         first = self.detached(
             h_max if self.problem.control.is_load else max(target.prescribed, h_max)
         )
-        start = min(lighter, key=place, default=first)
-        if place(start) > target.prescribed:
-            start = self._history(start, replace(target, branch="loading")).states[-1]
-        back.reverse()  # states at one place come in the order opposite to loading
-        return Path((*sorted(back, key=place), start), ())
+        last = min(lighter, key=prescribed_in, default=first)
+        if prescribed_in(last) > target.prescribed:
+            last = self._history(last, replace(target, branch="loading")).states[-1]
+        back.reverse()  # states at one prescribed value come in the order opposite to loading
+        return Path((*sorted(back, key=prescribed_in), last), ())

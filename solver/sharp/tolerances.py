@@ -300,14 +300,8 @@ NO_CURVATURE = 1e-100
 
 STRENGTH_EXCEEDED = 2e-5
 """σ_th. Tension inside a patch may exceed the strength by this share when it opens."""
-MOST_MAXIMA = 32
-"""Maxima of tension of one field that are refined."""
 SHORTEST_CRACK = 0.02
 """λ_min. Shorter ones are not put: steps of their edges would count as rest."""
-HEALED_PLACE = 0.05
-"""λ_min. A maximum of tension this close to a crack that closed again is at the same place."""
-MOST_OPENINGS = 1000
-"""Openings one after the other at one place of a path; more are an endless loop."""
 
 # ---------------------------------------------------------------- continuation of a branch
 

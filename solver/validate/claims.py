@@ -150,7 +150,7 @@ def branch(judge: Judge) -> Iterator[Row]:
         p_star = wave.full_contact_stress
         widths.append(result.contact_fraction[on_axis] / 2 - a / PERIOD)
         off = (result.mean_stress[on_axis] - wave.mean_stress(a)) / p_star
-        stresses.append((off, judge.slack(wave.mean_stress_at, a, s) / p_star))
+        stresses.append((off, judge.error_of_half_width(wave.mean_stress_at, a, s) / p_star))
         off = (result.energy[on_axis] - wave.energy(a)) / wave.energy_scale
         one_node = 2 * wave.work_of_adhesion * PERIOD * judge.standard.edge
         energies.append((off, np.full(a.size, one_node / wave.energy_scale)))
@@ -172,7 +172,7 @@ def fold(judge: Judge) -> Iterator[Row]:
         stress = result.mean_stress[np.flatnonzero(result.patches)[-1]]
         a, s = np.array([loop.fold_half_width]), np.array([loop.fold_separation])
         # The edges of the last state are within e of equilibrium ones, those within e of the fold.
-        bound = judge.slack(wave.mean_stress_at, a, s) / wave.full_contact_stress
+        bound = judge.error_of_half_width(wave.mean_stress_at, a, s) / wave.full_contact_stress
         off = np.array([(stress - loop.fold_mean_stress) / wave.full_contact_stress])
         stresses.append((off, 2 * bound))
     yield judge.worst(
@@ -214,9 +214,9 @@ def westergaard(judge: Judge) -> Iterator[Row]:
     gamma0 = "γ = 0 against Westergaard:"
     edge = np.array(judge.standard.edge)
     yield judge.worst(f"{gamma0} half-width / λ", width, edge)
-    mean = judge.slack(wave.mean_stress_at, a, s) / p_star
+    mean = judge.error_of_half_width(wave.mean_stress_at, a, s) / p_star
     yield judge.worst(f"{gamma0} mean stress / p*", off, mean)
-    top = judge.slack(highest, a, s) / p_star
+    top = judge.error_of_half_width(highest, a, s) / p_star
     yield judge.worst(f"{gamma0} highest stress / p*", peak - highest(a, s) / p_star, top)
     drops = abs(result.loss_from_drops) / wave.energy_scale * PERIOD
     yield judge.row(f"{gamma0} no energy drops / (A p*)", drops, 1e-9)
@@ -261,7 +261,7 @@ def punch(judge: Judge) -> Iterator[Row]:
     width = result.contact_fraction[on] / 2 * PERIOD
     hertzian = wave.full_contact_stress * np.sin(np.pi * width / PERIOD) ** 2
     punch = pull_off_stress(width, PERIOD, MODULUS, wave.work_of_adhesion)
-    bounds = judge.unknown_width(wave, width, result.separation[on]) / np.abs(punch)
+    bounds = judge.error_at_given_width(wave, width, result.separation[on]) / np.abs(punch)
     errors = (result.mean_stress[on] - hertzian) / punch - 1
     yield judge.worst("Koiter's punch: tension of the wave at α = 3", errors, bounds)
 
@@ -284,7 +284,7 @@ def parabola(judge: Judge) -> Iterator[Row]:
         return np.asarray(repulsion * psi2 / 3 + tension * psi2 / 6 * (1 + psi2))
 
     errors = result.mean_stress[on] - parabola_load(a, radius, MODULUS, gamma) / PERIOD
-    bounds = curved(a) + judge.unknown_width(wave, a, result.separation[on])
+    bounds = curved(a) + judge.error_at_given_width(wave, a, result.separation[on])
     own = np.abs(wave.mean_stress(a) * PERIOD - parabola_load(a, radius, MODULUS, gamma))
     most = own.max(initial=0) / PERIOD / p_star
     note = f"the wave itself differs from the parabola by up to {most:.1e}"
@@ -293,7 +293,7 @@ def parabola(judge: Judge) -> Iterator[Row]:
     a_least, load = parabola_pull_off(radius, MODULUS, gamma)
     least = np.array([a_least])
     s = np.asarray(wave.separation(least))
-    bound = float((curved(least) + judge.slack(wave.mean_stress_at, least, s))[0])
+    bound = float((curved(least) + judge.error_of_half_width(wave.mean_stress_at, least, s))[0])
     error = result.pull_off_stress * PERIOD / load + 1
     largest = wave.mean_stress(a_least * np.linspace(0.7, 1.4, 10_001)).min()
     own = abs(largest * PERIOD / load - 1)
@@ -331,8 +331,9 @@ def controls(judge: Judge) -> Iterator[Row]:
         last = np.flatnonzero(result.patches)[-1]
         off = (result.mean_stress[last] - exact.fold_mean_stress) / p_star
         s = np.array([exact.fold_separation])
-        slack = judge.slack(wave.mean_stress_at, np.array([exact.fold_half_width]), s)[0] / p_star
-        yield judge.row(f"{held}: p̄_out / p*", off, 2 * slack)
+        half_width = np.array([exact.fold_half_width])
+        bound = judge.error_of_half_width(wave.mean_stress_at, half_width, s)[0] / p_star
+        yield judge.row(f"{held}: p̄_out / p*", off, 2 * bound)
 
 
 def opening(judge: Judge) -> Iterator[Row]:
@@ -341,7 +342,7 @@ def opening(judge: Judge) -> Iterator[Row]:
     scale = MODULUS * AMPLITUDE / PERIOD  # of stresses
     gamma, strength = 0.075 * scale * AMPLITUDE, 3.0 * scale
     problem = Problem(profile, HALF_SPACE, gamma, strength=strength)
-    accuracy = max(judge.standard.accuracy, 1e-4)  # the place depends on the tension's tolerance
+    accuracy = max(judge.standard.accuracy, 1e-4)  # s depends on the tension's tolerance
     per_wave = judge.standard.nodes // 2 if judge.standard.nodes else None
     method = make_method(judge.name, problem, accuracy=accuracy, nodes_per_wave=per_wave)
     result = run_loop(method, max_penetration=0.99, load_steps=5)

@@ -160,22 +160,24 @@ class Judge:
 
     # ------------------------------------------------------------------ bounds
 
-    def slack(self, function: Callable[[Array, Array], Array], a: Array, s: Array) -> Array:
-        """Compute the change of ``function`` with a change e of the half-width at the same s."""
+    def error_of_half_width(
+        self, function: Callable[[Array, Array], Array], a: Array, s: Array
+    ) -> Array:
+        """Compute the change of ``function`` when the half-width changes by e at the same s."""
         step, here = self.standard.edge * PERIOD, function(a, s)
         change = [np.abs(function(a + sign * step, s) - here) for sign in (-1, 1)]
         return np.asarray(np.maximum(*change) + self.standard.stress * np.abs(here))
 
-    def unknown_width(self, wave: SingleWave, a: Array, s: Array) -> Array:
+    def error_at_given_width(self, wave: SingleWave, a: Array, s: Array) -> Array:
         """Bound the error of the mean stress at a half-width known, and balanced, within e."""
 
-        def imbalance(a: Array) -> Array:
+        def excess_stress(a: Array) -> Array:
             return wave.mean_stress_at(a, s) - wave.mean_stress(a)
 
         step = self.standard.edge * PERIOD
         changes = [
             [np.abs(function(a + sign * step) - function(a)) for sign in (-1, 1)]
-            for function in (imbalance, wave.mean_stress)
+            for function in (excess_stress, wave.mean_stress)
         ]
         width = np.maximum(*changes[0]) + np.maximum(*changes[1])
         return np.asarray(width + self.standard.stress * wave.full_contact_stress)

@@ -31,10 +31,10 @@ MATHEMATICAL = {
         "OUTGROWN",
         "REJOINED",
     },
-    "output/grid_fields.py": {"_FIELD_NODES", "_FINER"},  # nodes of an output, not of a loop
+    "output/grid_fields.py": {"_FINER"},  # nodes of an output, not of a loop
     # nodes and numbers of trials of a diagnosis, which no loss depends on
     "field/patch_tension.py": {"_COARSE", "_POINTS", "_MOVES"},
-    "output/interior_tension.py": {"_CANDIDATES", "_CANDIDATES_OPENING"},
+    "output/interior_tension.py": {"_CANDIDATES"},
     "field/assembly.py": {"_PERIODIC_SERIES", "_MAPPED_SERIES"},  # ranges of series
     "field/cholesky.py": {"BLOCK"},
     "field/opening_series.py": {"_MANY_NODES", "_PER_UNIT"},  # sizes of tables

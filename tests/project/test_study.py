@@ -19,7 +19,7 @@ from adhesis import HalfSpace, Problem, run_loop, self_affine_profile
 from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.report.paper import TABLE_1
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING
-from adhesis.solver.grid.method import GridMethod
+from tests.support.grids import grid_of
 from tools.study import amplitude, coarse, jumps, monotone
 from tools.study.collect import COLUMNS, _chosen, collect_all, without_detached
 from tools.study.data import Rows, Study, read
@@ -251,7 +251,7 @@ def test_detached_realisations_are_left_out_of_the_average():
 def test_coarse_steps_become_the_path_of_the_method_grid():
     profile = self_affine_profile(0.8, period=1e-3, n0=2, ratio=6, h_rms=1e-6, seed=5)
     problem = Problem(profile, HalfSpace(1e6, 0.5), 0.02)
-    right = run_loop(GridMethod(problem, nodes=256), max_penetration=0.6, load_steps=6)
+    right = run_loop(grid_of(problem, nodes=256), max_penetration=0.6, load_steps=6)
     fine, long = coarse.loops(problem, 256, (0.6,), 0.02, (0.02, 0.6))
     assert fine["loss_dimensionless"] == pytest.approx(right.loss_dimensionless, rel=0.01)
     assert fine["pull_off_stress"] == pytest.approx(right.pull_off_stress, rel=0.02)

@@ -205,7 +205,7 @@ def test_whatever_is_a_number_is_taken_as_one(two: Any) -> None:
     assert whole("x", two, Bounds(0, 9, whole=True)) == 2
     assert HalfSpace(two, 0.5) == HalfSpace(2.0, 0.5)
     assert spectral(n0=two) == spectral(n0=2)
-    assert check_cycle(0.5, two) == (0.5, 2)
+    assert check_cycle(0.5, two, Control()) == (0.5, 2)
 
 
 MASKED = np.ma.array([1.0, 2.0, 4.0], mask=[False, True, False])

@@ -90,7 +90,7 @@ def branch(
     before: float | None = None,
     **options: float,
 ) -> Branch:
-    closing = SimpleNamespace(over=lambda point, reached, name: abs(reached.at - point.at))
+    closing = SimpleNamespace(between=lambda point, reached, name: abs(reached.at - point.at))
     aim = Target(target, target, towards)
     point = curve.point(start)
     if before is not None:
@@ -308,12 +308,12 @@ class Clearance:
     def __init__(self, before: float, after: float) -> None:
         self.before, self.after = before, after
 
-    def least(self, field: Any) -> tuple[float, float]:
+    def minimum(self, field: Any) -> tuple[float, float]:
         """Value at a field, and its place."""
         at = field.separation
         return (at - 0.6 + self.before if at > 0.6 else at - 0.6 - self.after), at
 
-    def ready(self, place: float) -> list[float]:
+    def choose_seeds(self, place: float) -> list[float]:
         """Seed at a place."""
         return [place]
 
@@ -321,10 +321,10 @@ class Clearance:
         """Whether the overlap is small."""
         return near and value > -0.5 * self.tolerance
 
-    def tracked(self, clear: Point, hit: Point) -> None:
+    def track_between(self, clear: Point, hit: Point) -> None:
         """Few gaps."""
 
-    def check_located(self, value: float, at: float) -> None:
+    def validate_location(self, value: float, at: float) -> None:
         """Nothing to check."""
 
 

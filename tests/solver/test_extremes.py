@@ -22,7 +22,6 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
-from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.method import Method, PathError
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.runtime import threads as one_thread
@@ -30,6 +29,7 @@ from adhesis.solver.runtime.threads import on_one_thread
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
+from tests.support.grids import grid_of
 
 WAVE = single_wave(1e-6, 1e-3)
 ROUGH = self_affine_profile(0.8, period=1e-3, n0=2, ratio=3, seed=4, h_rms=1e-6)
@@ -166,7 +166,7 @@ def test_full_contact_is_reported_with_where_it_happens(share, max_stress, where
 
 
 def methods(problem: Problem) -> list[Method]:
-    return [GridMethod(problem, nodes=64), SharpMethod(problem)]
+    return [grid_of(problem, nodes=64), SharpMethod(problem)]
 
 
 @pytest.mark.parametrize("index", [0, 1])

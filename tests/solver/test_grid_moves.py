@@ -9,7 +9,8 @@ import pytest
 
 from adhesis import Problem, single_wave
 from adhesis.solver.grid.contact import Contact
-from adhesis.solver.grid.edges import Edges, patch_ranges
+from adhesis.solver.grid.edges import Edges
+from adhesis.solver.grid.kernels import patch_ranges
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.moves import Motion, apply_moves, edge_moves, least_release
 from tests.support.scenes import HALF_SPACE

@@ -9,15 +9,16 @@ from adhesis import Problem, self_affine_profile, single_wave
 from adhesis.solver.grid import relax
 from adhesis.solver.grid.compliance import EdgeCompliance
 from adhesis.solver.grid.contact import Contact, ContactSolver
-from adhesis.solver.grid.edges import patch_ranges, survey
+from adhesis.solver.grid.edges import survey
 from adhesis.solver.grid.elasticity import ElasticGrid
-from adhesis.solver.grid.kernels import dot, inverse_form
+from adhesis.solver.grid.kernels import dot, inverse_form, patch_ranges
 from adhesis.solver.grid.lattice import Lattice
 from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.grid.moves import Move
 from adhesis.solver.grid.pairs import pairs
 from adhesis.solver.grid.path import Steps
 from adhesis.solver.model.control import Control
+from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
 
 PERIOD = 2e-3 * np.pi
@@ -25,7 +26,7 @@ PERIOD = 2e-3 * np.pi
 
 def rough(gamma: float = 0.02, seed: int = 5, **options) -> GridMethod:
     profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=8, seed=seed, h_rms=1e-6)
-    return GridMethod(Problem(profile, HALF_SPACE, gamma), **{"nodes": 512, **options})
+    return grid_of(Problem(profile, HALF_SPACE, gamma), **{"nodes": 512, **options})
 
 
 def random_contact(rng: np.random.Generator, n: int, patches: int) -> np.ndarray:
@@ -57,10 +58,10 @@ def test_a_shortened_step_begins_where_the_held_edges_lead(stiffness):
     # with the edges held stress is linear in what is prescribed: nothing is left to solve
     control = Control() if stiffness is None else Control(stiffness)
     profile = self_affine_profile(0.8, period=PERIOD, n0=2, ratio=8, seed=5, h_rms=1e-6)
-    method = GridMethod(Problem(profile, HALF_SPACE, 0.02, control), nodes=512)
+    method = grid_of(Problem(profile, HALF_SPACE, 0.02, control), nodes=512)
     steps = Steps(method.problem, method.relaxation, 1e-3, "loading", method.count)
     contact = method.solver.empty(0.4e-6)
-    contact.mask = random_contact(np.random.default_rng(4), method.n, 3)
+    contact.mask = random_contact(np.random.default_rng(4), method.nodes, 3)
     method.solver.solve(contact, 1e-6)
     contact.prescribed = control.prescribed(contact.separation, float(contact.stress.mean()))
     far = contact.at(contact.prescribed - 4e-8, control)
@@ -81,7 +82,7 @@ def test_a_shortened_step_begins_where_the_held_edges_lead(stiffness):
 def test_conjugate_gradients_give_the_dense_solution(patches):
     method = rough()
     contact = method.solver.empty(0.4e-6)
-    contact.mask = random_contact(np.random.default_rng(patches), method.n, patches)
+    contact.mask = random_contact(np.random.default_rng(patches), method.nodes, patches)
     method.solver.solve(contact, 1e-8)
     nodes = np.flatnonzero(contact.mask)
     matrix = dense(method.lattice.elastic.kernel(), nodes, nodes)
@@ -98,7 +99,7 @@ def test_conjugate_gradients_give_the_dense_solution(patches):
 
 def test_energy_error_is_of_second_order_in_the_residual():
     method = rough()
-    mask = random_contact(np.random.default_rng(0), method.n, 4)
+    mask = random_contact(np.random.default_rng(0), method.nodes, 4)
     errors, residuals = [], []
     exact = exact_energy(method, mask, 0.3e-6) + method.lattice.elastic.dx * float(
         method.lattice.adhesion[mask].sum()
@@ -255,14 +256,15 @@ def test_moving_an_edge_by_one_node_costs_what_the_survey_says():
 
 
 @pytest.mark.parametrize("level", [0.3e-6, 0.8e-6])
-def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level):
+def test_moving_a_pair_of_edges_costs_what_it_is_priced_at(level, monkeypatch):
     method = rough()
     contact = method.solver.empty(0.8 * level)
     contact.mask = method.lattice.height > level
     method.solver.solve(contact, 1e-6)
     edges = method.relaxation.edges(contact)
     dx = method.lattice.dx
-    found = pairs(contact, edges, method.lattice, coupling=np.inf)  # price them all
+    monkeypatch.setattr("adhesis.solver.grid.pairs.COUPLING", np.inf)  # price them all
+    found = pairs(contact, edges, method.lattice)
     assert {p.direction for p in found} == {1, -1}
     now = exact_energy(method, contact.mask, contact.separation)
     unit = 2 * dx * method.problem.work_of_adhesion
@@ -366,7 +368,7 @@ def test_patch_ranges_reach_round_the_period():
 
 def test_touching_finds_the_crest_between_nodes():
     profile = single_wave(1e-6, PERIOD).shifted(0.4 * PERIOD / 256)
-    method = GridMethod(Problem(profile, HALF_SPACE, 0.01), nodes=256)
+    method = grid_of(Problem(profile, HALF_SPACE, 0.01), nodes=256)
     crest = profile.h_max
     empty = method.solver.empty(crest * (1 - 1e-6))
     assert method.lattice.height.max() < empty.separation

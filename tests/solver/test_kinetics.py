@@ -15,6 +15,7 @@ from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.method import SharpMethod
+from tests.support.grids import grid_of
 
 SOLID = HalfSpace(1e6, 0.5)
 PHASES = [
@@ -212,7 +213,7 @@ def test_equal_speeds_end_elsewhere():
     method = SharpMethod(race())
     method.edges.law = method.edges.law._replace(longest_step=0.2 * method.edges.law.longest_step)
     start, touches = method.nucleation.first_touch()
-    gaps = method.nucleation.seeded(np.empty((0, 2)), touches)
+    gaps = method.nucleation.insert_seeds(np.empty((0, 2)), touches)
     found = method.edges.relax(gaps, start, 0.05 * method.edges.wave, equal_speeds=True)
     while isinstance(found, np.ndarray):
         found = method.edges.relax(found, start, 0.05 * method.edges.wave, equal_speeds=True)
@@ -271,7 +272,7 @@ def test_a_coarse_grid_tells_what_it_misses_on_equal_crests():
     problem = equal_waves(4, 499277, 0.00879)
     exact = loss(problem)
     for nodes in (128, 512):
-        grid = run_loop(GridMethod(problem, nodes=nodes), max_penetration=0.8, load_steps=10)
+        grid = run_loop(grid_of(problem, nodes=nodes), max_penetration=0.8, load_steps=10)
         reported = grid.loss_error / grid.loss
         assert abs(grid.loss_dimensionless / exact - 1) < reported < 0.5
         assert any("numerical error of the loss" in text for text in grid.warnings)

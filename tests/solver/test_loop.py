@@ -260,13 +260,13 @@ def test_a_contact_that_never_detaches_is_reported():
 @pytest.mark.parametrize("depth", [0.0, 1.0, 1.5, -0.2, np.nan, np.inf])
 def test_depths_without_a_state_are_refused(depth):
     with pytest.raises(ValueError, match=r"max_penetration is .* between 0 and 1"):
-        check_cycle(depth, 10)
+        check_cycle(depth, 10, Control())
 
 
 @pytest.mark.parametrize("steps", [0, -3, 2.5])
 def test_impossible_load_steps_are_refused(steps):
     with pytest.raises(ValueError, match=r"load_steps is .* whole number"):
-        check_cycle(0.5, steps)
+        check_cycle(0.5, steps, Control())
 
 
 def test_exact_wave_refuses_other_profiles():

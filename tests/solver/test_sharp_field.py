@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import quad
 
 from adhesis import Problem, self_affine_profile, single_wave
-from adhesis.solver.grid.method import GridMethod
 from adhesis.solver.sharp.field.dense_solver import GapField, solve, solve_again
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.opening_series import fine_opening, sum_modes, work_of_gaps
@@ -17,7 +16,9 @@ from adhesis.solver.sharp.gap.conformal_map import map_gaps, theta_at
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource, half_plane_opening
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from tests.support.explicit_solution import explicit_openings, explicit_solution
+from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
+from tests.support.solved_field import solved_field
 
 GAPS = np.array([[0.3, 0.8], [0.83, 2.0], [2.05, 3.1], [3.3, 4.1], [4.2, 6.5]])
 
@@ -40,7 +41,7 @@ def separation(rough):
 
 def energy(source, gaps, separation):
     """Elastic energy beyond full contact in units of E*/(2 q0²)."""
-    field = GapField(source, gaps, separation, 1e-12)
+    field = solved_field(source, gaps, separation, 1e-12)
     return 0.5 * work_of_gaps(field) - np.pi * separation * field.pressure, field
 
 
@@ -53,7 +54,9 @@ def test_single_wave_against_johnson(half_width, toughness):
     y = np.sin(half_width / 2) ** 2
     p1 = toughness / np.sqrt(2 * np.pi / np.tan(half_width / 2))
     separation = amplitude * (1 - y + y * np.log(y)) - p1 * np.log(y)
-    field = GapField(source, np.array([[half_width, 2 * np.pi - half_width]]), separation, 1e-14)
+    field = solved_field(
+        source, np.array([[half_width, 2 * np.pi - half_width]]), separation, 1e-14
+    )
     mean_stress = amplitude * y - p1  # E*/2 = 1
     assert abs(field.pressure - mean_stress) < 5e-12 * amplitude
     k = 0.5 * np.sqrt(2 * np.pi) * field.opening
@@ -71,7 +74,7 @@ def test_field_equals_the_explicit_solution(patches):
         3: [[0.3, 0.8], [1.0, 2.0], [2.3, 5.1]],
         4: [[0.3, 0.8], [1.0, 2.0], [2.3, 3.1], [3.3, 4.9]],
     }[patches]
-    field = GapField(source, np.array(gaps), separation, 1e-13)
+    field = solved_field(source, np.array(gaps), separation, 1e-13)
     c, opening = explicit_solution(
         lambda theta: source.sample(theta)[:, 0], np.array(gaps), separation, 60
     )
@@ -85,7 +88,7 @@ def test_openings_equal_the_explicit_solution():
     profile = self_affine_profile(0.8, period=2e-3 * np.pi, n0=4, ratio=5, h_rms=1e-6, seed=2)
     separation = 0.6 * profile.h_max * profile.q0
     gaps = np.array([[0.3, 0.8], [1.0, 2.0], [2.3, 5.1]])
-    field = GapField(StressSource(profile), gaps, separation, 1e-13)
+    field = solved_field(StressSource(profile), gaps, separation, 1e-13)
     theta, opening = explicit_openings(profile, gaps, separation)
     assert np.all(np.diff(theta, axis=1) > 0)
     for k in range(len(gaps)):
@@ -114,9 +117,9 @@ def test_field_converges_with_its_tolerance(source, separation):
     """The error follows the tolerance over six decades, with patches down to 0.16 λ_min."""
     gaps = GAPS.copy()
     gaps[1, 0] = 0.801
-    exact = GapField(source, gaps, separation, 1e-13).opening
+    exact = solved_field(source, gaps, separation, 1e-13).opening
     for tolerance in (1e-3, 1e-5, 1e-7, 1e-9):
-        opening = GapField(source, gaps, separation, tolerance).opening
+        opening = solved_field(source, gaps, separation, tolerance).opening
         assert np.abs(opening - exact).max() < 20 * tolerance * np.abs(exact).max()
 
 
@@ -151,14 +154,14 @@ DEVICES = {
 
 def held(source, gaps, separation, device):
     """Field of the gaps, held so that it is the one that they have at the separation."""
-    fixed = GapField(source, gaps, separation, 1e-13)
+    fixed = solved_field(source, gaps, separation, 1e-13)
     prescribed = device.separation_weight * separation - device.compliance * fixed.pressure
-    return GapField(source, gaps, prescribed, 1e-13, device)
+    return solved_field(source, gaps, prescribed, 1e-13, device)
 
 
 @pytest.mark.parametrize("name", DEVICES)
 def test_the_field_does_not_know_what_holds_it(source, separation, name):
-    fixed = GapField(source, GAPS, separation, 1e-13)
+    fixed = solved_field(source, GAPS, separation, 1e-13)
     field = held(source, GAPS, separation, DEVICES[name])
     assert field.separation == pytest.approx(separation, rel=1e-9)
     assert field.pressure == pytest.approx(fixed.pressure, rel=1e-11)
@@ -175,8 +178,8 @@ def test_derivatives_against_differences(source, separation, name):
         up, down = GAPS.ravel().copy(), GAPS.ravel().copy()
         up[f] += step
         down[f] -= step
-        high = GapField(source, up.reshape(-1, 2), field.prescribed, 1e-13, device)
-        low = GapField(source, down.reshape(-1, 2), field.prescribed, 1e-13, device)
+        high = solved_field(source, up.reshape(-1, 2), field.prescribed, 1e-13, device)
+        low = solved_field(source, down.reshape(-1, 2), field.prescribed, 1e-13, device)
         difference = (high.opening - low.opening).ravel() / (2 * step)
         assert np.abs(difference - by_edge[:, f]).max() < 2e-6 * np.abs(difference).max()
         slope = (high.pressure - low.pressure) / (2 * step)
@@ -187,7 +190,7 @@ def test_derivatives_against_differences(source, separation, name):
 
 def test_hessian_is_symmetric(source, separation):
     """C_e ∂C_e/∂n_f is a second derivative of the energy."""
-    field = GapField(source, GAPS, separation, 1e-13)
+    field = solved_field(source, GAPS, separation, 1e-13)
     outward = np.tile([1.0, -1.0], 5)
     hessian = field.opening.ravel()[:, None] * field.derivatives[0] * outward
     off = hessian - np.diag(np.diag(hessian))
@@ -198,7 +201,7 @@ def test_hessian_is_symmetric(source, separation):
 def test_derivatives_by_what_is_prescribed(source, separation, name):
     field = held(source, GAPS, separation, DEVICES[name])
     way = 0.5 * separation
-    other = GapField(source, GAPS, field.prescribed + way, 1e-13, DEVICES[name])
+    other = solved_field(source, GAPS, field.prescribed + way, 1e-13, DEVICES[name])
     assert np.allclose(other.opening - field.opening, way * field.opening_by_prescribed, rtol=1e-8)
     assert abs(other.pressure - field.pressure - way * field.pressure_by_prescribed) < (
         1e-8 * abs(field.pressure)
@@ -224,7 +227,7 @@ def test_moments_against_brute_force(source, k):
 
 
 def test_mean_gap_is_the_separation(source, separation):
-    field = GapField(source, GAPS, separation, 1e-10)
+    field = solved_field(source, GAPS, separation, 1e-10)
     total = 0.0
     for k in range(5):
         shape = fine_opening(field, k)
@@ -244,7 +247,7 @@ def test_edge_opening_against_the_edge_stress_of_the_grid():
     wanted = np.array([[0.4, 1.5], [2.0, 2.9], [3.3, 4.6], [5.1, 5.9]])  # patches
     errors = []
     for n in (4096, 16384):
-        grid = GridMethod(Problem(profile, half_space, 0.02), nodes=n)
+        grid = grid_of(Problem(profile, half_space, 0.02), nodes=n)
         first, last = np.round(wanted * n / (2 * np.pi)).astype(int).T
         contact = grid.solver.empty(separation)
         for a, b in zip(first, last, strict=True):
@@ -254,7 +257,7 @@ def test_edge_opening_against_the_edge_stress_of_the_grid():
         k_grid = -contact.stress[np.stack([first, last])] * np.sqrt(dx) / 0.7602
         left, right = ((first - 0.31) * 2 * np.pi / n, (last + 0.31) * 2 * np.pi / n)
         gaps = np.stack([right, np.append(left[1:], left[0] + 2 * np.pi)], axis=1)
-        opening = GapField(source, gaps, separation * profile.q0, 1e-10).opening
+        opening = solved_field(source, gaps, separation * profile.q0, 1e-10).opening
         # of a gap's ends the left one belongs to the patch before it
         by_patch = np.stack([np.roll(opening[:, 1], 1), opening[:, 0]])
         k = by_patch * half_space.modulus / 4 * np.sqrt(2 * np.pi / profile.q0)
@@ -277,7 +280,7 @@ def test_hundreds_of_patches_in_one_period():
     source = StressSource(Profile(2 * np.pi, coefficients))
     crest = np.arange(waves) * 2 * np.pi / waves
     gaps = np.stack([crest + half_width / waves, crest + (2 * np.pi - half_width) / waves], axis=1)
-    field = GapField(source, gaps, separation, 1e-10)
+    field = solved_field(source, gaps, separation, 1e-10)
     pressure = waves * amplitude * y
     assert abs(field.pressure / pressure - 1) < 1e-9
     assert np.abs(field.opening).max() < 1e-8 * amplitude * waves

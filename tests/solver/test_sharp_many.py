@@ -329,7 +329,7 @@ def test_potentials_on_a_tree_that_lasts_are_those_on_a_new_one(loaded, seed):
         of_gaps = response.factor.response[: tree.response_start[count]]
         factor = factor_tree(tree, of_gaps, response.factor.negative[:count])
         charges = upward_pass(tree, factor, response.charges.isolated[:, :n].T.copy())
-        potential = np.zeros(charges.mutual.shape)
+        potential = np.zeros(charges.potential_of_sibling.shape)
         downward_pass(tree, factor, whole_tree(tree), charges, potential)
         difference = np.abs(potential[:, :n] - response.potential[:, :n]).max(axis=1)
         assert (difference < 1e-4 * np.abs(potential[:, :n]).max(axis=1)).all()

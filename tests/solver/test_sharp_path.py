@@ -105,10 +105,10 @@ def test_a_touch_on_the_last_step_to_a_fold_is_found_with_edges_held():
     h_max = profile.h_max * profile.q0
     state = method.follow(method.detached(profile.h_max), 0.8 * profile.h_max).states[-1]
     point = method.edges.equilibrium(state.internal.gaps, 0.8 * h_max, 0.01)
-    clear, _ = method.nucleation.least(point.field)
+    clear, _ = method.nucleation.minimum(point.field)
     assert clear > 1e-2 * h_max
-    assert method.nucleation.located_held(point, clear, 0.799 * h_max) is None
-    found = method.nucleation.located_held(point, clear, 0.2 * h_max)
+    assert method.nucleation.locate_touch_at_fixed_edges(point, clear, 0.799 * h_max) is None
+    found = method.nucleation.locate_touch_at_fixed_edges(point, clear, 0.2 * h_max)
     assert 0.2 * h_max < found.point.at < 0.8 * h_max
     np.testing.assert_array_equal(found.point.gaps, point.gaps)
     _, opening = explicit_openings(profile, point.gaps, found.point.at)

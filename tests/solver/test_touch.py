@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
@@ -9,8 +12,8 @@ from adhesis import HalfSpace, Problem, run_loop, self_affine_profile, single_wa
 from adhesis.solver.references.single_wave import SingleWave
 from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.method import SharpMethod
-from adhesis.solver.sharp.nucleation.closing import Closing
-from adhesis.solver.sharp.nucleation.gap_minima import bottoms
+from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
+from adhesis.solver.sharp.nucleation.gap_minima import local_minima
 from adhesis.solver.sharp.nucleation.nucleation import Minima, Nucleation, Touch
 from tests.support.scenes import HALF_SPACE
 
@@ -26,7 +29,7 @@ def places(of: Nucleation, overlaps: list[float]) -> list[float]:
     """Places that get a patch, of minima at θ = 0, 1, … with openings in units of h_max."""
     opening = np.array(overlaps) * AMPLITUDE * 2 * np.pi / PERIOD
     theta, curvature = np.arange(len(overlaps), dtype=float), np.full(len(overlaps), 1e-3)
-    return [touch.theta for touch in of.ready(Minima(theta, opening, curvature))]
+    return [touch.theta for touch in of.choose_seeds(Minima(theta, opening, curvature))]
 
 
 def test_the_deepest_place_gets_a_patch_and_those_that_equal_it() -> None:
@@ -67,7 +70,7 @@ def test_seeds_that_meet_are_one_patch() -> None:
 def test_a_seed_is_narrower_than_the_first_equilibrium_that_it_grows_to(gamma: float) -> None:
     wave = SingleWave(AMPLITUDE, PERIOD, HALF_SPACE.modulus, gamma)
     q0 = 2 * np.pi / PERIOD
-    gaps = nucleation(gamma).seeded(np.empty((0, 2)), [Touch(0.0, 0.0, AMPLITUDE * q0)])
+    gaps = nucleation(gamma).insert_seeds(np.empty((0, 2)), [Touch(0.0, 0.0, AMPLITUDE * q0)])
     width = (2 * np.pi - (gaps[0, 1] - gaps[0, 0])) / q0
     assert 0.2 < width / (2 * wave.half_width(AMPLITUDE)) < 0.6
 
@@ -79,9 +82,9 @@ def test_what_the_parabola_of_a_minimum_may_be_wrong_by_covers_a_cubic() -> None
         nodes = np.linspace(1, -1, 12) + rng.uniform(-0.01, 0.01, 12)
         at, half, third = rng.uniform(-0.5, 0.5), rng.uniform(0.2, 1), rng.uniform(-0.6, 0.6)
         opening = 1 + half * (nodes - at) ** 2 + third * (nodes - at) ** 3
-        place, low, _, _, doubt = bottoms(nodes, opening)
+        place, low, _, _, error = local_minima(nodes, opening)
         if len(place) == 1 and abs(place[0] - at) < 0.3:
-            assert abs(low[0] - 1) <= 1.5 * doubt[0]
+            assert abs(low[0] - 1) <= 1.5 * error[0]
 
 
 @pytest.mark.parametrize(
@@ -108,13 +111,15 @@ def test_the_first_of_several_gaps_that_close_is_aimed_at_by_itself() -> None:
     def clearances(at: float) -> np.ndarray:
         return np.array([0.3 - at - 0.2 * at**2, 0.05 - 0.15 * at + 0.02 * at**3, 1.0 - 1.1 * at])
 
-    closing = Closing(0.0, 1.0, clearances(0.0), clearances(1.0))
+    closing = ClearanceInterpolation(
+        0.0, 1.0, clearances(0.0), clearances(1.0), lambda field: clearances(field.separation)
+    )
     clear, hit = 0.0, 1.0
     wanted = -1e-7
     for _ in range(4):
-        at = clear + (hit - clear) * closing.aim(clear, hit, wanted)
+        at = clear + (hit - clear) * closing.next_trial(clear, hit, wanted)
         least = float(clearances(at).min())
-        closing.note(at, clearances(at))
+        closing.record(at, cast(Any, SimpleNamespace(separation=at)))
         clear, hit = (at, hit) if least > 0 else (clear, at)
     assert abs(least - wanted) < 1e-8
     assert int(np.argmin(clearances(hit))) == 0

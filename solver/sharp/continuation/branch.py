@@ -141,7 +141,7 @@ class Branch:
 
     def continue_from(self, point: Point) -> None:
         """Go on from a further point of the branch, which a descent led to."""
-        self.trail.add(point, self._closing.over(self.point, point, self._target.branch))
+        self.trail.add(point, self._closing.between(self.point, point, self._target.branch))
         self.point, self._predictor = point, Predictor(point)
         self.steps.forget_failures()
 
@@ -168,7 +168,7 @@ class Branch:
         )
         gaps, smallest = reached.gaps, self._edges.smallest
         remaining = without_small(gaps, smallest) if shortest_length(gaps) < smallest else None
-        closed = self._closing.over(self.point, reached, self._target.branch)
+        closed = self._closing.between(self.point, reached, self._target.branch)
         may_touch = self.trail.closed + closed >= self.trail.clearance or remaining is not None
         is_output = error > 1 or reached.at == self._target.at
         # A step that crossed a fold is not halved.

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.solver.crack import Crack
+from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
@@ -17,16 +17,15 @@ from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import NoState
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN
+from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
 from adhesis.solver.sharp.nucleation.location import Located, locate
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
-from adhesis.solver.sharp.output.contact_states import Memory, States
+from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import (
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
-    MOST_OPENINGS,
     SAME_BRANCH,
 )
 from adhesis.solver.values import with_values
@@ -59,18 +58,18 @@ class Follower:
         self.edges, self.nucleation, self.states, self.jumps = edges, nucleation, states, jumps
         self.openings, self.resolution = openings, resolution
         self.closing = ClosingBound(edges)
-        self._last: tuple[Memory, Point] | None = None
+        self._last: tuple[ContinuationData, Point] | None = None
         self._output: tuple[Point, ContactState] | None = None
 
-    def recall_point(self, memory: Memory | None) -> Point | None:
+    def recall_point(self, memory: ContinuationData | None) -> Point | None:
         """Return the point at which a path stopped, if this is the memory of its state."""
-        self.nucleation.seen = NOT_SEEN if memory is None else memory.seen
+        self.nucleation.searched = NONE_SEARCHED if memory is None else memory.searched
         self.openings.healed = []
-        if memory is None or memory.course is None:
+        if memory is None or memory.branch_data is None:
             return None
         if self._last is not None and self._last[0] is memory:
             return self._last[1]
-        at, nearly, rate, slope, previous = memory.course
+        at, nearly, rate, slope, previous = memory.branch_data
         field = self.edges.field_again(memory.gaps, at, *nearly)
         return Point(at, field, rate, slope, memory.clearance, previous)
 
@@ -104,18 +103,18 @@ class Follower:
         """Compute the change of energy between two points of a branch, less the work, in J/m²."""
         if self._output is None or self._output[0] is not output:
             self._output = output, self.states.of_point(output)
-        return self.states.imbalance(self._output[1], self.states.of_point(point))
+        return self.states.energy_residual(self._output[1], self.states.of_point(point))
 
     def _remember(self, history: History, branch: Branch) -> None:
         """Let the last state remember its point."""
         # What has not closed since the last search need not be searched again.
         point = branch.point.with_clearance(max(branch.trail.clearance - branch.trail.closed, 0.0))
         branch.point = point
-        memory = Memory(
+        memory = ContinuationData(
             point.field.gaps,
             point.clearance,
-            (point.at, point.field.nearly, point.rate, point.slope, point.previous),
-            self.nucleation.seen,
+            BranchData(point.at, point.field.nearly, point.rate, point.slope, point.previous),
+            self.nucleation.searched,
         )
         # A dense field does not depend on the way to it; a hierarchical one does.
         if self.edges.uses_windows(point.field.gaps):
@@ -207,17 +206,17 @@ class Follower:
 
     def _is_before(self, state: ContactState, jump: ComputedJump, target: Target) -> bool:
         direction = -1.0 if target.branch == "loading" else 1.0
-        return direction * (self.states.place(state) - jump.at) < 0
+        return direction * (self.states.prescribed_of(state) - jump.at) < 0
 
     def _opening_at(self, history: History, point: Point, target: Target) -> ComputedJump | None:
         """Compute the jump at the start of a branch where patches open at once; else None."""
         if not self.openings.is_possible:
             return None
         while True:
-            least, found = self.openings.least(point.field)
+            least, found = self.openings.minimum(point.field)
             if least > 0:
                 return None
-            opened = Located(point, self.openings.ready(found), 0.0)
+            opened = Located(point, self.openings.choose_seeds(found), 0.0)
             jump = self._opening_jump(opened, target)
             if jump is not None:
                 self._check_openings(history, jump)
@@ -229,7 +228,7 @@ class Follower:
         before = self.states.of_point(point)
         jump = self.jumps.compute(
             before,
-            self.openings.seeded(gaps, opened.seeds),
+            self.openings.insert_seeds(gaps, opened.seeds),
             point.at,
             target.branch,
             known=point,
@@ -272,13 +271,13 @@ class Follower:
         The fold lies somewhere on that step, too.
         """
         point = fold.point
-        low = self.nucleation.least(point.field)[0]
+        low = self.nucleation.minimum(point.field)[0]
         way = abs(fold.at - point.at)
         if not self.edges.is_fixed:
             way *= max(1.0, abs(point.field.separation_by_prescribed))
-        if low > self.closing.rate_held(point) * way:
+        if low > self.closing.rate_at_fixed_edges(point) * way:
             return None
-        return self.nucleation.located_held(point, low, fold.at)
+        return self.nucleation.locate_touch_at_fixed_edges(point, low, fold.at)
 
     def _fold_jump(
         self, last: ContactState | None, fold: Fold, target: Target, finest: float
@@ -294,7 +293,7 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             last = self.states.of_point(point)
             states = (last,)
-        before = self.states.shifted(last, point.field, fold.at)
+        before = self.states.at_fixed_edges(last, point.field, fold.at)
         jump = self.jumps.compute(before, point.field.gaps, fold.at, target.branch, known=point)
         after = jump.states[-1]
         late = self.states.work(before, after, way)

@@ -91,11 +91,13 @@ class Jumps:
         if self._is_same_minimum(rival, point):
             return None
         ends = (self._after(before, end, at) for end in (point, rival))
-        return self.states.apart(*ends)
+        return self.states.energy_difference(*ends)
 
     def _after(self, before: ContactState, point: Point | None, at: float) -> ContactState:
         """State that a descent led to."""
-        return self.states.after_loss(before, at) if point is None else self.states.of_point(point)
+        if point is None:
+            return self.states.detached_after(before, at)
+        return self.states.of_point(point)
 
     def _end_of_rival(self, point: Rival, at: float) -> Point | None:
         """Go on with equal speeds, from a minimum that they reached, until nothing touches."""
@@ -105,7 +107,7 @@ class Jumps:
             point,
             at,
             lambda gaps, touching, before: self._relax(
-                self.nucleation.seeded(gaps, touching),
+                self.nucleation.insert_seeds(gaps, touching),
                 at,
                 equal_speeds=True,
                 start=self.edges.start(before),
@@ -116,7 +118,7 @@ class Jumps:
         """Descend at a d next to that of an equilibrium, until nothing touches."""
 
         def relaxed(gaps: Array, touching: list[Touch], before: Point | None) -> Point | None:
-            gaps = self.nucleation.seeded(gaps, touching) if touching else gaps
+            gaps = self.nucleation.insert_seeds(gaps, touching) if touching else gaps
             return self._relax(gaps, at, start=self.edges.start(before))
 
         return self._nucleate_until_clear(relaxed(start, [], known), at, relaxed)
@@ -143,12 +145,12 @@ class Jumps:
                 _, touches = self.nucleation.first_touch()
                 point = descend(np.empty((0, 2)), touches, None)
                 continue
-            least, minima = self.nucleation.least(point.field)
+            least, minima = self.nucleation.minimum(point.field)
             if least > 0:
                 return point.with_clearance(least)
-            grown = descend(point.field.gaps, self.nucleation.ready(minima), point)
+            grown = descend(point.field.gaps, self.nucleation.choose_seeds(minima), point)
             if grown is not None and self.is_same(grown.field.gaps, point.field.gaps):
-                if adhesive and least < -self.nucleation.overlap:
+                if adhesive and least < -self.nucleation.tolerance:
                     break
                 return point
             point = grown
@@ -180,7 +182,7 @@ class Jumps:
         ``rivals``, unless there is one.
         """
         if touches:
-            gaps = self.nucleation.seeded(gaps, touches)
+            gaps = self.nucleation.insert_seeds(gaps, touches)
         track = Track()
         start = self.edges.start(known)
         point = self._relax(gaps, at, track=track, start=start)

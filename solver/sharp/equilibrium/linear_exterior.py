@@ -119,13 +119,13 @@ def _cover(tree: Tree, first: int, width: int) -> tuple[Integers, Array]:
         run = k - turn
         while parent[run] >= 0:
             above = parent[run]
-            if tree.span[above, 0] != k - turn or tree.span[above, 1] >= last:
+            if tree.gap_range[above, 0] != k - turn or tree.gap_range[above, 1] >= last:
                 break
             run = above
         runs[made] = run
         turns[made] = 2 * np.pi if turn > 0 else 0.0
         made += 1
-        k = tree.span[run, 1] + 1 + turn
+        k = tree.gap_range[run, 1] + 1 + turn
     return runs[:made].copy(), turns[:made].copy()
 
 
@@ -185,7 +185,7 @@ def _reduce_exterior(outside: OutsideRuns, ends: Array, law: EdgeLaw, panels: Pa
     charge = np.empty((r, 2))
     charge[:, 0] = outside.charges.isolated[0, last]
     charge[:, 1] = -outside.charges.isolated[1, last]
-    potential = np.zeros(outside.charges.mutual.shape)
+    potential = np.zeros(outside.charges.potential_of_sibling.shape)
     downward_pass(tree, factor, whole_tree(tree), outside.charges, potential)
     mean = np.zeros(2)
     for leaf in range(outside.runs.shape[0]):
@@ -229,7 +229,7 @@ def extend_window(
     now = solve(window, prescribed, orders, 1, model, exterior)
     kernel, _ = exterior_kernel(now.nodes.theta, now.nodes.weight, exterior)
     own = outside.tree
-    potential = np.zeros(outside.charges.mutual.shape)
+    potential = np.zeros(outside.charges.potential_of_sibling.shape)
     whole = own.node_start[own.rank.shape[0] - 1]
     for i in range(kernel.shape[0]):
         for a in range(kernel.shape[1]):

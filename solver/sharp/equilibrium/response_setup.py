@@ -171,19 +171,24 @@ def _copy_run(known: LinearResponse, old: int, out: LinearResponse, new: int) ->
     _copy(known.factor.response, theirs, out.factor.response, own)
     out.factor.negative[new] = known.factor.negative[old]
     theirs, own = run_span(source.pair_start, old), run_span(tree.pair_start, new)
-    _copy(known.factor.pair, theirs, out.factor.pair, own)
+    _copy(known.factor.pair_inverse, theirs, out.factor.pair_inverse, own)
     theirs, own = run_span(source.kernel_start, old), run_span(tree.kernel_start, new)
     _copy(source.kernel, theirs, tree.kernel, own)
     theirs = run_span(source.interpolation_start, old)
     own = run_span(tree.interpolation_start, new)
     _copy(source.interpolation, theirs, tree.interpolation, own)
-    _copy(known.factor.inward, theirs, out.factor.inward, own)
+    _copy(known.factor.inner_potential, theirs, out.factor.inner_potential, own)
     for half in range(2):
         if tree.children[new, half] >= 0:
             theirs = run_span(source.node_start, source.children[old, half])
             own = run_span(tree.node_start, tree.children[new, half])
             for column in range(2):
-                _copy(known.charges.mutual[column], theirs, out.charges.mutual[column], own)
+                _copy(
+                    known.charges.potential_of_sibling[column],
+                    theirs,
+                    out.charges.potential_of_sibling[column],
+                    own,
+                )
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Equation (1) of ``dense_solver``: nodes, matrix and loads of given gaps.
+"""Assemble equation (1) of ``dense_solver``: nodes, matrix and loads of given gaps.
 
 A gap's own part, its diagonal block and its loads, depends on its row of the table of gaps alone;
 the blocks between gaps are the half-space kernel at their nodes.
@@ -22,13 +22,11 @@ _MAPPED_SERIES = 0.3
 
 
 @compiled
-def node_offsets(orders: Integers, rules: GaussRules, exterior: Exterior) -> Integers:
-    """Number the first node of each gap, and all; the exterior, the last gap, has none."""
+def node_offsets(orders: Integers, rules: GaussRules) -> Integers:
+    """Number the first node of each gap, and all."""
     offset = np.zeros(orders.shape[0] + 1, dtype=np.int64)
     for k in range(orders.shape[0]):
         offset[k + 1] = offset[k] + rules.counts[orders[k]]
-    if is_present(exterior):
-        offset[-1] = offset[-2]
     return offset
 
 
@@ -37,22 +35,24 @@ def assemble_dense(
     table: Array, orders: Integers, fields: int, model: FieldModel, exterior: Exterior
 ) -> tuple[Nodes, Equations]:
     """Assemble (1) with the source S (``fields`` 1), or S and S' (2), without the exterior."""
-    offset = node_offsets(orders, model.rules, exterior)
+    offset = node_offsets(orders, model.rules)
+    if is_present(exterior):  # the last gap, without nodes
+        offset[-1] = offset[-2]
     nodes, equations = _allocate(table, orders, offset, offset[-1], fields)
-    gaps = table.shape[0]
+    count = table.shape[0]
     if is_present(exterior):
-        gaps -= 1
-        nodes.slope[gaps] = 1.0
-        equations.end_terms[gaps] = 0.0
-    fill_gaps(np.arange(gaps), nodes, equations, offset, model)
-    for k in range(gaps):
+        count -= 1
+        nodes.slope[count] = 1.0
+        equations.end_terms[count] = 0.0
+    fill_gaps(np.arange(count), nodes, equations, offset, model)
+    for k in range(count):
         _fill_rows(k, nodes, equations.matrix)
     return nodes, equations
 
 
 @compiled
 def assemble_changed(table: Array, before: Solution, model: FieldModel) -> tuple[Nodes, Equations]:
-    """Assemble as :func:`assemble_dense`, taking over the parts of gaps that have not changed."""
+    """Assemble as :func:`assemble_dense`, copying the parts of unchanged gaps."""
     old, known = before.nodes, before.equations
     offset = old.offset
     nodes = Nodes(
@@ -87,11 +87,9 @@ def assemble_blocks(
 
     The block of gap k is ``matrix[offset[k] : offset[k + 1], :m]``, m its number of nodes.
     """
-    gaps = table.shape[0]
-    offset, widest = _block_offsets(orders, model.rules)
-    nodes, equations = _allocate(table, orders, offset, widest, fields)
-    equations.matrix[:] = 0.0
-    fill_gaps(np.arange(gaps), nodes, equations, np.zeros(gaps, dtype=np.int64), model)
+    count = table.shape[0]
+    nodes, equations = _allocate_blocks(table, orders, fields, model.rules)
+    fill_gaps(np.arange(count), nodes, equations, np.zeros(count, dtype=np.int64), model)
     return nodes, equations
 
 
@@ -104,13 +102,12 @@ def assemble_some(
     before: Equations,
     model: FieldModel,
 ) -> tuple[Nodes, Equations]:
-    """Assemble diagonal blocks with S and S', taking over those of gaps from a known ``source``.
+    """Assemble diagonal blocks with S and S', copying those of unchanged gaps.
 
-    That is -1 for the others.
+    ``source[k]`` is the index of gap k in ``known``, or -1.
     """
-    offset, widest = _block_offsets(orders, model.rules)
-    nodes, equations = _allocate(table, orders, offset, widest, 2)
-    equations.matrix[:] = 0.0
+    nodes, equations = _allocate_blocks(table, orders, 2, model.rules)
+    offset = nodes.offset
     for k in range(source.shape[0]):
         j = source[k]
         if j >= 0:
@@ -131,45 +128,46 @@ def assemble_some(
 
 
 @compiled
-def _block_offsets(orders: Integers, rules: GaussRules) -> tuple[Integers, int]:
-    """Number the first node of each gap, and all; and find the most nodes of a gap."""
-    offset = np.zeros(orders.shape[0] + 1, dtype=np.int64)
-    widest = 0
-    for k in range(orders.shape[0]):
-        m = rules.counts[orders[k]]
-        offset[k + 1] = offset[k] + m
-        widest = max(widest, m)
-    return offset, widest
-
-
-@compiled
 def _allocate(
     table: Array, orders: Integers, offset: Integers, columns: int, fields: int
 ) -> tuple[Nodes, Equations]:
     """Allocate nodes and equations."""
-    gaps, n = table.shape[0], offset[-1]
+    count, n = table.shape[0], offset[-1]
     nodes = Nodes(
         table, orders, offset, np.empty(n), np.empty(n), np.empty(n), np.empty(n),
-        np.empty((gaps, 2)),
+        np.empty((count, 2)),
     )  # fmt: skip
     equations = Equations(
         matrix=np.empty((n, columns)),
         load=np.empty((n, fields + 1)),
-        end_terms=np.empty((gaps, 2, fields)),
+        end_terms=np.empty((count, 2, fields)),
     )
     return nodes, equations
 
 
 @compiled
+def _allocate_blocks(
+    table: Array, orders: Integers, fields: int, rules: GaussRules
+) -> tuple[Nodes, Equations]:
+    """Allocate nodes, and equations whose matrix holds the diagonal blocks alone, zeros."""
+    widest = 0
+    for k in range(orders.shape[0]):
+        widest = max(widest, rules.counts[orders[k]])
+    nodes, equations = _allocate(table, orders, node_offsets(orders, rules), widest, fields)
+    equations.matrix[:] = 0.0
+    return nodes, equations
+
+
+@compiled
 def fill_gaps(
-    gaps: Integers, nodes: Nodes, equations: Equations, column: Integers, model: FieldModel
+    indices: Integers, nodes: Nodes, equations: Equations, column: Integers, model: FieldModel
 ) -> None:
     """Fill in the own parts of some gaps; their blocks begin in these columns of the matrix."""
     rules, panels = model.rules, model.panels
     counts, orders, offset, table = rules.counts, nodes.orders, nodes.offset, nodes.table
     matrix, load, end_terms = equations.matrix, equations.load, equations.end_terms
     fields = end_terms.shape[2]
-    for k in gaps:
+    for k in indices:
         m = counts[orders[k]]
         s = np.empty((m, fields))
         ends = np.empty((2, fields))
@@ -208,11 +206,11 @@ def _fill_nodes(k: int, s: Array, nodes: Nodes, load: Array, rules: GaussRules) 
     slope[k, 0] = 1 / theta_at(gap, -1.0)[1]
     slope[k, 1] = 1 / theta_at(gap, 1.0)[1]
     for i in range(m):
-        place = base + i
-        theta[place], stretch = theta_at(gap, eta[start + i])
-        weight[place] = weights[start + i] * stretch
-        sine[place], cosine[place] = np.sin(0.5 * theta[place]), np.cos(0.5 * theta[place])
-        load[i, 1] = weight[place]
+        node = base + i
+        theta[node], stretch = theta_at(gap, eta[start + i])
+        weight[node] = weights[start + i] * stretch
+        sine[node], cosine[node] = np.sin(0.5 * theta[node]), np.cos(0.5 * theta[node])
+        load[i, 1] = weight[node]
         for field in range(s.shape[1]):
             total = 0.0
             for j in range(m):

@@ -1,8 +1,8 @@
-"""Dense symmetric positive definite systems, compiled, without calls of LAPACK.
+"""Factor and solve dense symmetric positive definite systems, compiled, without LAPACK.
 
 A field of a few gaps has some tens of unknowns, seldom hundreds; there the overhead of library
 calls and their copies dominates. Factors are A = LᵀL with L lower, by rows and from the last
-one on: every loop then starts at the beginning of a row, and eight rows are taken away at once, so
+one on: every loop then starts at the beginning of a row, and eight rows are subtracted at once, so
 that sums stay in vector registers.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_sums
 
-BLOCK = 8  # rows that are taken away at once; multiples of it as many columns are the fastest
+BLOCK = 8  # rows that are subtracted at once; numbers of columns that it divides are fastest
 
 
 @compiled_sums

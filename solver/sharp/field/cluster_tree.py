@@ -1,4 +1,4 @@
-"""Binary tree of neighbouring gaps: the charges through which each run acts on the others.
+"""Build the binary tree of neighbouring gaps, whose runs act on each other through charges.
 
 In its own coordinate η (``conformal_map``) a gap acts on the others through charges q_i = w_i f_i
 at its nodes; the others' potentials g_i = (dθ/dη) g(θ_i) there are
@@ -8,8 +8,9 @@ at its nodes; the others' potentials g_i = (dθ/dη) g(θ_i) there are
 A run of neighbouring gaps is an interval between two patches, just as a gap is one: in *its*
 coordinate all that lies outside is again on the line Im η = π/(2α), however narrow the patches at
 its ends. So it acts on the outside like a few charges at the Chebyshev nodes of η, their number
-growing with the logarithm of run over patch. The tree holds their places, the kernel K between both
-halves of a run, and the interpolation E from its nodes to theirs; ``tree_factor`` solves on it.
+growing with the logarithm of run over patch. The tree holds their positions, the kernel K between
+both halves of a run, and the interpolation E from its nodes to theirs; ``tree_factor`` solves on
+it.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class Tree(NamedTuple):
 
     Attributes
     ----------
-    children, span : int array, shape (runs, 2)
+    children, gap_range : int array, shape (runs, 2)
         Both halves of a run, -1 for a gap; and its first and last gap.
     rows : array, shape (runs, 5)
         Its ends and patches, as in the table of gaps; of a whole period none.
@@ -57,7 +58,7 @@ class Tree(NamedTuple):
     """
 
     children: Integers
-    span: Integers
+    gap_range: Integers
     rows: Array
     rank: Integers
     node_start: Integers
@@ -73,13 +74,13 @@ class Tree(NamedTuple):
 
 @compiled
 def run_span(start: Integers, run: int) -> slice:
-    """Return where a flat array holds what belongs to a run."""
+    """Return the slice of a flat array that belongs to a run."""
     return slice(start[run], start[run + 1])
 
 
 @compiled
 def run_halves(tree: Tree, run: int) -> tuple[int, int, int, int]:
-    """Return both halves of a run, and how many charges they have."""
+    """Return both halves of a run, and their numbers of charges."""
     one, two = tree.children[run, 0], tree.children[run, 1]
     return one, two, tree.rank[one], tree.rank[two]
 
@@ -97,17 +98,17 @@ def _interval(table: Array, first: int, last: int) -> Array:
 
 @compiled
 def _wanted_rank(row: Array, digits: float) -> int:
-    """Return how many charges a run needs."""
+    """Return the number of charges that a run needs."""
     wanted = int(np.ceil((digits + CHARGE_MARGIN) / convergence_rate(row)))
     return min(max(wanted, FEWEST_CHARGES), MOST_CHARGES)
 
 
 @compiled
-def _pair_runs(gaps: int) -> Integers:
+def _pair_runs(count: int) -> Integers:
     """Pair neighbouring runs, level by level; returns both halves of each."""
-    children = np.full((2 * gaps - 1, 2), -1)
-    level = np.arange(gaps)
-    made = gaps
+    children = np.full((2 * count - 1, 2), -1)
+    level = np.arange(count)
+    made = count
     while level.shape[0] > 1:
         above = np.empty((level.shape[0] + 1) // 2, dtype=np.int64)
         for i in range(level.shape[0] // 2):
@@ -122,24 +123,24 @@ def _pair_runs(gaps: int) -> Integers:
 
 @compiled
 def pair_again(known: Integers, source: Integers) -> tuple[Integers, Integers]:
-    """Pair the runs of gaps of which most are those of a tree with the halves ``known``.
+    """Pair the runs of gaps most of which were gaps of a tree with the halves ``known``.
 
-    Returns both halves of each run, and which run it was, -1 where something has changed.
-    ``source`` is which gap each was, -1 if none. Such a gap takes the place of one that is gone, if
-    there is one between the same neighbours; else it is paired with the gap before it.
+    ``source[k]`` is the index of gap k in that tree, or -1. A gap that is not in the tree replaces
+    one that is gone, if there is one between the same neighbours; else it is paired with the gap
+    before it. Returns both halves of each run, and its index in the tree, -1 if it has changed.
     """
-    gaps, runs, before = source.shape[0], 2 * source.shape[0] - 1, (known.shape[0] + 1) // 2
+    count, runs, before = source.shape[0], 2 * source.shape[0] - 1, (known.shape[0] + 1) // 2
     children, same = np.full((runs, 2), -1), np.full(runs, -1)
-    same[:gaps] = source
+    same[:count] = source
     image = np.full(known.shape[0], -1)  # of every run of the tree
-    made = gaps
-    first = -1  # run of the gaps before all places
-    free = 0  # place
-    for k in range(gaps):
+    made = count
+    first = -1  # run of the gaps before all known ones
+    free = 0  # index in the tree
+    for k in range(count):
         after = k
-        while after < gaps and source[after] < 0:
+        while after < count and source[after] < 0:
             after += 1
-        end = source[after] if after < gaps else before
+        end = source[after] if after < count else before
         if source[k] >= 0:
             free = source[k]
         if source[k] >= 0 or free < end:
@@ -152,8 +153,8 @@ def pair_again(known: Integers, source: Integers) -> tuple[Integers, Integers]:
         elif free == 0 and first < 0:
             first = k
         else:
-            place = first if free == 0 else image[free - 1]
-            children[made, 0], children[made, 1] = place, k
+            partner = first if free == 0 else image[free - 1]
+            children[made, 0], children[made, 1] = partner, k
             if free == 0:
                 first = made
             else:
@@ -175,15 +176,15 @@ def pair_again(known: Integers, source: Integers) -> tuple[Integers, Integers]:
 def empty_tree(
     table: Array, offset: Integers, children: Integers, known: Integers, digits: float, closed: bool
 ) -> Tree:
-    """Make space for the tree of the gaps of ``table``, in runs with these halves.
+    """Allocate the tree of the gaps of ``table``, in runs with these halves.
 
-    ``known`` are the numbers of charges of runs for which they are known, else 0. ``closed`` if the
-    gaps are all those of the period, so that there is nothing outside; else they must leave space
-    for at least one more.
+    ``known`` are the numbers of charges of known runs, else 0. ``closed`` if the gaps are all those
+    of the period, so that there is nothing outside; else they must leave space for at least one
+    more.
     """
-    runs, gaps = children.shape[0], table.shape[0]
+    runs, count = children.shape[0], table.shape[0]
     rank = known.copy()
-    span = np.empty((runs, 2), dtype=np.int64)
+    gap_range = np.empty((runs, 2), dtype=np.int64)
     rows = np.empty((runs, table.shape[1]))
     at = np.zeros(runs + 1, dtype=np.int64)
     square = np.zeros(runs + 1, dtype=np.int64)
@@ -192,16 +193,16 @@ def empty_tree(
     lift = np.zeros(runs + 1, dtype=np.int64)
     for run in range(runs):
         one, two = 0, 0
-        if run < gaps:
-            span[run] = run
+        if run < count:
+            gap_range[run] = run
             rows[run] = table[run]
             rank[run] = offset[run + 1] - offset[run]
         else:
             first, last = children[run, 0], children[run, 1]
             one, two = rank[first], rank[last]
-            span[run, 0], span[run, 1] = span[first, 0], span[last, 1]
+            gap_range[run, 0], gap_range[run, 1] = gap_range[first, 0], gap_range[last, 1]
             if run < runs - 1 or not closed:
-                rows[run] = _interval(table, span[run, 0], span[run, 1])
+                rows[run] = _interval(table, gap_range[run, 0], gap_range[run, 1])
                 if rank[run] == 0:
                     rank[run] = _wanted_rank(rows[run], digits)
         r = rank[run]
@@ -211,7 +212,7 @@ def empty_tree(
         mixed[run + 1] = mixed[run] + one * two
         lift[run + 1] = lift[run] + (one + two) * r
     return Tree(
-        children, span, rows, rank, at, square, inner, mixed, lift, np.empty(at[runs]),
+        children, gap_range, rows, rank, at, square, inner, mixed, lift, np.empty(at[runs]),
         np.empty(at[runs]), np.empty(mixed[runs]), np.empty(lift[runs]),
     )  # fmt: skip
 
@@ -224,13 +225,13 @@ def build_tree(
 
     ``closed`` as in :func:`empty_tree`.
     """
-    gaps = table.shape[0]
-    children = _pair_runs(gaps)
+    count = table.shape[0]
+    children = _pair_runs(count)
     none: Integers = np.zeros(children.shape[0], dtype=np.int64)
     tree = empty_tree(table, offset, children, none, digits, closed)
     tree.theta[: theta.shape[0]] = theta
     tree.stretch[: theta.shape[0]] = stretch
-    for run in range(gaps, children.shape[0]):
+    for run in range(count, children.shape[0]):
         place_charges(tree, run)
     return tree
 
@@ -239,31 +240,31 @@ def build_tree(
 def place_charges(tree: Tree, run: int) -> None:
     """Place the charges of a run, and compute its interpolation and kernel."""
     at, r, row = tree.node_start, tree.rank[run], tree.rows[run]
-    places, stretches = tree.theta, tree.stretch
+    theta, stretch = tree.theta, tree.stretch
     for i in range(r):
         t = np.pi * (r - i - 0.5) / r
-        places[at[run] + i], stretches[at[run] + i] = theta_at(row, np.cos(t))
+        theta[at[run] + i], stretch[at[run] + i] = theta_at(row, np.cos(t))
     begin = tree.interpolation_start[run]
     for half in range(2):
         child = tree.children[run, half]
         own = slice(at[child], at[child + 1])
         end = begin + tree.rank[child] * r
-        _interpolate(row, places[own], stretches[own], r, tree.interpolation[begin:end])
+        _interpolate(row, theta[own], stretch[own], r, tree.interpolation[begin:end])
         begin = end
     own = slice(at[tree.children[run, 0]], at[tree.children[run, 0] + 1])
     other = slice(at[tree.children[run, 1]], at[tree.children[run, 1] + 1])
     kernel = tree.kernel[run_span(tree.kernel_start, run)]
-    _kernel(places[own], stretches[own], places[other], stretches[other], kernel)
+    _kernel(theta[own], stretch[own], theta[other], stretch[other], kernel)
 
 
 @compiled
 def replace_run(tree: Tree, run: int, table: Array, digits: float) -> bool:
     """Place the charges of a run anew; returns whether it has enough.
 
-    One less than it needs is enough: the margin covers it.
+    Accepts one charge fewer than required; CHARGE_MARGIN covers it.
     """
     if tree.rank[run] > 0:
-        tree.rows[run] = _interval(table, tree.span[run, 0], tree.span[run, 1])
+        tree.rows[run] = _interval(table, tree.gap_range[run, 0], tree.gap_range[run, 1])
         if _wanted_rank(tree.rows[run], digits) > tree.rank[run] + 1:
             return False
     place_charges(tree, run)
@@ -288,7 +289,7 @@ def _kernel(theta: Array, stretch: Array, other: Array, other_stretch: Array, ou
 
 @compiled
 def _interpolate(row: Array, theta: Array, stretch: Array, rank: int, out: Array) -> None:
-    """Interpolate potentials from the nodes of an interval to places inside it, flat."""
+    """Compute the interpolation of potentials from the nodes of an interval to points inside."""
     node = np.empty(rank)
     share = np.empty(rank)
     for a in range(rank):

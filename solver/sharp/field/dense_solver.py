@@ -1,4 +1,4 @@
-"""Elastic field of given contact edges: every gap is a crack in a full contact.
+"""Solve the elastic field of given contact edges: every gap is a crack in a full contact.
 
 Full contact carries the stress σ_full; the gaps relieve it. With θ = q0 x, S = 2σ/E*, T = q0 t (gap
 opening) and |D| the operator with symbol |m|,
@@ -42,7 +42,6 @@ from adhesis.solver.sharp.field.assembly import assemble_changed, assemble_dense
 from adhesis.solver.sharp.field.cholesky import cholesky, solve_column, solve_factored
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.exterior import (
-    NO_EXTERIOR,
     Exterior,
     ExteriorCoupling,
     add_exterior,
@@ -50,7 +49,6 @@ from adhesis.solver.sharp.field.exterior import (
     translation_terms,
 )
 from adhesis.solver.sharp.field.solution import (
-    FIXED_SEPARATION,
     Equations,
     ExteriorTerms,
     FieldModel,
@@ -60,13 +58,20 @@ from adhesis.solver.sharp.field.solution import (
     balance_means,
     combine_openings,
     edge_openings,
+    mean_openings,
     no_exterior_terms,
     no_solution,
 )
 from adhesis.solver.sharp.field.weight_function import exterior_singular_terms
 from adhesis.solver.sharp.gap.conformal_map import in_order, map_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers
+
+
+def check_definite(solution: Solution) -> None:
+    """Raise FloatingPointError if there is no solution."""
+    if math.isnan(solution.pressure):
+        raise FloatingPointError("the matrix of the gaps is not positive definite")
 
 
 class GapField:
@@ -83,8 +88,8 @@ class GapField:
     tolerance : float
         Wanted relative accuracy of the interaction between gaps.
     device : LoadingDevice
-    solution : Solution, optional
-        The solution for these gaps, if it is known already.
+    solution : Solution
+        The solution for these gaps.
 
     Attributes
     ----------
@@ -103,17 +108,12 @@ class GapField:
         gaps: Array,
         prescribed: float,
         tolerance: float,
-        device: LoadingDevice = FIXED_SEPARATION,
-        solution: Solution | None = None,
+        device: LoadingDevice,
+        solution: Solution,
     ) -> None:
         self.source, self.gaps, self.prescribed = source, gaps, prescribed
         self.tolerance, self.device = tolerance, device
-        if solution is None:
-            model = FieldModel(device, float(-np.log(tolerance)), GAUSS_RULES, source.panels)
-            orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
-            solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
-        if math.isnan(solution.pressure):
-            raise FloatingPointError("the matrix of the gaps is not positive definite")
+        check_definite(solution)
         self._solution = solution
         self.nearly = solution.pressure, solution.separation
 
@@ -133,8 +133,8 @@ class GapField:
         return self.solution.separation
 
     @property
-    def held(self) -> Solution:
-        """Solution with its responses at held edges."""
+    def fixed_edge_solution(self) -> Solution:
+        """Solution that also holds the responses at fixed edges."""
         return self.solution
 
     @property
@@ -145,20 +145,20 @@ class GapField:
     @property
     def pressure_by_prescribed(self) -> float:
         """∂p/∂d at fixed edges; negative."""
-        return -2 * np.pi / float(self.held.mean.resistance)
+        return -2 * np.pi / float(self.fixed_edge_solution.mean.resistance)
 
     @property
     def separation_by_prescribed(self) -> float:
         """∂(q0 s)/∂d at fixed edges."""
-        unit_mean = float(self.held.mean.unit_mean)
+        unit_mean = float(self.fixed_edge_solution.mean.unit_mean)
         return -unit_mean * self.pressure_by_prescribed / (2 * np.pi)
 
     @cached_property
     def opening_by_prescribed(self) -> Array:
         """∂C/∂d at fixed edges, shape (L, 2)."""
-        state = self.held
-        unit = np.ascontiguousarray(-self.pressure_by_prescribed * state.solved[:, 1:2])
-        out: Array = edge_openings(unit, state.nodes, GAUSS_RULES)
+        solution = self.fixed_edge_solution
+        unit = np.ascontiguousarray(-self.pressure_by_prescribed * solution.solved[:, 1:2])
+        out: Array = edge_openings(unit, solution.nodes, GAUSS_RULES)
         return out[:, 0].reshape(-1, 2)
 
     @cached_property
@@ -183,7 +183,7 @@ def solve(
     """Solve (1) with the source S (``fields`` 1), or S and S' (2) for :func:`derivatives`.
 
     An iteration must keep the orders: where they change, the field jumps by its error. The pressure
-    is NaN if the matrix is not positive definite to rounding, or edges are no numbers or cross.
+    is NaN if the matrix is not positive definite to rounding, or edges are NaN or cross.
     """
     table = map_gaps(gaps)
     if not in_order(table):
@@ -201,9 +201,9 @@ def solve_again(
     exterior: Exterior,
     before: Solution,
 ) -> Solution:
-    """Solve (1) with S and S', taking over the equations of gaps that have not changed.
+    """Solve (1) with S and S', copying the equations of unchanged gaps.
 
-    They are those of such a solution ``before``.
+    They are copied from ``before``, a solution with S and S'.
     """
     table = map_gaps(gaps)
     if not in_order(table):
@@ -235,11 +235,7 @@ def _solve_equations(
         return no_solution(nodes.table, nodes.orders, model.device)
     solved = load.copy()
     solve_factored(factor, solved)
-    load_mean = 0.0
-    unit_mean = 0.0
-    for i in range(load.shape[0]):
-        load_mean += load[i, 1] * solved[i, 0]
-        unit_mean += load[i, 1] * solved[i, 1]
+    load_mean, unit_mean = mean_openings(load, solved)
     if is_present(exterior):
         load_mean -= exterior.mean[0]
         unit_mean += exterior.mean[1]

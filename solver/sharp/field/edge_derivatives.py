@@ -1,4 +1,4 @@
-"""Derivatives of the field of ``dense_solver`` with respect to the edges.
+"""Compute the derivatives of the field of ``dense_solver`` with respect to the edges.
 
 Those of other edges follow from the weight functions (``weight_function``), an edge's own from
 translation invariance: moving all edges together is moving the profile, whose source is S_full'.
@@ -21,27 +21,27 @@ from adhesis.solver.sharp.gap.quadrature import GaussRules
 
 
 @compiled_for_both
-def derivatives(state: Solution, rules: GaussRules) -> tuple[Array, Array]:
+def derivatives(solution: Solution, rules: GaussRules) -> tuple[Array, Array]:
     """Compute ∂C_e/∂θ_f, shape (2L, 2L), and ∂Y/∂θ_f, shape (2L,), of a solution with S and S'.
 
     Y is p, under a load q0 s.
     """
-    edges = state.opening.shape[0]
+    edges = solution.opening.shape[0]
     every = np.arange(edges)
-    load, area = singular_loads(state, every, padded(edges), rules)
-    if state.exterior.present:
-        load[:, :edges] += state.exterior.load
-        area += state.exterior.area
-    solve_factored(state.factor, load)
-    by_edge, conjugate = openings_by_edges(state, every, load, area, rules)
-    together = openings_by_translation(state, rules)
+    load, area = singular_loads(solution, every, padded(edges), rules)
+    if solution.exterior.present:
+        load[:, :edges] += solution.exterior.load
+        area += solution.exterior.area
+    solve_factored(solution.factor, load)
+    by_edge, conjugate = openings_by_edges(solution, every, load, area, rules)
+    together = openings_by_translation(solution, rules)
     for e in range(edges):
         total = 0.0
         for f in range(edges):
             if f != e:
                 total += by_edge[e, f]
         by_edge[e, e] = together[e] - total
-    if state.exterior.present:
+    if solution.exterior.present:
         # the ends of the exterior stay
         typical = 0.0
         for e in range(edges - 2):

@@ -1,7 +1,7 @@
-"""Exterior of a window of gaps: a linear response about a known state, as a Schur complement.
+"""Represent the exterior of a window of gaps by a Schur complement.
 
-Gaps outside a window act on it through the charges q of their run at its nodes ξ
-(``cluster_tree``),
+The exterior is a linear response about a known state. Gaps outside a window act on it through the
+charges q of their run at its nodes ξ (``cluster_tree``),
 
     q = q0 - p q1 - R g,      g = -Kᵀ w f   (the potentials of the window's gaps at ξ),
 
@@ -86,7 +86,7 @@ def is_present(exterior: Exterior) -> bool:
 
 @compiled
 def exterior_kernel(theta: Array, weight: Array, exterior: Exterior) -> tuple[Array, Array]:
-    """Evaluate w K at some places, shape (places, r), and its derivative by θ."""
+    """Evaluate w K at some positions, shape (positions, r), and its derivative by θ."""
     value = np.empty((theta.shape[0], exterior.theta.shape[0]))
     slope = np.empty((theta.shape[0], exterior.theta.shape[0]))
     sine, cosine = np.sin(0.5 * exterior.theta), np.cos(0.5 * exterior.theta)

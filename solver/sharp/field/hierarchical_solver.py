@@ -1,4 +1,4 @@
-"""Field of many gaps: equation (1) of ``dense_solver`` on a tree of gaps.
+"""Solve the field of many gaps: equation (1) of ``dense_solver`` on a tree of gaps.
 
 Equation and nodes are those of the dense solver; the gaps interact through ``cluster_tree``. The
 work grows as the number of gaps.
@@ -21,6 +21,7 @@ from adhesis.solver.sharp.field.solution import (
     Solution,
     balance_means,
     combine_openings,
+    mean_openings,
     no_exterior_terms,
 )
 from adhesis.solver.sharp.field.tree_factor import (
@@ -34,7 +35,7 @@ from adhesis.solver.sharp.gap.conformal_map import in_order, map_gaps
 from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 
-class HierarchicalSystem(NamedTuple):
+class FactoredGaps(NamedTuple):
     """Factored equations of many gaps, beyond their :class:`Solution`.
 
     The matrix of the solution's equations holds the diagonal blocks.
@@ -60,14 +61,14 @@ class HierarchicalSystem(NamedTuple):
 def invert_blocks(nodes: Nodes, blocks: Array, rules: GaussRules) -> tuple[Array, Array, bool]:
     """Invert the diagonal blocks A: A⁻¹ and w A⁻¹ w, flat, and whether all are definite."""
     offset = nodes.offset
-    gaps = offset.shape[0] - 1
+    count = offset.shape[0] - 1
     size = 0
-    for k in range(gaps):
+    for k in range(count):
         size += (offset[k + 1] - offset[k]) ** 2
     inverse = np.empty(size)
     response = np.empty(size)
     at = 0
-    for k in range(gaps):
+    for k in range(count):
         m = offset[k + 1] - offset[k]
         start = rules.vector_start[nodes.orders[k]]
         block = blocks[offset[k] : offset[k + 1], :m]
@@ -129,10 +130,10 @@ def apply_inverse(offset: Integers, inverse: Array, x: Array) -> Array:
 @compiled_for_both
 def solve_many(
     gaps: Array, prescribed: float, orders: Integers, fields: int, model: FieldModel
-) -> tuple[Solution, HierarchicalSystem]:
+) -> tuple[Solution, FactoredGaps]:
     """Solve the field of many gaps, otherwise as ``dense_solver.solve``.
 
-    Of S' there is the load alone, no solution.
+    Of S' only the load is computed, no solution.
     """
     table = map_gaps(gaps)
     count = table.shape[0]
@@ -145,13 +146,9 @@ def solve_many(
     weights = quadrature_weights(nodes, model.rules)
     tree = build_tree(table, offset, nodes.theta, nodes.weight / weights, model.digits, True)
     factor = factor_tree(tree, response, np.zeros(count, dtype=np.int64))
-    system = HierarchicalSystem(inverse, weights, tree, factor)
-    solved = solve_loads(system, offset, load[:, :2].copy(), np.zeros((load.shape[0], 2)))
-    load_mean = 0.0
-    unit_mean = 0.0
-    for i in range(load.shape[0]):
-        load_mean += load[i, 1] * solved[i, 0]
-        unit_mean += load[i, 1] * solved[i, 1]
+    factored = FactoredGaps(inverse, weights, tree, factor)
+    solved = solve_loads(factored, offset, load[:, :2].copy(), np.zeros((load.shape[0], 2)))
+    load_mean, unit_mean = mean_openings(load, solved)
     mean, pressure, separation = balance_means(load_mean, unit_mean, prescribed, model.device)
     if not (ordered and definite):
         pressure = np.nan
@@ -168,41 +165,42 @@ def solve_many(
         opening=opening,
         exterior=no_exterior_terms(),
     )
-    return solution, system
+    return solution, factored
 
 
 @compiled
-def solve_loads(system: HierarchicalSystem, offset: Integers, load: Array, charge: Array) -> Array:
+def solve_loads(factored: FactoredGaps, offset: Integers, load: Array, charge: Array) -> Array:
     """Apply (B + G)⁻¹ to loads, and to the potentials of further charges of the gaps, as columns.
 
     The potential of a gap's further charges in that gap itself is part of its load.
     """
-    solved = apply_inverse(offset, system.inverse, load)
-    w, own = system.weights, np.empty(load.shape)
+    solved = apply_inverse(offset, factored.inverse, load)
+    w, own = factored.weights, np.empty(load.shape)
     for i in range(load.shape[0]):
         for c in range(load.shape[1]):
             own[i, c] = w[i] * solved[i, c] + charge[i, c]
-    charges = upward_pass(system.tree, system.factor, own)
-    potential = np.zeros(charges.mutual.shape)
-    downward_pass(system.tree, system.factor, whole_tree(system.tree), charges, potential)
+    tree = factored.tree
+    charges = upward_pass(tree, factored.factor, own)
+    potential = np.zeros(charges.potential_of_sibling.shape)
+    downward_pass(tree, factored.factor, whole_tree(tree), charges, potential)
     for i in range(load.shape[0]):
         for c in range(load.shape[1]):
             own[i, c] = load[i, c] - w[i] * potential[c, i]
-    return apply_inverse(offset, system.inverse, own)
+    return apply_inverse(offset, factored.inverse, own)
 
 
 @compiled
-def gap_potentials(state: Solution, weights: Array) -> Array:
+def gap_potentials(solution: Solution, weights: Array) -> Array:
     """Compute the potential of the other gaps at every node, from the balance of its own gap."""
-    offset, load, blocks = state.nodes.offset, state.equations.load, state.equations.matrix
-    out = np.empty(state.scaled_opening.shape[0])
+    offset, load, blocks = solution.nodes.offset, solution.equations.load, solution.equations.matrix
+    out = np.empty(solution.scaled_opening.shape[0])
     for k in range(offset.shape[0] - 1):
         base = offset[k]
         m = offset[k + 1] - base
         for i in range(base, base + m):
             # A f + w g + S~ + p X = 0
-            total = load[i, 0] + state.pressure * load[i, 1]
+            total = load[i, 0] + solution.pressure * load[i, 1]
             for j in range(m):
-                total += blocks[i, j] * state.scaled_opening[base + j]
+                total += blocks[i, j] * solution.scaled_opening[base + j]
             out[i] = -total / weights[i]
     return out

@@ -1,4 +1,4 @@
-"""Opening of the gaps at fine nodes, and energy of a gap field: all modes, by sine transforms.
+"""Compute openings at fine nodes, and the energy of a gap field: all modes, by sine transforms.
 
 A gap's opening is T = Σ_n b_n sin((n+1)t), cos t = η. Below the M modes of (1) in ``dense_solver``
 b_n come from f; above them the straight crack gives b_n = -s_n/(n+1), with s_n the Chebyshev
@@ -53,7 +53,7 @@ class GapOpening:
 
 @compiled_for_both
 def count_sine_nodes(gap: Array, modes: int, top: int, per_wave: float) -> int:
-    """Count the sine nodes of a gap of which the shortest wave holds ``per_wave``.
+    """Count the sine nodes of a gap at ``per_wave`` nodes per shortest wave.
 
     There are no fewer than ``modes``, those of its field.
     """
@@ -83,7 +83,7 @@ def fast_size(fewest: int) -> int:
 
 
 @compiled_sums
-def _fine_nodes(gap: Array, circle: Circle, theta: Array, span: Array) -> None:
+def _fine_nodes(gap: Array, circle: Circle, theta: Array, theta_by_t: Array) -> None:
     """Place the sine nodes of a gap, as many as ``theta`` holds: θ, falling, and dθ/dt.
 
     As :func:`theta_at`, many at a time, with exp(y) - 1 from a table.
@@ -95,26 +95,26 @@ def _fine_nodes(gap: Array, circle: Circle, theta: Array, span: Array) -> None:
         inwards = 1.0 - 2 * side
         for i in range(0 if side == 1 else middle, middle if side == 1 else theta.shape[0]):
             y = alpha * (1 + inwards * circle.cosine[i + 1])
-            place = int(y * _PER_UNIT)
-            x = y - place / _PER_UNIT
+            entry = int(y * _PER_UNIT)
+            x = y - entry / _PER_UNIT
             grown = 1 / 24 + x * (1 / 120 + x * (1 / 720 + x / 5040))
             grown = x * (1 + x * (0.5 + x * (1 / 6 + x * grown)))
-            grown = _EXPM1[place] + grown * (1 + _EXPM1[place])
+            grown = _EXPM1[entry] + grown * (1 + _EXPM1[entry])
             r = grown * near * far / (far + (1 + grown) * near)
-            span[i] = alpha * (near + r) * (far - r) / (near + far) * circle.sine[i + 1]
+            theta_by_t[i] = alpha * (near + r) * (far - r) / (near + far) * circle.sine[i + 1]
             theta[i] = gap[LEFT + side] + inwards * r
 
 
 @compiled
 def _fine_moments(
-    gap: Array, panels: Panels, circle: Circle, theta: Array, span: Array, modes: Array
+    gap: Array, panels: Panels, circle: Circle, theta: Array, theta_by_t: Array, modes: Array
 ) -> None:
     """Place the fine nodes of a gap (:func:`_fine_nodes`), and compute s_n of all their modes."""
-    _fine_nodes(gap, circle, theta, span)
+    _fine_nodes(gap, circle, theta, theta_by_t)
     load = interpolate(theta, panels.width, panels.stress)
     count = theta.shape[0]
     for i in range(count):
-        load[i] *= span[i]
+        load[i] *= theta_by_t[i]
     sine_sums(load, circle, modes)
     for n in range(count):
         modes[n] *= 2 / (count + 1)
@@ -135,8 +135,8 @@ def _work_of_gaps(
         if count != last:
             circle = tabulate_circle(count + 1)
             last = count
-        theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
-        _fine_moments(table[k], panels, circle, theta, span, modes)
+        theta, theta_by_t, modes = np.empty(count), np.empty(count), np.empty(count)
+        _fine_moments(table[k], panels, circle, theta, theta_by_t, modes)
         for n in range(m, count):
             total += modes[n] * modes[n] / (n + 1)
     work = -np.pi / 2 * total
@@ -147,10 +147,11 @@ def _work_of_gaps(
 
 def work_of_gaps(field: GapField) -> float:
     """Integrate S_full T dθ over the gaps."""
-    of, source = field.solution, field.source
+    solution, source = field.solution, field.source
     return _work_of_gaps(
-        of.nodes, of.equations.load, of.scaled_opening, GAUSS_RULES, source.top, source.panels
-    )
+        solution.nodes, solution.equations.load, solution.scaled_opening, GAUSS_RULES, source.top,
+        source.panels,
+    )  # fmt: skip
 
 
 @compiled_for_both
@@ -160,8 +161,8 @@ def open_gap(
     """Evaluate θ, falling, dθ/dt and T of gap k at the nodes of a circle, and b_n, from all f."""
     gap, order = nodes.table[k], nodes.orders[k]
     count = circle.cosine.shape[0] // 2 - 1
-    theta, span, modes = np.empty(count), np.empty(count), np.empty(count)
-    _fine_moments(gap, panels, circle, theta, span, modes)
+    theta, theta_by_t, modes = np.empty(count), np.empty(count), np.empty(count)
+    _fine_moments(gap, panels, circle, theta, theta_by_t, modes)
     m = rules.counts[order]
     for n in range(m, count):
         modes[n] = -modes[n] / (n + 1)
@@ -174,19 +175,19 @@ def open_gap(
         modes[n] = 2 / np.pi * total
     opening = np.empty(count)
     sine_sums(modes, circle, opening)
-    return theta, span, opening, modes
+    return theta, theta_by_t, opening, modes
 
 
 def fine_opening(field: GapField, k: int, per_wave: float = SHAPE_NODES) -> GapOpening:
     """Evaluate the opening T of gap k at fine nodes."""
-    state = field.solution
-    modes = GAUSS_RULES.counts[state.nodes.orders[k]]
-    count = count_sine_nodes(state.nodes.table[k], modes, field.source.top, per_wave)
-    theta, span, opening, modes = open_gap(
-        state.nodes, k, state.scaled_opening, tabulate_circle(count + 1), GAUSS_RULES,
+    solution = field.solution
+    fewest = GAUSS_RULES.counts[solution.nodes.orders[k]]
+    count = count_sine_nodes(solution.nodes.table[k], fewest, field.source.top, per_wave)
+    theta, theta_by_t, opening, modes = open_gap(
+        solution.nodes, k, solution.scaled_opening, tabulate_circle(count + 1), GAUSS_RULES,
         field.source.panels,
     )  # fmt: skip
-    weight = span * np.pi / (count + 1)
+    weight = theta_by_t * np.pi / (count + 1)
     return GapOpening(theta[::-1], opening[::-1], weight[::-1], modes)
 
 
@@ -194,9 +195,14 @@ def refine_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]
     """Evaluate θ, increasing, and T at about ``factor`` times as many sine nodes as modes b_n."""
     count = fast_size(factor * (len(modes) + 1) - 1)
     circle = tabulate_circle(count + 1)
-    more, theta, span, opening = np.zeros(count), np.empty(count), np.empty(count), np.empty(count)
+    more, theta, theta_by_t, opening = (
+        np.zeros(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+    )
     more[: len(modes)] = modes
-    _fine_nodes(gap, circle, theta, span)
+    _fine_nodes(gap, circle, theta, theta_by_t)
     sine_sums(more, circle, opening)
     return theta[::-1], opening[::-1]
 

@@ -1,10 +1,14 @@
-"""Tension inside patches, of one field: at equally spaced nodes, and refined at single places.
+"""Compute the tension inside patches of one field, on equally spaced nodes or anywhere, refined.
 
 S = S_full + p + |D| T is first taken on equally spaced nodes, eight or more to a shortest wave, by
 Fourier transforms: the square roots of T at its edges leave an error there that falls as the
 distance to the power -2, below a hundredth of the singular stress one wave away. It finds the local
-maxima of tension; the largest of them are then verified and refined by the quadrature of
-``grid_fields``, which is exact to rounding.
+maxima of tension; the largest of them are then verified and refined by :class:`RefinedTension`,
+
+    S = S_full + p - (1/4π) ∫_gaps T(φ) / sin²((θ-φ)/2) dφ,
+
+a Gauss-Chebyshev rule on the fine nodes, whose spacing at an end of the gap is far below that of
+any output grid: it is exact to rounding.
 
 ``theta`` in the units of the field, tension in units of E*/2.
 """
@@ -17,22 +21,24 @@ import numpy as np
 
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array, Profile
+from adhesis.solver.peaks import parabola_vertex
+from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.opening_series import GapOpening, fine_opening
 
 _COARSE = 4.0  # sine nodes per shortest wave of the openings at nodes; the verification has more
-_POINTS = 17  # places between the neighbours of a node at which its maximum is refined
+_POINTS = 17  # points between the neighbours of a node at which its maximum is refined
 _MOVES = 2  # steps of a node by which the maximum may lie beside the candidate
 
 
 class RefinedTension:
-    """Tension of one field at any places inside its patches."""
+    """Tension of one field at any position inside its patches."""
 
     def __init__(self, field: GapField, openings: list[GapOpening]) -> None:
         self._source, self._pressure = field.source, field.pressure
         theta = np.concatenate([opening.theta for opening in openings])
         self._sine, self._cosine = np.sin(0.5 * theta), np.cos(0.5 * theta)
-        self._strength = np.concatenate([o.opening * o.weight for o in openings]) / (4 * np.pi)
+        self._source_weight = np.concatenate([o.opening * o.weight for o in openings])
         self._gaps = field.gaps
 
     @classmethod
@@ -41,46 +47,52 @@ class RefinedTension:
         return cls(field, [fine_opening(field, k) for k in range(len(field.gaps))])
 
     def at(self, theta: Array) -> Array:
-        """Tension at some places."""
-        half = np.outer(np.sin(0.5 * theta), self._cosine)
-        half -= np.outer(np.cos(0.5 * theta), self._sine)
-        np.square(half, out=half)
-        pull = np.reciprocal(half, out=half) @ self._strength
+        """Compute the tension at some positions on the contact."""
+        pull = _sum_pull(theta, self._sine, self._cosine, self._source_weight) / (4 * np.pi)
         return np.asarray(pull - self._source.sample(theta)[:, 0] - self._pressure)
 
     def inside(self, theta: float) -> bool:
-        """Whether a place lies on the contact."""
+        """Return whether a position lies on the contact."""
         from_left = (theta - self._gaps[:, 0]) % (2 * np.pi)
         return bool((from_left > self._gaps[:, 1] - self._gaps[:, 0]).all())
 
     def edge_distance(self, theta: float) -> float:
-        """Distance of a place on the contact to the nearest edge."""
+        """Compute the distance of a position on the contact from the nearest edge."""
         to_right = (self._gaps[:, 0] - theta) % (2 * np.pi)
         to_left = (theta - self._gaps[:, 1]) % (2 * np.pi)
         return float(min(to_right.min(), to_left.min()))
 
     def maximum(self, theta: float, step: float) -> tuple[float, float] | None:
-        """Place and value of a local maximum within some steps of ``theta``; None without one."""
+        """Locate a maximum within some steps of ``theta``: position and value; None without one."""
         for _ in range(_MOVES + 1):
             if not self.inside(theta) or self.edge_distance(theta) <= step:
                 return None
-            places = theta + step * np.linspace(-1, 1, _POINTS)
-            values = self.at(places)
+            points = theta + step * np.linspace(-1, 1, _POINTS)
+            values = self.at(points)
             i = int(values.argmax())
             if 0 < i < _POINTS - 1:
-                before, here, after = values[i - 1 : i + 2]
-                bend = before - 2 * here + after
-                shift = 0.5 * (before - after) / bend if bend < 0 else 0.0
-                return (
-                    float(places[i] + shift * (places[1] - places[0])),
-                    float(here - 0.25 * (before - after) * shift),
-                )
-            theta = float(places[i])
+                shift, highest = parabola_vertex(*values[i - 1 : i + 2])
+                return float(points[i] + shift * (points[1] - points[0])), highest
+            theta = float(points[i])
         return None
 
 
+@compiled
+def _sum_pull(theta: Array, sine: Array, cosine: Array, weight: Array) -> Array:
+    """Sum weight_j / sin²((θ-φ_j)/2) over j, with sine and cosine of φ_j/2."""
+    out = np.zeros(theta.shape[0])
+    for i in range(theta.shape[0]):
+        s, c = np.sin(0.5 * theta[i]), np.cos(0.5 * theta[i])
+        total = 0.0
+        for j in range(sine.shape[0]):
+            half = s * cosine[j] - c * sine[j]
+            total += weight[j] / (half * half)
+        out[i] = total
+    return out
+
+
 def nodal_tension(problem: Problem) -> NodalTension:
-    """Return the nodes on which maxima of tension are looked for.
+    """Return the nodes on which maxima of tension are searched.
 
     A strength may be a small part of the stress that flattens the profile. Parabolas on eight nodes
     to a wave miss a maximum by 1e-2 of that stress, on 32 by 4e-5.
@@ -112,7 +124,7 @@ class NodalTension:
         self._full[:size] = harmonic[:size] * profile.coefficients[:size] * (profile.q0 * n)
 
     def of(self, field: GapField) -> Array:
-        """Tension at the nodes, NaN outside contact."""
+        """Compute the tension at the nodes, NaN outside contact."""
         n, step = self._n, self.step
         opening = np.zeros(n)
         free = []

@@ -1,4 +1,4 @@
-"""Field of every gap by itself, between given edges and in a known potential of the others."""
+"""Solve every gap by itself, between given edges and in a known potential of the others."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def interpolate_potential(
 ) -> float:
     """Interpolate a potential g at θ from G = g dθ/dη at the nodes η of a gap.
 
-    Beyond the gap it is that at the end.
+    Beyond an end of the gap it is the potential at that end.
     """
     x, _, slope = eta_at(gap, min(max(theta, gap[LEFT]), gap[RIGHT]))
     above = 0.0
@@ -57,9 +57,9 @@ def solve_separately(
 ) -> Solution:
     """Solve every gap between ``edges``, shape (L, 2), in the potential of the others.
 
-    That is given as G = g dθ/dη at the nodes of gaps next to these, with rows in ``table``. What is
-    prescribed holds to rounding, for which p is corrected by what the errors of the potentials
-    make of it. Responses of all gaps together (``solved`` and ``mean``) are left out.
+    The potential is given as G = g dθ/dη at the nodes of nearby gaps, with rows in ``table``. The
+    pressure is corrected for the errors of the potentials, so that d has the prescribed value to
+    rounding. Responses of all gaps together (``solved`` and ``mean``) are left out.
     """
     rules = model.rules
     nodes, equations = assemble_blocks(map_gaps(edges), orders, 1, model)
@@ -85,8 +85,8 @@ def solve_separately(
         solve_column(factor, column)
         for i in range(m):
             f[first + i, 0] = column[i]
-    mean = 0.0  # of the opening, times 2π, and what it loses by a unit of p
-    unit_mean = 0.0
+    mean = 0.0  # mean opening times 2π
+    unit_mean = 0.0  # its decrease per unit of p
     for i in range(n):
         mean += nodes.weight[i] * f[i, 0]
         unit_mean += nodes.weight[i] * by_pressure[i]

@@ -1,4 +1,4 @@
-"""Prescribed quantity, model and solution of (1) in ``dense_solver`` for given gaps."""
+"""Prescribed value, model and solution of (1) in ``dense_solver`` for given gaps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from adhesis.solver.sharp.gap.quadrature import GaussRules, Integers
 
 
 class LoadingDevice(NamedTuple):
-    """Device that prescribes d = separation_weight·q0 s - compliance·p.
+    """Device that prescribes the value d = separation_weight·q0 s - compliance·p.
 
     It is x of ``control`` in the units used here: (1, 0) is a fixed separation, (1, E* q0/(2k)) a
     device of stiffness k, (0, 1) a load.
@@ -27,7 +27,7 @@ FIXED_SEPARATION = LoadingDevice(1.0, 0.0)
 
 
 class FieldModel(NamedTuple):
-    """Everything that a field depends on besides its gaps and the prescribed quantity.
+    """Inputs of a field besides its gaps and the prescribed value.
 
     Attributes
     ----------
@@ -170,12 +170,12 @@ def no_exterior_terms() -> ExteriorTerms:
 
 @compiled
 def no_solution(table: Array, orders: Integers, device: LoadingDevice) -> Solution:
-    """Make the solution for edges that are no numbers or cross."""
-    gaps = table.shape[0]
+    """Make the solution for edges that are NaN or cross."""
+    count = table.shape[0]
     empty, none = np.empty(0), np.empty((0, 0))
-    offset = np.zeros(gaps + 1, dtype=np.int64)
+    offset = np.zeros(count + 1, dtype=np.int64)
     return Solution(
-        nodes=Nodes(table, orders, offset, empty, empty, empty, empty, np.empty((gaps, 2))),
+        nodes=Nodes(table, orders, offset, empty, empty, empty, empty, np.empty((count, 2))),
         equations=Equations(none, none, np.empty((0, 0, 0))),
         factor=none,
         solved=none,
@@ -183,7 +183,7 @@ def no_solution(table: Array, orders: Integers, device: LoadingDevice) -> Soluti
         separation=np.nan,
         pressure=np.nan,
         scaled_opening=empty,
-        opening=np.full(2 * gaps, np.nan),
+        opening=np.full(2 * count, np.nan),
         exterior=no_exterior_terms(),
     )
 
@@ -214,13 +214,21 @@ def subtract_end_terms(opening: Array, slope: Array, end_terms: Array, field: in
 
 
 @compiled
+def mean_openings(load: Array, solved: Array) -> tuple[float, float]:
+    """Sum Xᵀ (B + G)⁻¹ of S~ and of X."""
+    load_mean = 0.0
+    unit_mean = 0.0
+    for i in range(load.shape[0]):
+        load_mean += load[i, 1] * solved[i, 0]
+        unit_mean += load[i, 1] * solved[i, 1]
+    return load_mean, unit_mean
+
+
+@compiled
 def balance_means(
     load_mean: float, unit_mean: float, prescribed: float, device: LoadingDevice
 ) -> tuple[MeanResponse, float, float]:
-    """Find the mean response, p and q0 s at which what is prescribed holds.
-
-    ``load_mean`` and ``unit_mean`` are Xᵀ (B + G)⁻¹ of S~ and of X.
-    """
+    """Find the mean response, p and q0 s at the prescribed value, from :func:`mean_openings`."""
     weight, compliance = device.separation_weight, device.compliance
     resistance = weight * unit_mean + 2 * np.pi * compliance
     pressure = -(2 * np.pi * prescribed + weight * load_mean) / resistance

@@ -1,4 +1,4 @@
-"""Interaction of many gaps on their tree (``cluster_tree``), solved directly.
+"""Solve the interaction of many gaps on their tree (``cluster_tree``) directly.
 
 With R the response of a run, q = q° - R g, a pair of neighbours 1, 2 obeys
 
@@ -30,17 +30,17 @@ class TreeFactor(NamedTuple):
     ----------
     response : array
         R of every run.
-    pair : array
+    pair_inverse : array
         (1 - K12 R2 K21 R1)⁻¹ of every pair.
-    inward : array
-        D of both halves of every pair.
+    inner_potential : array
+        D of both halves of every pair: their potentials by a potential outside.
     negative : int array, shape (runs,)
         Number of negative eigenvalues of every run; the whole is the last one.
     """
 
     response: Array
-    pair: Array
-    inward: Array
+    pair_inverse: Array
+    inner_potential: Array
     negative: Integers
 
 
@@ -51,12 +51,12 @@ class Charges(NamedTuple):
     ----------
     isolated : array
         q°, without potentials from outside the run.
-    mutual : array
+    potential_of_sibling : array
         c, the potential of the other half of the run's parent, without any from outside that.
     """
 
     isolated: Array
-    mutual: Array
+    potential_of_sibling: Array
 
 
 @compiled_sums
@@ -98,12 +98,12 @@ def _eliminate(a: Array, x: Array) -> bool:
 
 @compiled
 def empty_factor(tree: Tree) -> TreeFactor:
-    """Make space for the factor of a tree."""
+    """Allocate the factor of a tree."""
     runs = tree.rank.shape[0]
     return TreeFactor(
         response=np.empty(tree.response_start[runs]),
-        pair=np.empty(tree.pair_start[runs]),
-        inward=np.empty(tree.interpolation_start[runs]),
+        pair_inverse=np.empty(tree.pair_start[runs]),
+        inner_potential=np.empty(tree.interpolation_start[runs]),
         negative=np.zeros(runs, dtype=np.int64),
     )
 
@@ -115,11 +115,11 @@ def factor_tree(tree: Tree, gap_response: Array, gap_negative: Integers) -> Tree
     ``gap_negative`` are the gaps' numbers of negative eigenvalues.
     """
     runs = tree.rank.shape[0]
-    gaps = (runs + 1) // 2
+    count = (runs + 1) // 2
     factor = empty_factor(tree)
-    factor.response[: tree.response_start[gaps]] = gap_response
-    factor.negative[:gaps] = gap_negative
-    for run in range(gaps, runs):
+    factor.response[: tree.response_start[count]] = gap_response
+    factor.negative[:count] = gap_negative
+    for run in range(count, runs):
         factor_run(tree, factor, run)
     return factor
 
@@ -130,7 +130,7 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
 
     A whole has no fewer negative eigenvalues than each of its halves; the sign of a pair's
     determinant gives whether their number is even. Two that appear together in one pair go unseen:
-    two places whose forces are equal to rounding.
+    those of two edges whose forces are equal to rounding.
     """
     responses, negative = factor.response, factor.negative
     one, two, n, m = run_halves(tree, run)
@@ -138,7 +138,7 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
     first = responses[run_span(tree.response_start, one)].reshape(n, n)
     second = responses[run_span(tree.response_start, two)].reshape(m, m)
     kernel = tree.kernel[run_span(tree.kernel_start, run)].reshape(n, m)
-    inverse = factor.pair[run_span(tree.pair_start, run)].reshape(n, n)
+    inverse = factor.pair_inverse[run_span(tree.pair_start, run)].reshape(n, n)
     # (1 - H R1)⁻¹, H = K12 R2 K21
     half = np.dot(kernel, second)
     reflected = np.dot(half, kernel.T)
@@ -157,7 +157,7 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
     if r == 0:
         return
     interpolation = tree.interpolation[run_span(tree.interpolation_start, run)].reshape(n + m, r)
-    inward = factor.inward[run_span(tree.interpolation_start, run)].reshape(n + m, r)
+    inward = factor.inner_potential[run_span(tree.interpolation_start, run)].reshape(n + m, r)
     charges = np.empty((n + m, r))  # by the potential, with the other sign
     # D1 = (1 - H R1)⁻¹ (E1 + K12 R2 E2), D2 = E2 + K21 R1 D1
     drive = np.dot(half, interpolation[n:])
@@ -209,17 +209,17 @@ def _add_transposed(a: Array, x: Array, out: Array) -> None:
 
 @compiled
 def charge_run(tree: Tree, factor: TreeFactor, run: int, charges: Charges, work: Array) -> None:
-    """Compute the charges of a run from those of its two parts, and their mutual potentials."""
+    """Compute the charges of a run from those of its halves, and the halves' potentials."""
     one, two, n, m = run_halves(tree, run)
     first = factor.response[run_span(tree.response_start, one)]
     second = factor.response[run_span(tree.response_start, two)]
     kernel = tree.kernel[run_span(tree.kernel_start, run)]
-    inverse = factor.pair[run_span(tree.pair_start, run)]
+    inverse = factor.pair_inverse[run_span(tree.pair_start, run)]
     up = tree.interpolation[run_span(tree.interpolation_start, run)]
     split = n * tree.rank[run]
     q1, g, q2 = work[0, :n], work[1, :n], work[2, :m]
-    for column in range(charges.mutual.shape[0]):
-        isolated, mutual = charges.isolated[column], charges.mutual[column]
+    for column in range(charges.potential_of_sibling.shape[0]):
+        isolated, mutual = charges.isolated[column], charges.potential_of_sibling[column]
         g1 = mutual[run_span(tree.node_start, one)]
         g2 = mutual[run_span(tree.node_start, two)]
         q1[:] = isolated[run_span(tree.node_start, one)]
@@ -254,12 +254,12 @@ def upward_pass(tree: Tree, factor: TreeFactor, isolated: Array) -> Charges:
     ``isolated``, shape (N, columns), are the charges that each gap would have by itself.
     """
     runs = tree.rank.shape[0]
-    gaps = (runs + 1) // 2
+    count = (runs + 1) // 2
     size = tree.node_start[runs]
     charges = Charges(np.empty((isolated.shape[1], size)), np.zeros((isolated.shape[1], size)))
     charges.isolated[:, : isolated.shape[0]] = isolated.T
     work = np.empty((3, tree.rank.max()))
-    for run in range(gaps, runs):
+    for run in range(count, runs):
         charge_run(tree, factor, run, charges, work)
     return charges
 
@@ -278,11 +278,11 @@ def downward_pass(
     too, and the others left as they are.
     """
     runs = tree.rank.shape[0]
-    gaps = (runs + 1) // 2
-    for run in range(runs - 1, gaps - 1, -1):
+    count = (runs + 1) // 2
+    for run in range(runs - 1, count - 1, -1):
         if not below[run]:
             continue
-        inward = factor.inward[run_span(tree.interpolation_start, run)]
+        inward = factor.inner_potential[run_span(tree.interpolation_start, run)]
         at = 0
         for half in range(2):
             child = tree.children[run, half]
@@ -290,7 +290,7 @@ def downward_pass(
             own = run_span(tree.node_start, child)
             size = tree.rank[child] * tree.rank[run]
             for column in range(potential.shape[0]):
-                potential[column, own] = charges.mutual[column, own]
+                potential[column, own] = charges.potential_of_sibling[column, own]
                 outer = potential[column][run_span(tree.node_start, run)]
                 _add_apply(inward[at : at + size], outer, potential[column][own])
             at += size

@@ -1,4 +1,4 @@
-"""Weight functions of the edges: how the field changes when an edge moves.
+"""Compute the weight functions of the edges: changes of the field when an edge moves.
 
 The derivative of the field with respect to an edge is the homogeneous solution with an opening
 ∝ 1/sqrt(r) there (Bueckner's and Rice's weight function). It is split into the opening
@@ -35,18 +35,18 @@ def end_singularity(nodes: Nodes, e: int, rules: GaussRules, density: Array) -> 
     offset, weight, eta = nodes.offset, nodes.weight, rules.eta
     base, m = offset[k], offset[k + 1] - offset[k]
     start = rules.vector_start[nodes.orders[k]]
-    strength = np.pi / (m + 1) / nodes.slope[k, side]
-    area = strength
+    singular_weight = np.pi / (m + 1) / nodes.slope[k, side]
+    area = singular_weight
     for j in range(m):
         x = eta[start + j]
         density[j] = 1 / (1 + x) if side == 0 else 1 / (1 - x)
         area += weight[base + j] * density[j]
-    return strength, area
+    return singular_weight, area
 
 
 @compiled
 def own_singular_load(
-    nodes: Nodes, e: int, block: Array, density: Array, strength: float, rules: GaussRules,
+    nodes: Nodes, e: int, block: Array, density: Array, singular_weight: float, rules: GaussRules,
     out: Array,
 ) -> None:  # fmt: skip
     """Load the gap of edge e by the edge's singular opening, into ``out``.
@@ -69,20 +69,20 @@ def own_singular_load(
         mapped = mapped_kernel(alpha, eta[start + i] - (2 * side - 1))
         images = periodic_images(theta[base + i] - edge)
         near = weights[start + i] * point * mapped
-        far = weight[base + i] * strength * images
+        far = weight[base + i] * singular_weight * images
         out[i] = total + (near + far) / (4 * np.pi)
 
 
 @compiled
 def singular_loads(
-    state: Solution, edges: Integers, columns: int, rules: GaussRules
+    solution: Solution, edges: Integers, columns: int, rules: GaussRules
 ) -> tuple[Array, Array]:
     """Load all nodes by the singular openings of some edges, one a column; with their areas.
 
-    There may be more ``columns`` than edges, for ``cholesky``; those are zero, as are those of the
-    exterior of a window, a gap without nodes.
+    Columns beyond the edges, for ``cholesky``, are zero, as are those of the exterior of a window,
+    a gap without nodes.
     """
-    nodes, matrix = state.nodes, state.equations.matrix
+    nodes, matrix = solution.nodes, solution.equations.matrix
     offset, table, weight = nodes.offset, nodes.table, nodes.weight
     n = nodes.theta.shape[0]
     load = np.zeros((n, columns))
@@ -96,12 +96,12 @@ def singular_loads(
         if first == behind:
             continue
         density = work[: behind - first]
-        strength, area[c] = end_singularity(nodes, e, rules, density)
+        singular_weight, area[c] = end_singularity(nodes, e, rules, density)
         rows = matrix[first:behind]
         edge = table[k, LEFT + e % 2]
-        _load_by_edge(rows, density, strength, edge, sine, cosine, weight, column)
+        _load_by_edge(rows, density, singular_weight, edge, sine, cosine, weight, column)
         own_singular_load(
-            nodes, e, rows[:, first:behind], density, strength, rules, column[first:behind]
+            nodes, e, rows[:, first:behind], density, singular_weight, rules, column[first:behind]
         )
         load[:, c] = column
     return load, area
@@ -111,7 +111,7 @@ def singular_loads(
 def _load_by_edge(
     rows: Array,
     density: Array,
-    strength: float,
+    singular_weight: float,
     edge: float,
     sine: Array,
     cosine: Array,
@@ -119,7 +119,7 @@ def _load_by_edge(
     out: Array,
 ) -> None:
     """Load other gaps, into ``out``, by a density of a gap's ``rows`` and a weight at an edge."""
-    scale = strength / (4 * np.pi)
+    scale = singular_weight / (4 * np.pi)
     edge_sine = np.sin(0.5 * edge)
     edge_cosine = np.cos(0.5 * edge)
     for i in range(out.shape[0]):
@@ -134,7 +134,7 @@ def _load_by_edge(
 
 @compiled
 def openings_by_edges(
-    state: Solution, edges: Integers, regular: Array, area: Array, rules: GaussRules
+    solution: Solution, edges: Integers, regular: Array, area: Array, rules: GaussRules
 ) -> tuple[Array, Array]:
     """Compute ∂C_e/∂θ_f, e ≠ f, shape (2L, edges), and ∂Y/∂θ_f for some edges f.
 
@@ -142,46 +142,46 @@ def openings_by_edges(
     the singular openings. Y is p, under a load q0 s.
     """
     count = edges.shape[0]
-    load, slope = state.equations.load, state.nodes.slope
-    solved, opening = state.solved, state.opening
+    load, slope = solution.equations.load, solution.nodes.slope
+    solved, opening = solution.solved, solution.opening
     conjugate = area.copy()
     for i in range(regular.shape[0]):
         for c in range(count):
             conjugate[c] += load[i, 1] * regular[i, c]
-    if state.mean.separation_weight == 0:
+    if solution.mean.separation_weight == 0:
         conjugate /= 2 * np.pi  # of the separation; the pressure stays
     else:
-        conjugate /= state.mean.resistance
+        conjugate /= solution.mean.resistance
         for i in range(regular.shape[0]):
             for c in range(count):
                 regular[i, c] -= solved[i, 1] * conjugate[c]
-    by_edge = edge_openings(regular, state.nodes, rules)[:, :count].copy()
+    by_edge = edge_openings(regular, solution.nodes, rules)[:, :count].copy()
     for c in range(count):
         f = edges[c]
         k, side = f // 2, f % 2
         by_edge[f ^ 1, c] += 0.5 * np.sqrt(2 * slope[k, 1 - side])  # the singular opening's far end
-        strength = (2 * side - 1) * opening[f] * np.sqrt(slope[k, side] / 8)
-        conjugate[c] *= strength
+        by_position = (2 * side - 1) * opening[f] * np.sqrt(slope[k, side] / 8)
+        conjugate[c] *= by_position
         for e in range(by_edge.shape[0]):
-            by_edge[e, c] *= strength
+            by_edge[e, c] *= by_position
     return by_edge, conjugate
 
 
 @compiled
-def openings_by_translation(state: Solution, rules: GaussRules) -> Array:
+def openings_by_translation(solution: Solution, rules: GaussRules) -> Array:
     """Compute the derivatives of all openings when all edges move together against the profile."""
-    load, solved = state.equations.load, state.solved
+    load, solved = solution.equations.load, solution.solved
     n = solved.shape[0]
     drift = 0.0
     for i in range(n):
         drift -= load[i, 1] * solved[i, 2]
-    drift += state.exterior.shift
-    drift = state.mean.separation_weight * drift / state.mean.resistance
+    drift += solution.exterior.shift
+    drift = solution.mean.separation_weight * drift / solution.mean.resistance
     moving = np.empty((n, 1))
     for i in range(n):
         moving[i, 0] = -solved[i, 2] - drift * solved[i, 1]
-    opening = edge_openings(moving, state.nodes, rules)[:, 0].copy()
-    subtract_end_terms(opening, state.nodes.slope, state.equations.end_terms, 1)
+    opening = edge_openings(moving, solution.nodes, rules)[:, 0].copy()
+    subtract_end_terms(opening, solution.nodes.slope, solution.equations.end_terms, 1)
     return opening
 
 
@@ -190,20 +190,20 @@ def exterior_singular_terms(
     nodes: Nodes, rules: GaussRules, coupling: ExteriorCoupling, exterior: Exterior
 ) -> tuple[Array, Array]:
     """Compute the terms of an exterior in loads and areas of a window's singular openings."""
-    gaps = nodes.table.shape[0]
-    place, strength = np.zeros(2 * gaps), np.zeros(2 * gaps)
-    area = np.zeros(2 * gaps)
+    count = nodes.table.shape[0]
+    position, singular_weight = np.zeros(2 * count), np.zeros(2 * count)
+    area = np.zeros(2 * count)
     by_node = coupling.kernel @ np.ascontiguousarray(exterior.charge[:, 1])
     work = np.empty(by_node.shape[0])
-    for e in range(2 * gaps - 2):
+    for e in range(2 * count - 2):
         k = e // 2
         first, behind = nodes.offset[k], nodes.offset[k + 1]
         density = work[: behind - first]
-        strength[e], _ = end_singularity(nodes, e, rules, density)
-        place[e] = nodes.table[k, LEFT + e % 2]
+        singular_weight[e], _ = end_singularity(nodes, e, rules, density)
+        position[e] = nodes.table[k, LEFT + e % 2]
         for j in range(first, behind):
             area[e] += density[j - first] * by_node[j]
-    at_edge, _ = exterior_kernel(place, strength, exterior)
+    at_edge, _ = exterior_kernel(position, singular_weight, exterior)
     area += at_edge @ np.ascontiguousarray(exterior.charge[:, 1])
     load = coupling.response @ np.ascontiguousarray(at_edge.T)
     return load, area

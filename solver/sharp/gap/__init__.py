@@ -1,4 +1,4 @@
-"""One gap: its ends, conformal map, quadrature, full-contact stress and moments.
+"""Ends, conformal map, quadrature, full-contact stress and moments of a gap.
 
 Import from its modules.
 """

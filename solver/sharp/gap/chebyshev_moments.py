@@ -1,15 +1,13 @@
-"""Moments of the full-contact stress over a gap.
+"""Compute the moments of the full-contact stress over a gap.
 
-In the coordinate η of a gap (``conformal_map``; its ends are η = ∓1)
-its field needs
+The field of a gap needs, in its coordinate η (``conformal_map``; its ends are η = ∓1),
 
     s_n  = (2/π) ∫ S U_n(η) sqrt(1 - η²) dθ,        n = 0 … M-1   (second-kind Chebyshev moments)
     s^±  = (1/π) ∫ S sqrt((1 ± η)/(1 ∓ η)) dθ = Σ_n (±1)^n s_n    (the load of each end)
 
-A gap is tiled with panels (``full_contact_stress``) no longer than
-their distance from its ends; the cost of a moment grows with log(gap/λ_min), not with the number of
-wave numbers. The two end pieces, with their square-root weight, are integrated with S interpolated
-on the finest panels.
+A gap is tiled with panels (``full_contact_stress``) no longer than their distance from its ends;
+the cost of a moment grows with log(gap/λ_min), not with the number of wave numbers. The two end
+pieces, with their square-root weight, are integrated with S interpolated on the finest panels.
 """
 
 from __future__ import annotations
@@ -66,9 +64,9 @@ def _most_end_nodes(left: float, right: float, panels: Panels) -> int:
 def _end_piece(
     gap: Array, side: int, length: float, panels: Panels, nodes: Array, count: int
 ) -> int:
-    """Put nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
+    """Place nodes from the end of a gap inwards, in cells graded to the patch beyond that end.
 
-    ``nodes`` must have space for them; returns how many there are then.
+    ``nodes`` must have space for them; returns their number so far.
     """
     near, far = pole_distances(gap, side)
     scale = 1 / gap[ALPHA]
@@ -128,16 +126,16 @@ def _weigh_by_source(
     distance = nodes[_MINUS + side]
     origin = (gap[LEFT] if side == 0 else gap[RIGHT]) / panels.width
     per = (1 if side == 0 else -1) / panels.width
-    last = panels.finest - 1
+    last = panels.finest_count - 1
     stress, slope = panels.stress, panels.slope
     both = nodes.shape[0] > _SLOPE
     for i in range(first, behind, 2):
-        place = origin + per * distance[i]
-        other_place = origin + per * distance[i + 1]
-        k = int(np.floor(place))
-        other_k = int(np.floor(other_place))
-        x = 2 * (place - k) - 1
-        y = 2 * (other_place - other_k) - 1
+        position = origin + per * distance[i]
+        other_position = origin + per * distance[i + 1]
+        k = int(np.floor(position))
+        other_k = int(np.floor(other_position))
+        x = 2 * (position - k) - 1
+        y = 2 * (other_position - other_k) - 1
         k &= last
         other_k &= last
         b1 = b2 = e1 = e2 = 0.0
@@ -168,7 +166,7 @@ def _panel_nodes(
     nodes: Array,
     count: int,
 ) -> int:
-    """Put the nodes of compressed panels; ``tiles`` holds first finest panel, size and row of each.
+    """Place the nodes of compressed panels; ``tiles`` holds their first panel, size and row.
 
     A panel is no longer than its distance from either end, so the logarithm of the map differs at
     its nodes from that at its centre by 2 artanh z with |z| ≤ 1/3: a short series.
@@ -220,7 +218,7 @@ def _panel_nodes(
 
 @compiled
 def _fill_short_gap(gap: Array, panels: Panels, nodes: Array) -> None:
-    """Put Gauss-Chebyshev nodes of the first kind in η: they serve s_n and s^± alike."""
+    """Place Gauss-Chebyshev nodes of the first kind in η, which serve s_n and s^± alike."""
     count = nodes.shape[1]
     for i in range(count):
         t = (i + 0.5) * np.pi / count
@@ -234,8 +232,8 @@ def _fill_short_gap(gap: Array, panels: Panels, nodes: Array) -> None:
 
 
 @compiled
-def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Array, int]:
-    """Make the nodes of the moments of one gap; returns their number, too."""
+def _moment_nodes(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Array, int]:
+    """Place the nodes of the moments of one gap; returns their number, too."""
     left = gap[LEFT]
     right = gap[RIGHT]
     width = panels.width
@@ -272,7 +270,7 @@ def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Arra
         tiles[0, tiled] = panel
         tiles[1, tiled] = size
         tiles[2, tiled] = panels.level_start[level] + (
-            (panel >> level) & ((panels.finest >> level) - 1)
+            (panel >> level) & ((panels.finest_count >> level) - 1)
         )
         tiled += 1
         panel += size
@@ -285,7 +283,7 @@ def _nodes_of(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[Arra
 
 
 @compiled_sums
-def _add_up(nodes: Array, count: int, s: Array, ends: Array) -> None:
+def _sum_moments(nodes: Array, count: int, s: Array, ends: Array) -> None:
     """Sum the moments of the nodes, by the recurrence of sin((n+1)t), cos t = η."""
     fields = s.shape[1]
     twice = np.empty(count)
@@ -339,5 +337,5 @@ def gap_moments(gap: Array, panels: Panels, s: Array, ends: Array) -> None:
     With ``s`` of shape (modes, 1) those of S alone. ``gap`` is a row of
     ``conformal_map.map_gaps``.
     """
-    nodes, count = _nodes_of(gap, s.shape[0], panels, s.shape[1])
-    _add_up(nodes, count, s, ends)
+    nodes, count = _moment_nodes(gap, s.shape[0], panels, s.shape[1])
+    _sum_moments(nodes, count, s, ends)

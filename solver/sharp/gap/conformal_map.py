@@ -1,4 +1,4 @@
-"""The coordinate of a gap in which its neighbours are far away.
+"""Map a gap to the coordinate in which its neighbours are far away.
 
 The half-space kernel dθ dθ'/(θ-θ')² keeps its form under every Möbius map. For a gap (l, r) between
 patches whose far sides are A < l and B > r, take
@@ -46,9 +46,9 @@ def map_gaps(gaps: Array) -> Array:
 
 @compiled
 def in_order(table: Array) -> bool:
-    """Return whether every gap and patch has a length; not so where an edge is no number."""
+    """Return whether every gap and patch has a length; False if an edge is NaN."""
     for k in range(table.shape[0]):
-        # not written as <= : a length that is no number is a failure, too
+        # written so that NaN fails
         length = table[k, RIGHT] - table[k, LEFT]
         if not (length > 0 and table[k, LEFT_PATCH] > 0 and table[k, RIGHT_PATCH] > 0):
             return False

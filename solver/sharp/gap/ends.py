@@ -1,4 +1,4 @@
-"""Gaps as an array of their ends: lengths, and what is left when gaps close or patches vanish.
+"""Measure gaps, insert gaps and patches, and drop those that have closed or vanished.
 
 Gaps are an array of shape (L, 2) of θ = q0 x: left and right ends, ascending.
 """
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from adhesis.solver.model.profile import Array
 
 
-def widths(gaps: Array) -> tuple[Array, Array]:
+def lengths_of(gaps: Array) -> tuple[Array, Array]:
     """Measure the gaps, and the patches to the right of each, shape (L,)."""
     patch = np.empty(len(gaps))
     patch[:-1] = gaps[1:, 0]
@@ -27,9 +27,9 @@ def outward(gaps: Array) -> Array:
 
 
 @cache
-def _signs(gaps: int) -> Array:
-    """Make the signs of :func:`outward`, read-only."""
-    sign = np.tile([1.0, -1.0], gaps)
+def _signs(count: int) -> Array:
+    """Make the signs of :func:`outward` for ``count`` gaps, read-only."""
+    sign = np.tile([1.0, -1.0], count)
     sign.setflags(write=False)
     return sign
 
@@ -47,9 +47,9 @@ def without_patches(gaps: Array, keep: NDArray[np.bool_]) -> Array:
 
 
 def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
-    """Put patches of the given widths into gaps (no gaps at all: into the open surface).
+    """Insert patches of the given widths into gaps; without gaps, into the open surface.
 
-    Patches that meet, or meet one that was there, are one: the gap between them closes.
+    Patches that meet, or meet an earlier one, become one: the gap between them closes.
     """
     if len(gaps) == 0:
         order = np.argsort(centres)
@@ -57,10 +57,10 @@ def with_patches(gaps: Array, centres: Array, widths: Array) -> Array:
         return _open(np.stack([left, np.append(right[1:], right[0] + 2 * np.pi)], axis=1))
     order = np.argsort(centres, kind="stable")
     centres, widths = centres[order], widths[order]
-    place = np.searchsorted(gaps[:, 0], centres) - 1
-    inside = (place >= 0) & (centres < gaps[place, 1])
+    index = np.searchsorted(gaps[:, 0], centres) - 1
+    inside = (index >= 0) & (centres < gaps[index, 1])
     seeds = np.stack([centres - widths / 2, centres + widths / 2], axis=1)[inside]
-    ends = np.insert(gaps.ravel(), np.repeat(2 * place[inside] + 1, 2), seeds.ravel())
+    ends = np.insert(gaps.ravel(), np.repeat(2 * index[inside] + 1, 2), seeds.ravel())
     return _open(np.asarray(ends.reshape(-1, 2)))
 
 
@@ -71,7 +71,7 @@ def _open(gaps: Array) -> Array:
 
 
 def with_gaps(gaps: Array, centres: Array, widths: Array) -> Array:
-    """Put gaps of the given widths into patches."""
+    """Insert gaps of the given widths into patches."""
     left = centres % (2 * np.pi) - widths / 2
     left = np.where(left < gaps[-1, 1] - 2 * np.pi, left + 2 * np.pi, left)
     both = np.concatenate([gaps, np.stack([left, left + widths], axis=1)])
@@ -80,7 +80,7 @@ def with_gaps(gaps: Array, centres: Array, widths: Array) -> Array:
 
 def without_small(gaps: Array, smallest: float) -> Array | None:
     """Drop closed gaps or vanished patches; None if all are as long as ``smallest``."""
-    length, patch = widths(gaps)
+    length, patch = lengths_of(gaps)
     if length.min() < smallest and len(gaps) > 1:
         keep = length >= smallest
         keep[int(np.argmax(length))] = True  # the last gap never closes

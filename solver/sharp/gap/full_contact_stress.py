@@ -1,7 +1,7 @@
-"""Full-contact stress as a source for gaps: compressed panels.
+"""Compress the full-contact stress, the source for gaps, on a tree of panels.
 
 Method ``sharp`` sees the rough profile only through the full-contact stress S(θ) = 2σ_full/E*,
-θ = q0 x. It is smooth on the scale of a shortest wave only, while what it is integrated with is
+θ = q0 x. It is smooth on the scale of a shortest wave only, while its weights in an integral are
 smooth away from the ends of a gap. So S is compressed once, on a binary tree of panels: on each
 panel ∫ S f ≈ Σ_i ω_i f(x_i) at the p Gauss-Legendre nodes, exact when f is a polynomial of degree
 below p. Its moments over a gap: ``chebyshev_moments``.
@@ -40,17 +40,17 @@ class Panels(NamedTuple):
     ----------
     width : float
         Length of a finest panel in θ.
-    finest : int
+    finest_count : int
         Number of finest panels; the shortest wave covers at least two.
     x, w : array, shape (p,)
         Gauss-Legendre rule of a panel.
-    stress, slope : array, shape (finest, p)
+    stress, slope : array, shape (finest_count, p)
         Chebyshev coefficients of S and S' on each finest panel.
-    tilt : array, shape (finest, 12)
+    tilt : array, shape (finest_count, 12)
         Those of h'.
-    half_plane : array, shape (2, finest, 8)
+    half_plane : array, shape (2, finest_count, 8)
         Those of the opening C of a half-plane crack that begins at θ, and of one that ends there.
-    weights : array, shape (2, 2·finest, p)
+    weights : array, shape (2, 2·finest_count, p)
         ω for S and for S', of every panel of every level, the finest level first.
     level_start : int array
         Row of ``weights`` at which each level starts.
@@ -59,7 +59,7 @@ class Panels(NamedTuple):
     """
 
     width: float
-    finest: int
+    finest_count: int
     x: Array
     w: Array
     stress: Array
@@ -89,8 +89,6 @@ class StressSource:
         Mean square slope.
     sharpest : float
         Largest |h''|, in units of q0.
-    steepest : float
-        Largest |h'|.
     highest : float
         θ of the highest crest.
     panels : Panels
@@ -115,8 +113,8 @@ class StressSource:
         half_plane = [a @ _to_chebyshev(t) for a in _half_plane_openings(m * h, t, count)]
 
         to_chebyshev = _to_chebyshev(x)
-        self.steepest = float(np.abs(profile.slopes(8 * top)).max())
-        pieces = int(np.ceil(1 + _PIECES_BY_SLOPE * self.steepest))
+        steepest = float(np.abs(profile.slopes(8 * top)).max())
+        pieces = int(np.ceil(1 + _PIECES_BY_SLOPE * steepest))
         # rule on a finest panel, composed of equal pieces; nodes and weights from 0 to 1
         start = np.arange(pieces)[:, None]
         self._piece_x = ((start + (y + 1) / 2) / pieces).ravel()
@@ -136,7 +134,7 @@ class StressSource:
         t, end = legendre.leggauss(2 * p - 4)
         self.panels = Panels(
             width=width,
-            finest=count,
+            finest_count=count,
             x=x,
             w=w,
             stress=np.ascontiguousarray(stress @ to_chebyshev),
@@ -210,7 +208,7 @@ def _clenshaw(coefficients: Array, x: float) -> float:
     b2 = 0.0
     twice = 2 * x
     for j in range(coefficients.shape[0] - 1, 0, -1):
-        b1, b2 = twice * b1 + (coefficients[j] - b2), b1  # what does not wait is added first
+        b1, b2 = twice * b1 + (coefficients[j] - b2), b1  # first the sum that need not wait for b1
     total: float = x * b1 - b2 + coefficients[0]
     return total
 
@@ -227,11 +225,11 @@ def _clenshaw_both(coefficients: Array, x: float) -> tuple[float, float]:
 
 
 @compiled_sums
-def value_at(coefficients: Array, place: float) -> float:
-    """Evaluate the piecewise series at θ = place · panel width."""
-    k = int(np.floor(place))
+def value_at(coefficients: Array, position: float) -> float:
+    """Evaluate the piecewise series at θ = position · panel width."""
+    k = int(np.floor(position))
     # the number of panels is a power of two
-    return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (place - k) - 1)
+    return _clenshaw(coefficients[k & (coefficients.shape[0] - 1)], 2 * (position - k) - 1)
 
 
 @compiled_sums
@@ -242,13 +240,14 @@ def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
     last = coefficients.shape[0] - 1
     beside = count - count % 4
     for i in range(0, beside, 4):  # four recurrences side by side: each waits for its last term
-        place, place_2 = theta[i] / width, theta[i + 1] / width
-        place_3, place_4 = theta[i + 2] / width, theta[i + 3] / width
-        k, k_2, k_3, k_4 = np.floor(place), np.floor(place_2), np.floor(place_3), np.floor(place_4)
+        position, position_2 = theta[i] / width, theta[i + 1] / width
+        position_3, position_4 = theta[i + 2] / width, theta[i + 3] / width
+        k, k_2 = np.floor(position), np.floor(position_2)
+        k_3, k_4 = np.floor(position_3), np.floor(position_4)
         c, c_2 = coefficients[int(k) & last], coefficients[int(k_2) & last]
         c_3, c_4 = coefficients[int(k_3) & last], coefficients[int(k_4) & last]
-        x, x_2 = 2 * (place - k) - 1, 2 * (place_2 - k_2) - 1
-        x_3, x_4 = 2 * (place_3 - k_3) - 1, 2 * (place_4 - k_4) - 1
+        x, x_2 = 2 * (position - k) - 1, 2 * (position_2 - k_2) - 1
+        x_3, x_4 = 2 * (position_3 - k_3) - 1, 2 * (position_4 - k_4) - 1
         a = b = a_2 = b_2 = a_3 = b_3 = a_4 = b_4 = 0.0
         for j in range(c.shape[0] - 1, 0, -1):
             a, b = 2 * x * a + (c[j] - b), a
@@ -265,13 +264,17 @@ def interpolate(theta: Array, width: float, coefficients: Array) -> Array:
 
 
 @compiled_sums
+def _evaluate_both(coefficients: Array, theta: float, width: float) -> tuple[float, float]:
+    """Evaluate a piecewise series at one angle, and its derivative by the argument of the panel."""
+    position = theta / width
+    k = int(np.floor(position))
+    return _clenshaw_both(coefficients[k & (coefficients.shape[0] - 1)], 2 * (position - k) - 1)
+
+
+@compiled_sums
 def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
     """Evaluate sqrt(1 + h'²) and its θ-derivative at one angle."""
-    place = theta / panels.width
-    k = int(np.floor(place))
-    x = 2 * (place - k) - 1
-    c = panels.tilt[k & (panels.finest - 1)]
-    tilt, rate = _clenshaw_both(c, x)
+    tilt, rate = _evaluate_both(panels.tilt, theta, panels.width)
     measure = np.sqrt(1 + tilt * tilt)
     return measure, tilt / measure * rate * 2 / panels.width
 
@@ -279,11 +282,7 @@ def measure_at(theta: float, panels: Panels) -> tuple[float, float]:
 @compiled_sums
 def half_plane_opening(theta: float, side: int, panels: Panels) -> tuple[float, float]:
     """Evaluate C and dC/dθ of a half-plane crack that begins (side 0) or ends (1) at θ."""
-    place = theta / panels.width
-    k = int(np.floor(place))
-    x = 2 * (place - k) - 1
-    c = panels.half_plane[side, k & (panels.finest - 1)]
-    value, rate = _clenshaw_both(c, x)
+    value, rate = _evaluate_both(panels.half_plane[side], theta, panels.width)
     return value, rate * 2 / panels.width
 
 
@@ -318,9 +317,9 @@ def _contact_between(
         for end in range(2):
             theta = patches[i, end]
             turns = np.floor(theta / (2 * np.pi))
-            place = (theta - turns * 2 * np.pi) / width
-            panel[end] = min(max(int(place), 0), count - 1)
-            share[end] = min(max(place - panel[end], 0.0), 1.0)
+            position = (theta - turns * 2 * np.pi) / width
+            panel[end] = min(max(int(position), 0), count - 1)
+            share[end] = min(max(position - panel[end], 0.0), 1.0)
             total += (2 * end - 1) * (turns * before[count] + before[panel[end]])
         part = _lengths(panel, share, tilt, nodes, w)
         total += (part[1] - part[0]) * width

@@ -1,4 +1,4 @@
-"""Gauss-Chebyshev rules of the gaps: how many values carry a gap's opening, and where."""
+"""Tabulate the Gauss-Chebyshev rules of the gaps, and choose the order of each gap."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Integers = NDArray[np.int64]
 class GaussRules(NamedTuple):
     """Gauss-Chebyshev rules of all numbers of nodes M, end to end, for the compiled code.
 
-    A gap's *order* is the place of its rule in ``counts``.
+    A gap's *order* is the index of its rule in ``counts``.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""Sine transforms of the gaps, compiled: Σ_j x_j sin(π j k/N), N = 2^a 3^b 5^c with a ≥ 2.
+"""Compute sine transforms, compiled: Σ_j x_j sin(π j k/N), N = 2^a 3^b 5^c with a ≥ 2.
 
 A gap has some hundred nodes, and few gaps of a state have equally many: library calls from Python
 cost more than the transforms. The N - 1 numbers are folded to N real ones, those are taken as N/2
-complex ones for a Fourier transform (Stockham's, of mixed radix), and its two halves are parted
+complex ones for a Fourier transform (Stockham's, of mixed radix), and its two halves are separated
 again (Press et al., Numerical Recipes, section 12.4).
 """
 
@@ -201,7 +201,7 @@ def _butterflies_of_five(parts: int, stride: int, circle: Circle, x: Parts, out:
 def _fourier(x: Parts, circle: Circle) -> Parts:
     """Sum z_j exp(2πi j k/M) over j; ``x`` is overwritten.
 
-    The circle holds four times as many places as the transform.
+    The circle holds four times as many points as the transform.
     """
     count = x.re.shape[0]
     out = Parts(np.empty(count), np.empty(count))
@@ -245,7 +245,7 @@ def sine_sums(x: Array, circle: Circle, out: Array) -> None:
             re[j >> 1] = y
     parts = _fourier(Parts(re, im), circle)
     re, im = parts.re, parts.im
-    # Σ_j y_j exp(2πi j k/N) from even and odd places; its imaginary parts are the even sums, its
+    # Σ_j y_j exp(2πi j k/N) from even and odd j; its imaginary parts are the even sums, its
     # real parts the steps between the odd ones
     odd = 0.5 * (re[0] + im[0])
     out[0] = odd

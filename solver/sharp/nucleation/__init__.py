@@ -1,4 +1,4 @@
-"""Nucleation of contact where surfaces touch inside a gap.
+"""Nucleation of contact inside a gap, and of a crack inside a patch.
 
 Import from its modules.
 """

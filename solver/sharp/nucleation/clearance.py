@@ -1,4 +1,4 @@
-"""How much of a gap's clearance can have been used up since it was looked at.
+"""Bound the clearance left in gaps since they were last searched.
 
 The fine opening of a gap (``opening_series``) costs as much as many fields, and most gaps are far
 from touching. Inside a gap the surface is free: between two states with nearly the same edges its
@@ -6,9 +6,9 @@ opening changes smoothly, so the nodes of the field show by how much it has clos
 edge that moves there is more: C sqrt(r) changes by C δ/(2 sqrt(r)), for which that a fourth of the
 shortest wave away is taken.
 
-A gap is looked at again when a good part of its clearance can be gone, or of its opening at any
+A gap is searched again when a good part of its clearance can be gone, or of its opening at any
 node: a minimum may appear there, whatever others there are. Beside the ends of a gap openings are
-small in any case; there it is looked at again when one is negative.
+small in any case; there it is searched again when one is negative.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from adhesis.solver.sharp.tolerances import (
 )
 
 
-class Seen(NamedTuple):
-    """Gaps as they were when they were looked at.
+class SearchedGaps(NamedTuple):
+    """Gaps as they were when they were last searched.
 
     Attributes
     ----------
@@ -51,36 +51,37 @@ class Seen(NamedTuple):
     clearance: Array
 
 
-class Left(NamedTuple):
-    """Clearance that is left of gaps that were seen.
+class RemainingClearance(NamedTuple):
+    """Clearance that is left in gaps since they were searched.
 
     Attributes
     ----------
     clearance : array, shape (L,)
-        Negative where a gap has to be looked at.
-    place : int array, shape (L,)
-        Place of each gap among those seen; negative where it has to be looked at.
-    fresh : int array
-        The gaps that have to be looked at.
-    is_same : bool
+        Negative where a gap has to be searched.
+    index_before : int array, shape (L,)
+        Index of each gap among those searched; negative where it has to be searched.
+    to_search : int array
+        The gaps that have to be searched.
+    is_unchanged : bool
         Whether there are none, and no gap has gone.
     """
 
     clearance: Array
-    place: Integers
-    fresh: Integers
-    is_same: bool
+    index_before: Integers
+    to_search: Integers
+    is_unchanged: bool
 
 
-NOT_SEEN = Seen(
+NONE_SEARCHED = SearchedGaps(
     np.empty((0, 2)), np.empty(0, dtype=np.int64), np.zeros(1, dtype=np.int64), np.empty(0),
     np.empty(0), np.empty(0),
 )  # fmt: skip
 
 
 @compiled
-def _low_opening(f: float, kind: int, node: int, rules: GaussRules) -> float:
-    eta = rules.eta[rules.vector_start[kind] + node]
+def _low_opening(f: float, order: int, node: int, rules: GaussRules) -> float:
+    """Compute the opening of the lower modes at a node from f."""
+    eta = rules.eta[rules.vector_start[order] + node]
     opening: float = f * np.sqrt(1 - eta * eta)
     return opening
 
@@ -91,28 +92,32 @@ def clearance_left(
     nodes: Nodes,
     f: Array,
     rules: GaussRules,
-    seen: Seen,
-    near: float,
-    beside: float,
-) -> Left:
-    """Compute the clearance that is surely left in each gap.
+    searched: SearchedGaps,
+    max_displacement: float,
+    closing_per_motion: float,
+) -> RemainingClearance:
+    """Compute a lower bound of the clearance in each gap.
 
-    Nodes further than ``near`` from their place are not compared; ``beside`` is the closing beside
-    an edge for its motion.
+    Nodes that moved further than ``max_displacement`` are not compared; ``closing_per_motion`` is
+    the closing beside an edge over the motion of the edge.
     """
     orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
-    within = NO_MINIMUM_WITHIN / COMPARABLE * near
+    within = NO_MINIMUM_WITHIN / COMPARABLE * max_displacement
     left = np.full(gaps.shape[0], -1.0)
-    place = np.full(gaps.shape[0], -1)
+    index = np.full(gaps.shape[0], -1)
     j = 0
     for k in range(gaps.shape[0]):
-        while j < seen.gaps.shape[0] and seen.gaps[j, 0] < gaps[k, 0] - near:
+        while j < searched.gaps.shape[0] and searched.gaps[j, 0] < gaps[k, 0] - max_displacement:
             j += 1
-        if j == seen.gaps.shape[0]:
+        if j == searched.gaps.shape[0]:
             break
-        begin = gaps[k, 0] - seen.gaps[j, 0]
-        end = gaps[k, 1] - seen.gaps[j, 1]
-        if abs(begin) > near or abs(end) > near or orders[k] != seen.orders[j]:
+        begin = gaps[k, 0] - searched.gaps[j, 0]
+        end = gaps[k, 1] - searched.gaps[j, 1]
+        if (
+            abs(begin) > max_displacement
+            or abs(end) > max_displacement
+            or orders[k] != searched.orders[j]
+        ):
             continue
         grown = max(begin, 0.0) + max(-end, 0.0)
         closed = 0.0
@@ -121,71 +126,73 @@ def clearance_left(
         comparable = True
         none_inside = True
         for i in range(m):
-            at = seen.offset[j] + i
+            at = searched.offset[j] + i
             # the slope between the node's neighbours, or the gap's end
             if i > 0:
-                before, low = seen.theta[at - 1], seen.opening[at - 1]
+                before, low = searched.theta[at - 1], searched.opening[at - 1]
             else:
-                before, low = seen.gaps[j, 0], 0.0
+                before, low = searched.gaps[j, 0], 0.0
             if i < m - 1:
-                after, high = seen.theta[at + 1], seen.opening[at + 1]
+                after, high = searched.theta[at + 1], searched.opening[at + 1]
             else:
-                after, high = seen.gaps[j, 1], 0.0
+                after, high = searched.gaps[j, 1], 0.0
             here = theta[offset[k] + i]
-            moved = here - seen.theta[at]
-            was = seen.opening[at] + (high - low) / (after - before) * moved
+            moved = here - searched.theta[at]
+            was = searched.opening[at] + (high - low) / (after - before) * moved
             now = _low_opening(f[offset[k] + i], orders[k], i, rules)
             closed = max(closed, was - now)
             most = max(most, was)
-            if abs(moved) > near:
+            if abs(moved) > max_displacement:
                 comparable = False
             # a minimum may appear at any node, but hardly beside the ends
             if min(here - gaps[k, 0], gaps[k, 1] - here) > within:
                 none_inside = False
-                rest = was - CLOSING_SAFETY * max(was - now, 0.0) - beside * grown
+                rest = was - CLOSING_SAFETY * max(was - now, 0.0) - closing_per_motion * grown
                 comparable = comparable and rest > CLEARANCE_LEFT * was
             elif now < 0 <= was:
                 comparable = False
         if not comparable:
             continue
-        clearance = seen.clearance[j]
+        clearance = searched.clearance[j]
         if clearance == np.inf and none_inside:
             clearance = most
-        rest = clearance - CLOSING_SAFETY * closed - beside * grown
+        rest = clearance - CLOSING_SAFETY * closed - closing_per_motion * grown
         if clearance == np.inf or rest > CLEARANCE_LEFT * clearance:
-            left[k] = rest if seen.clearance[j] < np.inf else np.inf
-            place[k] = j
-    fresh: Integers = np.flatnonzero(place < 0)
-    is_same = gaps.shape[0] == seen.gaps.shape[0] and fresh.shape[0] == 0
-    return Left(left, place, fresh, is_same)
+            left[k] = rest if searched.clearance[j] < np.inf else np.inf
+            index[k] = j
+    to_search: Integers = np.flatnonzero(index < 0)
+    is_unchanged = gaps.shape[0] == searched.gaps.shape[0] and to_search.shape[0] == 0
+    return RemainingClearance(left, index, to_search, is_unchanged)
 
 
 @compiled
-def noted(
+def update_searched(
     gaps: Array,
     nodes: Nodes,
     f: Array,
     rules: GaussRules,
-    seen: Seen,
-    place: Integers,
+    searched: SearchedGaps,
+    index: Integers,
     clearance: Array,
-) -> Seen:
-    """Note what was seen: gaps just looked at (``place`` negative) with their clearance."""
+) -> SearchedGaps:
+    """Update the searched gaps by those just searched, whose ``index`` is negative."""
     orders, offset, theta = nodes.orders, nodes.offset, nodes.theta
     new_gaps = gaps.copy()
     new_theta = theta.copy()
     new_opening = np.empty(theta.shape[0])
     new_clearance = clearance.copy()
     for k in range(gaps.shape[0]):
-        j = place[k]
+        j = index[k]
         if j >= 0:
-            new_gaps[k] = seen.gaps[j]
-            new_clearance[k] = seen.clearance[j]
+            new_gaps[k] = searched.gaps[j]
+            new_clearance[k] = searched.clearance[j]
         for i in range(rules.counts[orders[k]]):
             at = offset[k] + i
             if j >= 0:
-                new_theta[at] = seen.theta[seen.offset[j] + i]
-                new_opening[at] = seen.opening[seen.offset[j] + i]
+                new_theta[at] = searched.theta[searched.offset[j] + i]
+                new_opening[at] = searched.opening[searched.offset[j] + i]
             else:
                 new_opening[at] = _low_opening(f[at], orders[k], i, rules)
-    return Seen(new_gaps, orders.copy(), offset.copy(), new_theta, new_opening, new_clearance)
+    return SearchedGaps(
+        new_gaps, orders.copy(), offset.copy(), new_theta, new_opening, new_clearance
+    )

@@ -1,4 +1,4 @@
-"""Where a gap that is clear at one point of a branch and overlaps at another touches between them.
+"""Find where a gap first closes between two points of a branch.
 
 Several gaps may have closed on the way. Each closes smoothly, while the least of all clearances has
 a kink wherever another gap takes the lead: so each is interpolated by itself.
@@ -6,16 +6,19 @@ a kink wherever another gap takes the lead: so each is interpolated by itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.tolerances import (
     TRIAL_FROM_END,
 )
 
 
-class Closing:
-    """Clearances of the gaps that overlap at one end of a stretch of a branch.
+class ClearanceInterpolation:
+    """Interpolation of the clearances of gaps that overlap at one end of a stretch of a branch.
 
     Parameters
     ----------
@@ -23,21 +26,32 @@ class Closing:
         d where all of them are clear, and where all overlap.
     before, after : array, shape (gaps,)
         Their clearances there.
+    clearances_of : callable
+        Computes their clearances in another field.
     """
 
-    def __init__(self, clear: float, hit: float, before: Array, after: Array) -> None:
+    def __init__(
+        self,
+        clear: float,
+        hit: float,
+        before: Array,
+        after: Array,
+        clearances_of: Callable[[GapField], Array],
+    ) -> None:
         self._at = [clear, hit]
         self._values = [before, after]
+        self._clearances_of = clearances_of
 
-    def note(self, at: float, values: Array) -> None:
-        """Take down the clearances at another place."""
+    def record(self, at: float, field: GapField) -> None:
+        """Record the clearances in a field at d = ``at``."""
         self._at.append(at)
-        self._values.append(values)
+        self._values.append(self._clearances_of(field))
 
-    def aim(self, clear: float, hit: float, wanted: float) -> float:
-        """Share of the way from ``clear`` to ``hit`` at which the first gap comes to ``wanted``.
+    def next_trial(self, clear: float, hit: float, wanted: float) -> float:
+        """Return the share of the way from ``clear`` to ``hit`` at which to try next.
 
-        Both are places that were taken down. A parabola goes through them and the nearest third.
+        There a gap first has the clearance ``wanted``, by a parabola through the clearances at both
+        ends and at the nearest third d that was recorded.
         """
         low, high = self._at.index(clear), self._at.index(hit)
         way = hit - clear

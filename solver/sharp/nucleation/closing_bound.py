@@ -1,4 +1,4 @@
-"""Bound on how far a gap can have closed along a branch, so that touches are searched in time."""
+"""Bound the closing of gaps along a branch, so that touches are searched in time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from adhesis.solver.sharp.mechanics import EdgeMechanics
 
 
 class ClosingBound:
-    """Estimates, on the safe side, of how far gaps close locally; in units of q0 s.
+    """Upper estimates of the local closing of gaps, in units of q0 s.
 
     Parameters
     ----------
@@ -21,8 +21,8 @@ class ClosingBound:
     def __init__(self, edges: EdgeMechanics) -> None:
         self._edges = edges
 
-    def over(self, point: Point, reached: Point, branch: Branch) -> float:
-        """Return by how much a gap may have closed from one point of a branch to the next."""
+    def between(self, point: Point, reached: Point, branch: Branch) -> float:
+        """Bound the closing of a gap from one point of a branch to the next."""
         if branch == "loading":
             return abs(reached.at - point.at) * self._rate(reached)
         # While the mean gap widens only edges that run can close a gap elsewhere.
@@ -30,8 +30,8 @@ class ClosingBound:
         return float(self._edges.critical / np.sqrt(self._edges.wave) * motion)
 
     def _rate(self, point: Point) -> float:
-        """Closing of a gap along the branch by d."""
-        rate = self.rate_held(point)
+        """Bound the closing of a gap along the branch per unit of d."""
+        rate = self.rate_at_fixed_edges(point)
         if self._edges.is_fixed:
             return rate
         # d(q0 s)/dd along the branch, from d = weight q0 s - compliance p and dY/dd
@@ -39,8 +39,8 @@ class ClosingBound:
         mean = 1 + compliance * point.slope if weight else point.slope
         return float(rate * max(1.0, abs(mean)))
 
-    def rate_held(self, point: Point) -> float:
-        """Return the closing of a gap by q0 s while edges are held.
+    def rate_at_fixed_edges(self, point: Point) -> float:
+        """Bound the closing of a gap per unit of q0 s at fixed edges.
 
         The mean gap closes by the gaps alone, the faster the less of the period they take.
         """

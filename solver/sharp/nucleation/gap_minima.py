@@ -1,4 +1,4 @@
-"""Local minima of the openings, compiled: parabolas through the fine nodes, or the whole series."""
+"""Find local minima of the openings, compiled: by parabolas on the fine nodes or the series."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from adhesis.solver.sharp.tolerances import (
 
 
 @compiled
-def bottoms(theta: Array, opening: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Local minima where θ falls: place, value, half of κ, width, doubt; θ of the minima rises.
+def local_minima(theta: Array, opening: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Find local minima where θ falls: position, value, half of κ, width, error; θ then rises.
 
     By the parabola through three nodes, Newton's form; ``width`` is the distance of the outer two,
-    ``doubt`` what the value may be wrong by, from the cubics through a fourth node on either side.
+    ``error`` that of the value, estimated from the cubics through a fourth node on either side.
     """
     x, y = theta, opening
     out = np.empty((5, y.shape[0] // 2 + 1))
@@ -56,8 +56,10 @@ def bottoms(theta: Array, opening: Array) -> tuple[Array, Array, Array, Array, A
 
 
 @compiled
-def _bottom(gap: Array, modes: Array, at: float, width: float) -> tuple[float, float, float]:
-    """Place, opening and half the curvature of a minimum, by parabolas that get narrower."""
+def _refine_minimum(
+    gap: Array, modes: Array, at: float, width: float
+) -> tuple[float, float, float]:
+    """Locate a minimum by narrowing parabolas: position, opening and half the curvature."""
     half = 0.0
     low = np.inf
     x = np.empty(3)
@@ -76,31 +78,31 @@ def _bottom(gap: Array, modes: Array, at: float, width: float) -> tuple[float, f
 
 
 @compiled
-def bottoms_of(
-    gaps: Integers,
+def minima_of_gaps(
+    indices: Integers,
     nodes: Nodes,
     f: Array,
     rules: GaussRules,
     top: int,
     panels: Panels,
 ) -> tuple[Array, Array, Array, Integers]:
-    """Minima of the openings of some gaps of a field: place, value, κ, and in which gap each lies.
+    """Find the minima of some gaps of a field: position, value, κ, and the gap of each.
 
-    ``top`` and ``panels`` are those of the source; ``gaps`` rise.
+    ``top`` and ``panels`` are those of the source; ``indices`` of the gaps rise.
     """
     out = np.empty((3, 64))
     where = np.empty(64, dtype=np.int64)
     found = 0
     last = 0
     circle = tabulate_circle(4)
-    for k in gaps:
-        modes_of_field = rules.counts[nodes.orders[k]]
-        count = count_sine_nodes(nodes.table[k], modes_of_field, top, SHAPE_NODES)
+    for k in indices:
+        fewest = rules.counts[nodes.orders[k]]
+        count = count_sine_nodes(nodes.table[k], fewest, top, SHAPE_NODES)
         if count != last:
             circle = tabulate_circle(count + 1)
             last = count
         theta, _, opening, modes = open_gap(nodes, k, f, circle, rules, panels)
-        at, low, half, width, doubt = bottoms(theta, opening)
+        at, low, half, width, error = local_minima(theta, opening)
         while found + at.shape[0] > where.shape[0]:
             wider = np.empty((3, 2 * where.shape[0]))
             wider[:, :found] = out[:, :found]
@@ -108,8 +110,10 @@ def bottoms_of(
             longer[:found] = where[:found]
             out, where = wider, longer
         for j in range(at.shape[0]):
-            if low[j] < max(MINIMUM_IS_LOW * half[j] * width[j] ** 2, MINIMUM_DOUBT * doubt[j]):
-                at[j], low[j], half[j] = _bottom(nodes.table[k], modes, at[j], 0.5 * width[j])
+            if low[j] < max(MINIMUM_IS_LOW * half[j] * width[j] ** 2, MINIMUM_DOUBT * error[j]):
+                at[j], low[j], half[j] = _refine_minimum(
+                    nodes.table[k], modes, at[j], 0.5 * width[j]
+                )
             out[0, found] = at[j]
             out[1, found] = low[j]
             out[2, found] = 2 * half[j]

@@ -1,8 +1,8 @@
 """Locate on a branch where contact appears in a gap, or a gap in contact.
 
-Both are the same search: a criterion has a value for every field, positive while nothing happens,
-and the first point of a branch is looked for at which it is not. ``nucleation.Nucleation`` is the
-criterion of touches, ``opening.Openings`` its mirror image, that of gaps that open inside patches.
+Both are the same search: a criterion has a value for every field, positive while nothing nucleates,
+and the first point of a branch is located at which it is not positive. ``nucleation.Nucleation`` is
+the criterion of touches, ``opening.Openings`` that of gaps that open inside patches.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.closing import Closing
+from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
 from adhesis.solver.sharp.tolerances import (
     BISECTION_EVERY,
     CLEAR_TRIALS,
@@ -29,44 +28,31 @@ Seed = TypeVar("Seed")
 
 @dataclass(frozen=True, eq=False)
 class Located(Generic[Seed]):
-    """The point of a branch at which something nucleates, what, and how late (in d) at most."""
+    """Point of a branch at which something nucleates, its seeds, and the lateness in d at most."""
 
     point: Point
     seeds: list[Seed]
     late: float
 
 
-class Tracked(Protocol):
-    """Values of several places, each followed by itself along a stretch of a branch."""
-
-    @property
-    def closing(self) -> Closing:
-        """What is known of them."""
-        ...
-
-    def values(self, field: GapField) -> Array:
-        """Compute their values in another field."""
-        ...
-
-
 class Criterion(Protocol[Seed]):
-    """What nucleates, and when."""
+    """Nucleation criterion: a value for every field, positive while nothing nucleates."""
 
     @property
     def tolerance(self) -> float:
         """Value below zero that is allowed in a state."""
         ...
 
-    def least(self, field: GapField) -> tuple[float, Any]:
-        """Return the least value of a field, and the places from which seeds are chosen."""
+    def minimum(self, field: GapField) -> tuple[float, Any]:
+        """Return the least value of a field, and the candidates from which seeds are chosen."""
         ...
 
-    def ready(self, places: Any) -> list[Seed]:
+    def choose_seeds(self, candidates: Any) -> list[Seed]:
         """Return the seeds of the least value, and of those that equal it; none if positive."""
         ...
 
     def is_located(self, value: float, many: bool, near: bool) -> bool:
-        """Whether a place with this value is exact enough.
+        """Return whether a point with this value is located finely enough.
 
         Parameters
         ----------
@@ -78,13 +64,21 @@ class Criterion(Protocol[Seed]):
         """
         ...
 
-    def tracked(self, clear: Point, hit: Point) -> Tracked | None:
-        """Return the places whose values change sign between two points, of many gaps."""
+    def track_between(self, clear: Point, hit: Point) -> ClearanceInterpolation | None:
+        """Track each value that changes sign between two points by itself, of many gaps."""
         ...
 
-    def check_located(self, value: float, at: float) -> None:
-        """Raise if a point found at d = ``at`` with this value cannot be used."""
+    def validate_location(self, value: float, at: float) -> None:
+        """Raise if a point located at d = ``at`` with this value cannot be used."""
         ...
+
+
+def secant_share(clear_value: float, hit_value: float, tolerance: float) -> float:
+    """Return the share of the way from a clear point to a hit at which to try next.
+
+    By a secant to a fifth of the tolerance below zero, kept off both ends.
+    """
+    return min(max((clear_value + 0.2 * tolerance) / (clear_value - hit_value), 0.02), 0.98)
 
 
 def locate(
@@ -97,11 +91,10 @@ def locate(
     """Locate the first point of a trail at which a criterion is met, with its seeds.
 
     Else None and the least value at the end of the trail. The trail starts at a point known to be
-    clear, by ``clearance`` at least; between its points the place is located to ``resolution``
-    (q0 s).
+    clear, by ``clearance`` at least; between its points the search ends at ``resolution`` (q0 s).
     """
     hit = trail[-1]
-    hit_value, hit_places = criterion.least(hit.field)
+    hit_value, hit_candidates = criterion.minimum(hit.field)
     if hit_value > 0:
         return None, hit_value
     clear_value = np.nan
@@ -109,11 +102,11 @@ def locate(
     low, high = 0, len(trail) - 1
     while high - low > 1:
         middle = (low + high) // 2
-        value, places = criterion.least(trail[middle].field)
+        value, candidates = criterion.minimum(trail[middle].field)
         if value > 0:
             low, clear_value = middle, value
         else:
-            high, hit, hit_places, hit_value = middle, trail[middle], places, value
+            high, hit, hit_candidates, hit_value = middle, trail[middle], candidates, value
     last = trail[low]
     clear = last.at
     # Of many gaps each trial is expensive: those at both ends show where to begin, and the least
@@ -121,42 +114,40 @@ def locate(
     many = edges.uses_windows(last.gaps)
     if many and low == 0 and clearance > 0:
         clear_value = clearance
-    tracked = criterion.tracked(last, hit) if many else None
+    tracked = criterion.track_between(last, hit) if many else None
     cleared = 0  # trials one after the other that were clear
     for trials in range(1, TOUCH_TRIALS + 1):
         if criterion.is_located(hit_value, many, abs(clear - hit.at) <= resolution):
             break
         share = 0.5
         if tracked is not None and trials % BISECTION_EVERY:
-            share = tracked.closing.aim(clear, hit.at, -0.2 * criterion.tolerance)
-        # The least value may be that of another place than the hit: then a secant creeps.
+            share = tracked.next_trial(clear, hit.at, -0.2 * criterion.tolerance)
+        # The least value may be that of another candidate than the hit: then a secant creeps.
         elif tracked is None and np.isfinite(clear_value) and cleared < CLEAR_TRIALS:
-            # secant to half of the value that is allowed, kept off the ends
-            aimed = clear_value + 0.2 * criterion.tolerance
-            share = min(max(aimed / (clear_value - hit_value), 0.02), 0.98)
-        aim = clear + (hit.at - clear) * share
-        if aim in (clear, hit.at):  # there its value differs by the error of the field
-            return Located(last, criterion.ready(hit_places), 0.0), 0.0
+            share = secant_share(clear_value, hit_value, criterion.tolerance)
+        trial = clear + (hit.at - clear) * share
+        if trial in (clear, hit.at):  # there its value differs by the error of the field
+            return Located(last, criterion.choose_seeds(hit_candidates), 0.0), 0.0
         point = None
         reach = CORRECTED * edges.wave
         if many:
-            point = edges.equilibrium(last.interpolate(hit, aim), aim, reach)
+            point = edges.equilibrium(last.interpolate(hit, trial), trial, reach)
         for start in (last, hit) if share < 0.5 else (hit, last):
             if point is None:
-                point = edges.equilibrium(start.extrapolate(aim), aim, reach)
+                point = edges.equilibrium(start.extrapolate(trial), trial, reach)
         if point is None:
             break
-        value, places = criterion.least(point.field)
+        value, candidates = criterion.minimum(point.field)
         if tracked is not None:
-            tracked.closing.note(aim, tracked.values(point.field))
+            tracked.record(trial, point.field)
         cleared = cleared + 1 if value > 0 else 0
         if value > 0:
-            last, clear, clear_value = point, aim, value
+            last, clear, clear_value = point, trial, value
         else:
-            hit, hit_places, hit_value = point, places, value
-    criterion.check_located(hit_value, hit.at)
-    # it was met so much earlier as the value says
+            hit, hit_candidates, hit_value = point, candidates, value
+    criterion.validate_location(hit_value, hit.at)
+    # estimate the distance from the exact location by a secant
     late = abs(clear - hit.at)
     if clear_value > hit_value:
         late *= -hit_value / (clear_value - hit_value)
-    return Located(hit, criterion.ready(hit_places), late), 0.0
+    return Located(hit, criterion.choose_seeds(hit_candidates), late), 0.0

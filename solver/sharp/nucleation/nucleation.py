@@ -1,16 +1,15 @@
-"""Where the surfaces touch inside a gap, and the patch that is put there.
+"""Locate contact that nucleates inside gaps, and insert seed patches.
 
 Contact nucleates only where the opening has closed to zero. With adhesion a touching point grows at
 once, along a path on which the energy only falls, to its first equilibrium; on the parabola κx²/2
 that is (16 Γ/(π κ²))^(1/3) wide, Γ = 2γ q0/E* (lengths in 1/q0). A seed of half that width is put
 at the touching point; the descent does the rest. Without adhesion a patch has no width at first
-touch: it is put when the overlap is large enough for the narrowest patch that is followed.
+touch: its seed is put when the overlap is large enough for the narrowest patch that is followed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,16 +26,21 @@ from adhesis.solver.sharp.gap.ends import with_patches
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, GaussRules, Integers
 from adhesis.solver.sharp.mechanics import EdgeMechanics
-from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN, Seen, clearance_left, noted
-from adhesis.solver.sharp.nucleation.closing import Closing
-from adhesis.solver.sharp.nucleation.gap_minima import bottoms_of
-from adhesis.solver.sharp.nucleation.location import Located
+from adhesis.solver.sharp.nucleation.clearance import (
+    NONE_SEARCHED,
+    SearchedGaps,
+    clearance_left,
+    update_searched,
+)
+from adhesis.solver.sharp.nucleation.closing import ClearanceInterpolation
+from adhesis.solver.sharp.nucleation.gap_minima import minima_of_gaps
+from adhesis.solver.sharp.nucleation.location import Located, secant_share
 from adhesis.solver.sharp.tolerances import CLEAR_TRIALS, COMPARABLE, OVERLAP, TOUCH_TRIALS
 
 
 @dataclass(frozen=True)
 class Touch:
-    """Local minimum of an opening: place, value and curvature κ, in units of 1/q0."""
+    """Local minimum of an opening: position, value and curvature κ, in units of 1/q0."""
 
     theta: float
     opening: float
@@ -44,7 +48,7 @@ class Touch:
 
 
 class Minima(NamedTuple):
-    """Local minima of the openings of some gaps: place, value and curvature, shape (minima,)."""
+    """Local minima of the openings of some gaps, as in :class:`Touch`, shape (minima,) each."""
 
     theta: Array
     opening: Array
@@ -52,11 +56,11 @@ class Minima(NamedTuple):
 
 
 class Lengths(NamedTuple):
-    """Constants of a problem that a search for touches takes.
+    """Constants of a problem for the search for touches.
 
     Attributes
     ----------
-    near, beside : float
+    max_displacement, closing_per_motion : float
         See ``clearance.clearance_left``.
     surface, narrowest, widest : float
         See :func:`seed_width`.
@@ -64,24 +68,17 @@ class Lengths(NamedTuple):
         Highest harmonic of the profile.
     """
 
-    near: float
-    beside: float
+    max_displacement: float
+    closing_per_motion: float
     surface: float
     narrowest: float
     widest: float
     top: int
 
 
-class TrackedGaps(NamedTuple):
-    """Gaps that close on a stretch of a branch: their clearances, and how these are computed."""
-
-    closing: Closing
-    values: Callable[[GapField], Array]
-
-
 @compiled_for_both
 def seed_width(curvature: float, lengths: Lengths) -> float:
-    """Width of the patch that is put where surfaces with the energy Γ touch with this curvature."""
+    """Compute the width of the seed at a touch with this curvature, of surfaces with energy Γ."""
     first = (16 * lengths.surface / (np.pi * curvature**2)) ** (1 / 3)
     width: float = min(max(0.5 * first, lengths.narrowest), lengths.widest)
     return width
@@ -89,7 +86,7 @@ def seed_width(curvature: float, lengths: Lengths) -> float:
 
 @compiled_for_both
 def clearances(opening: Array, curvature: Array, lengths: Lengths) -> Array:
-    """As :meth:`Nucleation.clearance`."""
+    """Compute :meth:`Nucleation.clearance`, compiled."""
     out = np.empty(opening.shape[0])
     for i in range(opening.shape[0]):
         width = seed_width(curvature[i], lengths)
@@ -102,14 +99,14 @@ def clearances(opening: Array, curvature: Array, lengths: Lengths) -> Array:
 
 
 @compiled_for_both
-def look_at(
-    gaps: Integers, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
+def search_gaps(
+    indices: Integers, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
     out: Array,
 ) -> Minima:  # fmt: skip
-    """Find the minima of some gaps; ``out`` receives their least clearances, at their places."""
-    theta, opening, curvature, where = bottoms_of(gaps, nodes, f, rules, lengths.top, panels)
+    """Find the minima of some gaps; ``out`` receives their least clearances by index."""
+    theta, opening, curvature, where = minima_of_gaps(indices, nodes, f, rules, lengths.top, panels)
     values = clearances(opening, curvature, lengths)
-    for k in gaps:
+    for k in indices:
         out[k] = np.inf
     for i in range(where.shape[0]):
         out[where[i]] = min(out[where[i]], values[i])
@@ -119,50 +116,55 @@ def look_at(
 @compiled
 def search(
     gaps: Array, nodes: Nodes, f: Array, rules: GaussRules, panels: Panels, lengths: Lengths,
-    seen: Seen,
-) -> tuple[float, int, Minima, Seen]:  # fmt: skip
-    """Find the least clearance of a field, looking only at gaps that may be used up.
+    searched: SearchedGaps,
+) -> tuple[float, int, Minima, SearchedGaps]:  # fmt: skip
+    """Find the least clearance of a field, searching only gaps that may have closed.
 
-    Also returns the number of these gaps, their minima, and what has been seen now.
+    Also returns the number of these gaps, their minima, and the updated searched gaps.
     """
-    left, place, fresh, is_same = clearance_left(
-        gaps, nodes, f, rules, seen, lengths.near, lengths.beside
+    left, index, to_search, is_unchanged = clearance_left(
+        gaps, nodes, f, rules, searched, lengths.max_displacement, lengths.closing_per_motion
     )
     minima = Minima(np.empty(0), np.empty(0), np.empty(0))
-    if fresh.shape[0] > 0:
-        minima = look_at(fresh, nodes, f, rules, panels, lengths, left)
-    if not is_same:
-        seen = noted(gaps, nodes, f, rules, seen, place, left)
-    return left.min(), fresh.shape[0], minima, seen
+    if to_search.shape[0] > 0:
+        minima = search_gaps(to_search, nodes, f, rules, panels, lengths, left)
+    if not is_unchanged:
+        searched = update_searched(gaps, nodes, f, rules, searched, index, left)
+    return left.min(), to_search.shape[0], minima, searched
 
 
 class Nucleation:
-    """Finds touching points and puts seeds there: a criterion of ``location.locate``.
+    """Criterion of touches for ``location.locate``, which also inserts seed patches.
 
     Attributes
     ----------
-    seen : Seen
-        Gaps as they were when they were looked at; set by whoever goes on from another state.
+    searched : SearchedGaps
+        Gaps as they were when they were last searched; set by a caller that continues from another
+        state.
+    equal : float
+        Touches whose clearances differ by less nucleate together, in units of 1/q0.
+    tolerance : float
+        Overlap that is allowed in a state, in units of 1/q0.
     """
 
     def __init__(self, problem: Problem, edges: EdgeMechanics) -> None:
         self.problem, self.edges = problem, edges
-        self.seen = NOT_SEEN
+        self.searched = NONE_SEARCHED
         self._lengths = Lengths(
-            near=COMPARABLE * edges.wave,
-            beside=float(edges.critical / np.sqrt(edges.wave)),
+            max_displacement=COMPARABLE * edges.wave,
+            closing_per_motion=float(edges.critical / np.sqrt(edges.wave)),
             surface=math.pi * edges.critical**2 / 8,  # Γ
             narrowest=float(3 * edges.smallest),
             widest=float(edges.longest_step),
             top=edges.source.top,
         )
         self.equal = EQUAL_CRESTS * problem.profile.h_max * problem.profile.q0
-        self.overlap = OVERLAP * problem.profile.h_max * problem.profile.q0
+        self.tolerance = OVERLAP * problem.profile.h_max * problem.profile.q0
 
     def first_touch(self) -> tuple[float, list[Touch]]:
-        """Separation q0 s at which the first patches are put, and where.
+        """Return the separation q0 s at which the first seeds are put, and the touches.
 
-        That is at every crest as high as the highest.
+        These are at every crest as high as the highest.
         """
         profile = self.problem.profile
         crests = profile.crests()
@@ -173,11 +175,11 @@ class Nucleation:
         return profile.h_max * profile.q0 - overlap, highest
 
     def clearance(self, opening: Array, curvature: Array) -> Array:
-        """Opening left at minima before a patch is put there; not positive when it is time."""
+        """Compute the opening left at minima before a seed is put; not positive at a touch."""
         return clearances(opening, curvature, self._lengths)
 
-    def ready(self, minima: Minima) -> list[Touch]:
-        """Where to put patches: the place of largest overlap, and those that equal it."""
+    def choose_seeds(self, minima: Minima) -> list[Touch]:
+        """Choose the touch of the largest overlap, and those that equal it."""
         over = self.clearance(minima.opening, minima.curvature)
         least = float(over.min(initial=np.inf))
         if least > 0:
@@ -189,48 +191,44 @@ class Nucleation:
             for i in np.flatnonzero(over <= min(least + equal, 0.0))
         ]
 
-    def least(self, field: GapField) -> tuple[float, Minima]:
-        """Least clearance of a field, and the minima of the gaps that may be used up.
+    def minimum(self, field: GapField) -> tuple[float, Minima]:
+        """Return the least clearance of a field, and the minima of the gaps that may have closed.
 
-        Only those are looked at; see ``clearance``.
+        Only those are searched; see ``clearance``.
         """
-        of = field.solution
-        least, looked_at, minima, self.seen = search(
-            field.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, field.source.panels,
-            self._lengths, self.seen,
+        solution = field.solution
+        least, count, minima, self.searched = search(
+            field.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES, field.source.panels,
+            self._lengths, self.searched,
         )  # fmt: skip
-        self.edges.count.openings += looked_at
+        self.edges.count.openings += count
         return least, minima
 
-    @property
-    def tolerance(self) -> float:
-        """Overlap that is allowed."""
-        return self.overlap
-
     def is_located(self, value: float, many: bool, near: bool) -> bool:
-        """Whether a touch with this clearance is exact enough; see ``location.Criterion``."""
-        return value == 0 or ((many or near) and value > -0.5 * self.overlap)
+        """Return whether a touch is located finely enough; see ``location.Criterion``."""
+        return value == 0 or ((many or near) and value > -0.5 * self.tolerance)
 
-    def check_located(self, value: float, at: float) -> None:
-        """Raise if surfaces overlap at the touch that was found."""
-        if value < -self.overlap and self.edges.critical > 0:
+    def validate_location(self, value: float, at: float) -> None:
+        """Raise if surfaces overlap at the touch that was located."""
+        if value < -self.tolerance and self.edges.critical > 0:
             raise NoState("surfaces overlap, and no first touch is found", at)
 
-    def _clearance_of(self, field: GapField, gaps: Integers) -> Array:
-        """Clearance of each of some gaps."""
-        self.edges.count.openings += len(gaps)
-        of, out = field.solution, np.empty(len(field.gaps))
-        look_at(
-            gaps, of.nodes, of.scaled_opening, GAUSS_RULES, field.source.panels, self._lengths, out
-        )
-        return out[gaps]
+    def _clearance_of(self, field: GapField, indices: Integers) -> Array:
+        """Compute the clearance of each of some gaps."""
+        self.edges.count.openings += len(indices)
+        solution, out = field.solution, np.empty(len(field.gaps))
+        search_gaps(
+            indices, solution.nodes, solution.scaled_opening, GAUSS_RULES, field.source.panels,
+            self._lengths, out,
+        )  # fmt: skip
+        return out[indices]
 
-    def tracked(self, clear: Point, hit: Point) -> TrackedGaps | None:
+    def track_between(self, clear: Point, hit: Point) -> ClearanceInterpolation | None:
         """Track the gaps that are open at one point and overlap at another."""
-        of, lengths = hit.field.solution, self._lengths
+        solution, lengths = hit.field.solution, self._lengths
         left = clearance_left(
-            hit.gaps, of.nodes, of.scaled_opening, GAUSS_RULES, self.seen, lengths.near,
-            lengths.beside,
+            hit.gaps, solution.nodes, solution.scaled_opening, GAUSS_RULES, self.searched,
+            lengths.max_displacement, lengths.closing_per_motion,
         )  # fmt: skip
         closed = np.flatnonzero(left.clearance <= 0)
         after = self._clearance_of(hit.field, closed)
@@ -238,35 +236,38 @@ class Nucleation:
         if len(closed) == 0 or clear.gaps.shape != hit.gaps.shape:
             return None
         before = self._clearance_of(clear.field, closed)
-        closing = Closing(clear.at, hit.at, before, after)
-        return TrackedGaps(closing, lambda field: self._clearance_of(field, closed))
+        return ClearanceInterpolation(
+            clear.at, hit.at, before, after, lambda field: self._clearance_of(field, closed)
+        )
 
-    def located_held(self, point: Point, clearance: float, end: float) -> Located[Touch] | None:
-        """Where surfaces touch between a point with this clearance and ``end``, edges held."""
+    def locate_touch_at_fixed_edges(
+        self, point: Point, clearance: float, end: float
+    ) -> Located[Touch] | None:
+        """Locate a touch between a point with this clearance and d = ``end``, at fixed edges."""
         clear, low, hit = point.at, clearance, end
         cleared = 0
         field = self.edges.field(point.gaps, hit)
-        high, minima = self.least(field)
-        if high > -self.overlap:
+        high, minima = self.minimum(field)
+        if high > -self.tolerance:
             return None
         for _ in range(TOUCH_TRIALS):
-            if high >= -0.5 * self.overlap:
+            if high >= -0.5 * self.tolerance:
                 break
-            # Openings are linear in d: a secant to a fourth of the overlap that is allowed
-            share = min(max((low + 0.25 * self.overlap) / (low - high), 0.02), 0.98)
-            aim = clear + (hit - clear) * (share if cleared < CLEAR_TRIALS else 0.5)
-            aimed = self.edges.field(point.gaps, aim)
-            value, there = self.least(aimed)
+            # openings are linear in d at fixed edges
+            share = secant_share(low, high, self.tolerance) if cleared < CLEAR_TRIALS else 0.5
+            trial = clear + (hit - clear) * share
+            tried = self.edges.field(point.gaps, trial)
+            value, there = self.minimum(tried)
             cleared = cleared + 1 if value > 0 else 0
             if value > 0:
-                clear, low = aim, value
+                clear, low = trial, value
             else:
-                hit, high, field, minima = aim, value, aimed, there
-        held = Point(hit, field, point.rate, float("nan"))
-        return Located(held, self.ready(minima), abs(end - point.at))
+                hit, high, field, minima = trial, value, tried, there
+        touching = Point(hit, field, point.rate, float("nan"))
+        return Located(touching, self.choose_seeds(minima), abs(end - point.at))
 
-    def seeded(self, gaps: Array, touches: list[Touch]) -> Array:
-        """Edges with a seed at each touch."""
+    def insert_seeds(self, gaps: Array, touches: list[Touch]) -> Array:
+        """Return the gaps with a seed patch at each touch."""
         return with_patches(
             gaps,
             np.array([t.theta for t in touches]),

@@ -1,4 +1,4 @@
-"""Where a gap opens inside a patch, and the crack that is put there: the mirror of a touch.
+"""Locate cracks that open inside patches, and insert them.
 
 An interface of finite strength gives way at a local maximum of tension that reaches the strength,
 away from the edges, where tension is singular. The crack is that of ``solver.crack``.
@@ -11,8 +11,10 @@ import math
 import numpy as np
 
 from adhesis.solver.crack import (
+    HEALED_PLACE,
     IN_PATCH,
-    LONGEST,
+    LONGEST_TRIAL_HALF_LENGTH,
+    MOST_MAXIMA,
     NEAR_STRENGTH,
     Crack,
     has_healed,
@@ -29,15 +31,13 @@ from adhesis.solver.sharp.gap.ends import with_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import measure_at
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.tolerances import (
-    HEALED_PLACE,
-    MOST_MAXIMA,
     SHORTEST_CRACK,
     STRENGTH_EXCEEDED,
 )
 
 
 class Openings:
-    """Finds where patches open inside and puts cracks there: a criterion of ``location.locate``.
+    """Criterion of openings inside patches for ``location.locate``, which also inserts cracks.
 
     Parameters
     ----------
@@ -67,13 +67,13 @@ class Openings:
 
     @property
     def is_possible(self) -> bool:
-        """Whether anything opens at all."""
+        """Whether patches may open: the strength is finite."""
         return math.isfinite(self.strength)
 
-    def least(self, field: GapField) -> tuple[float, list[Crack]]:
+    def minimum(self, field: GapField) -> tuple[float, list[Crack]]:
         """Return the least value of all maxima of tension of a field, and those near the strength.
 
-        Positive, too, where tension falls from all edges.
+        The value is positive, too, where tension falls from all edges.
         """
         if self._nodal is None:
             return 1.0, []
@@ -92,32 +92,32 @@ class Openings:
                     found.append(crack)
         return min((crack.value for crack in found), default=1 - NEAR_STRENGTH), found
 
-    def ready(self, places: list[Crack]) -> list[Crack]:
-        """Return the crack of the largest excess, and those that equal it."""
-        return largest_excess(places)
+    def choose_seeds(self, candidates: list[Crack]) -> list[Crack]:
+        """Choose the crack of the largest excess, and those that equal it."""
+        return largest_excess(candidates)
 
-    def seeded(self, gaps: Array, cracks: list[Crack]) -> Array:
-        """Return the gaps with a crack at each place."""
+    def insert_seeds(self, gaps: Array, cracks: list[Crack]) -> Array:
+        """Return the gaps with these cracks inserted."""
         centres = np.array([crack.position for crack in cracks])
         return with_gaps(gaps, centres, np.array([crack.length for crack in cracks]))
 
     def heal(self, cracks: list[Crack]) -> None:
-        """Note cracks that closed again."""
+        """Record cracks that closed again."""
         self.healed += cracks
         self.heals += len(cracks)
 
     def is_located(self, value: float, many: bool, near: bool) -> bool:
-        """Whether a place with this value is exact enough.
+        """Return whether a maximum with this value is located finely enough.
 
-        A maximum may appear with a tension above the strength: then no place is exact.
+        A maximum may appear with a tension above the strength: then no point of the branch is.
         """
         return near or value > -0.5 * self.tolerance
 
-    def tracked(self, clear: Point, hit: Point) -> None:
-        """Follow no maximum by itself."""
+    def track_between(self, clear: Point, hit: Point) -> None:
+        """Track no maximum by itself."""
 
-    def check_located(self, value: float, at: float) -> None:
-        """Accept every place: see :meth:`is_located`."""
+    def validate_location(self, value: float, at: float) -> None:
+        """Accept every point: see :meth:`is_located`."""
 
     def _crack_at(
         self, field: GapField, refined: RefinedTension, theta: float, tension: float
@@ -133,7 +133,7 @@ class Openings:
             toughness=measure,
             release=lambda half: self._release(field, theta, half),
             shortest=0.5 * SHORTEST_CRACK * wave,
-            longest=min(LONGEST * wave, IN_PATCH * refined.edge_distance(theta)),
+            longest=min(LONGEST_TRIAL_HALF_LENGTH * wave, IN_PATCH * refined.edge_distance(theta)),
         )
 
     def _release(self, field: GapField, theta: float, half: float) -> float:

@@ -1,8 +1,9 @@
-"""Contact states of method ``sharp``: energies, stress and edges in SI units, from a gap field."""
+"""Compute contact states of method ``sharp`` from a gap field: energies, stress, edges in SI."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,13 +17,23 @@ from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
-from adhesis.solver.sharp.nucleation.clearance import NOT_SEEN, Seen
+from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED, SearchedGaps
 from adhesis.solver.values import with_values
 
 
+class BranchData(NamedTuple):
+    """Point of a branch at which a path stopped: d, p and q0 s, and the rest of ``Point``."""
+
+    prescribed: float
+    nearly: tuple[float, float]
+    rate: Array
+    slope: float
+    previous: PreviousPoint | None
+
+
 @dataclass(frozen=True, eq=False)
-class Memory:
-    """What a state remembers, so that a path goes on from it whatever was followed in between.
+class ContinuationData:
+    """Data from which a path continues at a state.
 
     Attributes
     ----------
@@ -30,21 +41,20 @@ class Memory:
         The ends of its gaps.
     clearance : float
         Of them (``Point.clearance``).
-    course : tuple of float, (float, float), array, float, PreviousPoint or None, optional
-        Where a path stopped at it: d, p and q0 s, dn/dd of every edge, dY/dd and the point before
-        it, as in ``Point``.
-    seen : Seen
-        The gaps as they were when they were last looked at.
+    branch_data : BranchData, optional
+        If a path stopped at the state.
+    searched : SearchedGaps
+        The gaps as they were when they were last searched for touches.
     """
 
     gaps: Array
     clearance: float
-    course: tuple[float, tuple[float, float], Array, float, PreviousPoint | None] | None = None
-    seen: Seen = NOT_SEEN
+    branch_data: BranchData | None = None
+    searched: SearchedGaps = NONE_SEARCHED
 
 
-def hold_of(problem: Problem) -> LoadingDevice:
-    """The control of a problem in the units of the field."""
+def loading_device(problem: Problem) -> LoadingDevice:
+    """Return the control of a problem in the units of the field."""
     if problem.control.is_load:
         return LoadingDevice(0.0, 1.0)
     compliance = 0.5 * problem.half_space.modulus * problem.profile.q0 / problem.control.stiffness
@@ -52,7 +62,7 @@ def hold_of(problem: Problem) -> LoadingDevice:
 
 
 class States:
-    """Makes contact states of one problem.
+    """Contact states and conversions of units of one problem.
 
     Parameters
     ----------
@@ -71,50 +81,51 @@ class States:
         h = np.abs(profile.coefficients * self.q0) ** 2
         self._full_energy = float(2 * np.pi * np.sum(m * h))  # ½∫S_full h~, both signs of m
 
-    def at(self, prescribed: float) -> float:
-        """What is prescribed, in the units of the field: of a separation or u_tot q0 times it."""
+    def to_field_units(self, prescribed: float) -> float:
+        """Convert the prescribed value to d: q0 times a separation or u_tot, 2p̄/E* of a load."""
         if self.problem.control.is_load:
             return prescribed / self._half
         return prescribed * self.q0
 
-    def prescribed(self, at: float) -> float:
-        """What d = ``at`` is in m, under a load in Pa."""
+    def to_si(self, at: float) -> float:
+        """Convert d = ``at`` to the prescribed value in m, under a load in Pa."""
         return at * self._half if self.problem.control.is_load else at / self.q0
 
-    def place(self, state: ContactState) -> float:
-        """What is prescribed in a state, in the units of the field."""
-        return self.at(self.problem.prescribed_in(state))
+    def prescribed_of(self, state: ContactState) -> float:
+        """Return the prescribed value of a state in field units, d."""
+        return self.to_field_units(self.problem.prescribed_in(state))
 
     def detached(self, separation: float) -> ContactState:
-        """State without contact at q0 s = ``separation``."""
-        return ContactState(separation / self.q0, np.empty((0, 2)), 0.0, 0.0, 0.0, 0.0)
+        """Make the state without contact at q0 s = ``separation``."""
+        return ContactState.detached(separation / self.q0)
 
     def overlaps_when_detached(self, at: float) -> bool:
-        """Whether no state without contact exists at d = ``at``: it would lie below s = h_max."""
+        """Return whether a state without contact at d = ``at`` would lie below s = h_max."""
         profile, control = self.problem.profile, self.problem.control
         return not control.is_load and at < profile.h_max * self.q0 * (1 - 1e-12)
 
     @property
-    def _per_prescribed(self) -> float:
-        """dY/dx in SI units where dY/dd is 1."""
+    def _stiffness_unit(self) -> float:
+        """Value of dY/dx in SI units at dY/dd = 1."""
         per = self._half * self.q0
         return 1 / per if self.problem.control.is_load else per
 
-    def after_loss(self, before: ContactState, at: float) -> ContactState:
-        """State without contact that ``before`` leaves behind at d = ``at``.
+    def detached_after(self, before: ContactState, at: float) -> ContactState:
+        """Make the state after ``before`` has lost contact at d = ``at``.
 
-        Under a load nothing holds it: the loop is closed at the separation of the loss.
+        Under a load the loop is closed at the separation of the loss (``model.control``).
         """
         if self.problem.control.is_load:
             return self.detached(before.separation * self.q0)
         return self.detached(at)
 
     def _hold_energy(self, separation: float, mean_stress: float) -> float:
+        """Compute the contribution of the control to the potential, in J/m."""
         profile, control = self.problem.profile, self.problem.control
         return control.potential(0.0, separation, mean_stress, profile.h_max, profile.period)
 
     def of_point(self, point: Point, separation: float | None = None) -> ContactState:
-        """State of a point of a branch; ``separation`` (m) where it is known without rounding."""
+        """Make the state of a point; ``separation`` (m) if it is known without rounding."""
         return self.of_field(point.field, point.slope, separation, point.clearance)
 
     def of_field(
@@ -124,7 +135,7 @@ class States:
         separation: float | None = None,
         clearance: float = 0.0,
     ) -> ContactState:
-        """State of a field with dY/dd = ``slope``; ``separation`` (m) as in :meth:`of_point`."""
+        """Make the state of a field, dY/dd = ``slope``; ``separation`` as in :meth:`of_point`."""
         self.count.energies += 1
         half = self._half
         at = gap_field.separation
@@ -143,20 +154,20 @@ class States:
             elastic_energy=elastic * half / self.q0**2,
             adhesion_energy=-self.problem.work_of_adhesion * measure / self.q0,
             contact_fraction=float((patches[:, 1] - patches[:, 0]).sum() / (2 * np.pi)),
-            stiffness=slope * self._per_prescribed,
+            stiffness=slope * self._stiffness_unit,
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=Memory(gaps, clearance),
+            internal=ContinuationData(gaps, clearance),
         )
 
-    def shifted(self, state: ContactState, gap_field: GapField, at: float) -> ContactState:
-        """State at d = ``at`` with the edges of ``state``: p is linear in s, U quadratic."""
+    def at_fixed_edges(self, state: ContactState, gap_field: GapField, at: float) -> ContactState:
+        """Move a state to d = ``at`` at fixed edges: p is linear in s, U quadratic."""
         way = at - gap_field.prescribed
         pressure = gap_field.pressure + gap_field.pressure_by_prescribed * way
-        apart = at
+        q0_s = at
         if not self.problem.control.is_fixed:
-            apart = gap_field.separation + gap_field.separation_by_prescribed * way
-        work = -np.pi * (apart - gap_field.separation) * (gap_field.pressure + pressure)
-        separation, mean_stress = apart / self.q0, pressure * self._half
+            q0_s = gap_field.separation + gap_field.separation_by_prescribed * way
+        work = -np.pi * (q0_s - gap_field.separation) * (gap_field.pressure + pressure)
+        separation, mean_stress = q0_s / self.q0, pressure * self._half
         return with_values(
             state,
             separation=separation,
@@ -164,17 +175,17 @@ class States:
             elastic_energy=state.elastic_energy + work * self._half / self.q0**2,
             stiffness=float("nan"),
             hold_energy=self._hold_energy(separation, mean_stress),
-            internal=Memory(gap_field.gaps, 0.0),
+            internal=ContinuationData(gap_field.gaps, 0.0),
         )
 
     def work(self, before: ContactState, after: ContactState, way: float) -> float:
-        """|Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""
+        """Compute |Y_before - Y_after| times ``way`` (in d), in J/m² of nominal area."""
         control, h_max = self.problem.control, self.problem.profile.h_max
         conjugate = [control.conjugate(s.separation, s.mean_stress, h_max) for s in (before, after)]
         unit = self._half if control.is_load else 1 / self.q0
         return abs(conjugate[0] - conjugate[1]) * way * unit
 
-    def imbalance(self, before: ContactState, after: ContactState) -> float:
+    def energy_residual(self, before: ContactState, after: ContactState) -> float:
         """Compute the change of energy between two states of a branch, less the work, in J/m²."""
         control, h_max = self.problem.control, self.problem.profile.h_max
         both = before, after
@@ -184,8 +195,8 @@ class States:
         work = 0.5 * way * (y[0] + y[1]) - way**2 * change / 12
         return (after.potential - before.potential) / self.period + work
 
-    def apart(self, one: ContactState, other: ContactState) -> float:
-        """Difference of two energies, in J/m² of nominal area."""
+    def energy_difference(self, one: ContactState, other: ContactState) -> float:
+        """Compute the difference of two energies, in J/m² of nominal area."""
         return abs(other.potential - one.potential) / self.period
 
     def jump(
@@ -196,16 +207,13 @@ class States:
         at_stake: float | None = None,
         barrier: float = 0.0,
     ) -> Jump:
-        """Jump between two states, with what is ``at_stake`` in J/m² if it raced.
+        """Make the jump between two states; ``at_stake`` in J/m² if it raced, else None.
 
         ``barrier`` is that of an opening, in units of γ/q0.
         """
         barrier *= self.problem.work_of_adhesion / (self.q0 * self.period)
-        jump = Jump.between(
+        return Jump.between(
             before, after, branch, self.period, raced=at_stake is not None,
             at_stake=at_stake or 0.0, barrier=barrier,
+            falls_off=self.problem.control.is_load and not after.patches,
         )  # fmt: skip
-        if self.problem.control.is_load and not after.patches:
-            # The load's own work is not counted, which may leave less than nothing.
-            jump = replace(jump, energy_drop=before.energy / self.period)
-        return jump

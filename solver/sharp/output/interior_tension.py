@@ -1,4 +1,4 @@
-"""Largest tension inside patches, away from their edges, of several states."""
+"""Find the largest tension inside patches of several states, away from their edges."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from functools import lru_cache
 
+from adhesis.solver.crack import MOST_MAXIMA
 from adhesis.solver.method import PatchTension
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.peaks import highest_peaks
@@ -15,7 +16,6 @@ from adhesis.solver.sharp.field.patch_tension import RefinedTension, nodal_tensi
 # Local maxima of each state that are kept: with zero range, and where a strength may be so small
 # beside the stress that flattens the profile that many seem to be higher.
 _CANDIDATES = 4
-_CANDIDATES_OPENING = 32
 
 
 def largest_tension(
@@ -27,14 +27,13 @@ def largest_tension(
     ----------
     problem : Problem
     field_of : callable
-        Gives the field of each state by its number.
+        Returns the field of each state by its number.
     count : int
         Number of states.
     """
     profile = problem.profile
     nodal = nodal_tension(problem)
-    step = nodal.step
-    most = _CANDIDATES if math.isinf(problem.strength) else _CANDIDATES_OPENING
+    most = _CANDIDATES if math.isinf(problem.strength) else MOST_MAXIMA
 
     @lru_cache(maxsize=1)
     def refined(state: int) -> RefinedTension:
@@ -51,7 +50,7 @@ def largest_tension(
     for value, state, node in candidates:
         if best is not None and value * unit <= best.tension:
             break
-        found = refined(state).maximum(node * step, step)
+        found = refined(state).maximum(node * nodal.step, nodal.step)
         if found is not None and found[1] * unit > (best.tension if best else 0.0):
             position = found[0] / profile.q0 % profile.period
             best = PatchTension(state, position, found[1] * unit)

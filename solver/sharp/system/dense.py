@@ -56,7 +56,7 @@ class DenseSystem(EdgeSystem):
         found, at, solution, rate, slope, steps = equilibrium(
             gaps, prescribed, reach, orders, strict, problem.law, problem.model, NO_EXTERIOR
         )
-        problem.count.newton(steps)
+        problem.count.add_newton(steps)
         if not found:
             return None
         return Point(prescribed, problem.solved(at, prescribed, solution), rate, slope)
@@ -82,7 +82,7 @@ class DenseSystem(EdgeSystem):
             track.ways.append(found.trajectory)
             motion = outward(gaps) * (found.gaps - gaps).ravel()
             track.stages.append(Stage(motion, found.interaction))
-        self._problem.count.descent(found.fields, found.tangents)
+        self._problem.count.add_descent(found.fields, found.tangents)
         return found
 
     def closing_motion(self, before: Array, after: Array) -> float:

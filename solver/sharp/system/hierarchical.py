@@ -29,7 +29,7 @@ from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
     equilibrium_many,
 )
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.dense_solver import GapField, check_definite
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.separate_gaps import solve_separately
 from adhesis.solver.sharp.field.solution import FieldModel, Solution
@@ -76,7 +76,7 @@ class HierarchicalSystem(EdgeSystem):
     def finer_openings(self, field: GapField) -> Array:
         """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
         if isinstance(field, FieldOfMany):
-            opening = field.held.opening  # a fold needs its responses, too
+            opening = field.fixed_edge_solution.opening  # a fold needs its responses, too
         else:
             opening = self.solution(field.gaps, field.prescribed, FINER_FIELD, 1).opening
         return opening.reshape(-1, 2)
@@ -98,15 +98,9 @@ class HierarchicalSystem(EdgeSystem):
             if near is None:
                 break
             found: EquilibriumOfMany = equilibrium_many(
-                near.response,
-                start,
-                prescribed,
-                reach,
-                strict,
-                problem.law,
-                problem.model,
+                near.response, start, prescribed, reach, strict, problem.law, problem.model
             )
-            problem.count.newton(found.corrections)
+            problem.count.add_newton(found.corrections)
             if found.found:
                 near.settled = found.gaps
                 return self._point(prescribed, near.response, found)
@@ -194,7 +188,7 @@ class HierarchicalSystem(EdgeSystem):
             approach: Approach = approach_minimum(
                 near.response, gaps, prescribed, law, problem.model
             )
-            count.descent(approach.steps, approach.steps)
+            count.add_descent(approach.steps, approach.steps)
             gaps, found = approach.gaps, None
             if approach.event == OUTGROWN:  # maybe as it is of other gaps, as many
                 near.is_outgrown = True
@@ -245,10 +239,11 @@ class FieldOfMany(GapField):
         """Solution of equation (1), solved at first access."""
         if self._solve is not None:
             self._solution, self._solve = self._solve(), None  # it holds a response
+            check_definite(self._solution)
         return self._solution
 
     @cached_property
-    def held(self) -> Solution:
+    def fixed_edge_solution(self) -> Solution:
         """Solution of all gaps together, for the responses at held edges, and more accurate."""
         digits = -math.log(FINER_FIELD * self.tolerance)
         model = FieldModel(self.device, digits, GAUSS_RULES, self.source.panels)

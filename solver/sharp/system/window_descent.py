@@ -96,7 +96,7 @@ def descend_in_window(
         most = WINDOW_FIELDS - fields
         found: Descent = descend(inside, prescribed, most, orders, equal_speeds, flow, alone)
         inside, orders = found.gaps, found.orders
-        problem.count.descent(found.fields, found.tangents)
+        problem.count.add_descent(found.fields, found.tangents)
         fields += found.fields
         if found.event == NO_FIELD:
             return reached

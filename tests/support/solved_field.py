@@ -1,0 +1,32 @@
+"""Fields of given gaps, solved by dense matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.sharp.field.dense_solver import GapField, solve
+from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
+from adhesis.solver.sharp.field.solution import (
+    FIXED_SEPARATION,
+    FieldModel,
+    LoadingDevice,
+    Solution,
+)
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.full_contact_stress import StressSource
+from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
+
+
+def solved_field(
+    source: StressSource,
+    gaps: Array,
+    prescribed: float,
+    tolerance: float,
+    device: LoadingDevice = FIXED_SEPARATION,
+) -> GapField:
+    """Solve the field of these gaps to a relative accuracy."""
+    model = FieldModel(device, float(-np.log(tolerance)), GAUSS_RULES, source.panels)
+    orders = choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
+    solution: Solution = solve(gaps, prescribed, orders, 2, model, NO_EXTERIOR)
+    return GapField(source, gaps, prescribed, tolerance, device, solution)
