@@ -164,6 +164,11 @@ def test_other_files_are_refused(tmp_path, result):
         (lambda: adhesis.load(3), TypeError, "path is 3"),
         (lambda: result.save("loop.h5"), InputError, "the name must end in .nc"),
         (lambda: result.save(3), TypeError, "path is 3"),
+        (
+            lambda: result.save("/nonexistent/x.nc"),
+            InputError,
+            "^path is /nonexistent/x.nc: there is no directory /nonexistent$",
+        ),
     ):
         with pytest.raises(error, match=message):
             call()

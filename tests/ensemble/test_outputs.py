@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -272,3 +274,20 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(
     assert [(path.name, path.read_text()) for path in Path("out").iterdir()] == [
         ("losses.csv", "old")
     ]
+
+
+def test_a_report_on_a_full_disk_ends_in_one_sentence(ask: Ask) -> None:
+    small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
+    write(Path("r.h5"), small, rows(small))
+    # files may not grow beyond this, which HDF5 and matplotlib meet as they meet a full disk
+    code = (
+        "import resource, sys; from adhesis.ensemble.command.main import main; "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY)); "
+        "sys.exit(main(['report', 'r.h5', '--to', 'out']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 74, done.stderr
+    assert done.stderr.splitlines() == [
+        "adhesis report: the report in out could not be written (File too large)"
+    ]
+    assert list(Path("out").iterdir()) == []
