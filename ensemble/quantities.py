@@ -25,6 +25,9 @@ _NAMES = {
 UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 """Unit by the name of a quantity; others are dimensionless (penetrations are in units of h_max)."""
 
+AXIS_UNITS = {"m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
+"""Units of the axes of a campaign for people, by their spelling in results files."""
+
 
 def with_units(table: Any) -> Any:
     """Return a DataFrame with the unit of every column in ``attrs["units"]``."""

@@ -45,6 +45,7 @@ from adhesis.ensemble.report.markdown_page import write_page
 from adhesis.ensemble.report.tables import loss_tables
 from adhesis.ensemble.report.tables import mechanisms as mechanism_tables
 from adhesis.ensemble.report.tables.table import number
+from adhesis.ensemble.report.tables.works import works
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.task.compute import make_problem
@@ -191,7 +192,7 @@ def test_the_paper_stands_beside_its_own_campaigns_alone(file, tmp_path, undrawn
     assert "aper" not in page.replace("paper.h5", "")
     assert "19.36" not in (tmp_path / "out" / "losses.csv").read_text()
     with style():
-        assert "paper" not in lines_of(loss_figures.loss_against_adhesion(data).axes[0])
+        assert "paper" not in lines_of(loss_figures.loss_against_hurst(data).axes[0])
 
 
 def test_numbers_are_written_as_people_write_them():
@@ -210,6 +211,19 @@ def test_tables_print_as_plain_lines_without_a_terminal(data):
     assert lines[6].split()[:3] == ["0.8", "0.04", "5"]
     assert "19.36" in lines[6]
     assert "failed" not in lines[1]  # nothing has
+
+
+def test_the_largest_tension_is_not_placed_where_contact_is_lost(data):
+    """They are two events of a loop, at two penetrations."""
+    headings = [column.heading for column in mechanism_tables.mechanisms(data).columns]
+    assert "largest tension (kPa)" in headings
+    assert "last contact lost at Δ/h_max" in headings
+
+
+def test_every_work_of_a_table_has_its_unit(data):
+    for column in works(data).columns:
+        if column.heading and "[J/m^2]" in column.name:
+            assert column.heading.endswith("J/m²)"), column.heading
 
 
 def test_jumps_by_kind_add_up_to_all_drops(data):
@@ -313,7 +327,7 @@ def test_the_loading_branch_takes_half_of_the_panel(data, tmp_path):
 def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
     """A panel for each γ; few points are not joined by a line."""
     with style():
-        figure = loss_figures.loss_against_adhesion(data)
+        figure = loss_figures.loss_against_hurst(data)
     for axes, gamma in zip(figure.axes, GAMMAS, strict=True):
         assert f"= {gamma:g} J" in axes.get_title(loc="left")
         found = [data.cell(h, gamma).estimates["loss_dimensionless"] for h in (0.7, 0.8)]
@@ -580,6 +594,8 @@ def test_the_page_embeds_every_figure_that_exists(report):
     for table in re.findall(r"(?:^\|.*\n)+", page, re.MULTILINE):
         assert len({line.count("|") for line in table.splitlines()}) == 1
     assert "19.36" in page
+    assert f"(fig3, table1) follow {paper.REFERENCE}." in page
+    assert "better than from two independent sets of profiles" in page
     assert "nan" not in page.replace("nano", "")
 
 

@@ -1,4 +1,4 @@
-"""Loss, and for turning points pull-off and contact too, along a further axis of the campaign."""
+"""Loss, and for turning points tension and contact too, along a further axis of the campaign."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ _LOG_FROM = 20  # an axis that spans more is logarithmic
 
 _LOSS = ("loss_dimensionless", r"loss $\tilde W$", 1.0)
 _OF_TURNING_POINT = (
-    ("pull_off_stress", "pull-off stress (kPa)", 1e3),
-    ("pull_off_penetration", r"pull-off at $\Delta/h_\mathrm{max}$", 1.0),
+    ("pull_off_stress", "largest tension (kPa)", 1e3),
+    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0),
     ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0),
     ("loss_per_contact", "loss per contact (mJ/m²)", 1e-3),
 )

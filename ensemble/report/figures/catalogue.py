@@ -76,7 +76,7 @@ LOSSES = (
         "table1_losses",
         "Loss of each H and work of adhesion",
         "Means with 95 % intervals, a panel for each γ.",
-        loss_figures.loss_against_adhesion,
+        loss_figures.loss_against_hurst,
         "Table 1",
         lambda data: "Stars: the paper's values, which have no error.",
     ),

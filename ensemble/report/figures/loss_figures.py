@@ -49,7 +49,7 @@ _STAR: Any = {
 }
 
 
-def loss_against_adhesion(data: Aggregate) -> Figure:
+def loss_against_hurst(data: Aggregate) -> Figure:
     """Table 1 as a figure: W~ of each H with intervals, a panel for each γ, the paper's beside."""
     shown = shown_gammas(data)
     columns = min(len(shown), _MOST_BESIDE)
@@ -336,7 +336,7 @@ def pull_off(data: Aggregate) -> Figure:
             unit=1e3,
         )
     axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    axes.set_ylabel("pull-off stress (kPa)")
+    axes.set_ylabel("largest tension (kPa)")
     axes.set_ylim(bottom=0)
     legend_above(figure, axes.get_legend_handles_labels()[0], 3)
     _second_scale(axes, data)

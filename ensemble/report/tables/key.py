@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.quantities import AXIS_UNITS
 from adhesis.ensemble.report.tables.table import KEY, TableColumn, Value
 
-_UNITS = {"1": "", "m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
 _CSV_UNITS = {"1": "", "m": " [m]", "m2": " [m^2]", "Pa": " [Pa]", "Pa m-1": " [Pa/m]"}
 
 
@@ -23,7 +23,7 @@ def axis_columns(axes: Iterable[Axis]) -> tuple[TableColumn, ...]:
     return tuple(
         TableColumn(
             f"{axis.name}{_CSV_UNITS[axis.unit]}",
-            f"{axis.name} ({_UNITS[axis.unit]})" if _UNITS[axis.unit] else axis.name,
+            axis.name if axis.unit == "1" else f"{axis.name} ({AXIS_UNITS[axis.unit]})",
         )
         for axis in axes
     )

@@ -83,7 +83,7 @@ def losses(data: Aggregate) -> Table:
         TableColumn("wall_time_mean [s]"),
     )
     rows = [_loss_row(data, cell) for cell in data.cells]
-    return make_table("Loss of one loop (Table 1)", columns, rows)
+    return make_table("Loss of one loop", columns, rows)
 
 
 def precision(data: Aggregate) -> Table:
