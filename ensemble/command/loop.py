@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, one_of, refused_as_input
-from adhesis.ensemble.loop.cycle import Cycle, cycle_of
+from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
 from adhesis.ensemble.loop.heights import closure_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
@@ -78,7 +78,7 @@ def execute(args: argparse.Namespace) -> int:
         results = _run(args, method, cycle, picked.visit if penetrations else None)
         fields = picked.collect(nodes) if penetrations else {}
     except PathError as error:
-        print(f"adhesis loop: {error}", file=sys.stderr)
+        print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return 1
     writing = Writing()
     if args.json is not None:

@@ -7,7 +7,7 @@ import sys
 import time
 
 from adhesis.ensemble.errors import InputError, refused_as_input
-from adhesis.ensemble.loop.cycle import control_of, turning_points_of
+from adhesis.ensemble.loop.cycle import control_of, in_options, turning_points_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.reporter import StatusLine
@@ -60,7 +60,7 @@ def execute(args: argparse.Namespace) -> int:
     try:
         answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
     except NoAnswer as error:
-        print(f"adhesis trace: {error}", file=sys.stderr)
+        print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
         return 1
     from adhesis.ensemble.trace.trace_page import summary, write_page
 

@@ -122,6 +122,21 @@ def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
     return Control(math.inf if args.stiffness is None else args.stiffness)
 
 
+def in_options(text: str, args: argparse.Namespace) -> str:
+    """Return a message on a path with the options that prescribe a stiffness or the separation."""
+    option = "--stiffness" if args.layer is None else "--layer"
+    for words, replacement in (
+        ("give a stiffness", "give --stiffness K"),
+        (
+            "give a larger stiffness",
+            "give a thinner --layer" if args.layer is not None else "give a larger --stiffness",
+        ),
+        ("prescribe the separation", f"prescribe the separation by leaving {option} out"),
+    ):
+        text = text.replace(words, replacement)
+    return text
+
+
 def _refuse_several(args: argparse.Namespace, *names: str) -> None:
     given = [f"--{n.replace('_', '-')}" for n in names if getattr(args, n) is not None]
     if len(given) > 1:

@@ -31,8 +31,10 @@ FAILURES = (RuntimeError, ValueError, ArithmeticError, MemoryError)
 
 
 def failure(error: Exception) -> str:
-    """Return class and message of an error."""
-    return f"{type(error).__name__}: {error}"
+    """Return the message of an error; where it is not written for users, with its class."""
+    from adhesis.solver.method import PathError
+
+    return str(error) if isinstance(error, PathError) else f"{type(error).__name__}: {error}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -71,8 +71,6 @@ NOT_RUN = {
     ),
     "python benchmarks/trace_coverage.py --cases 20 --json out/coverage.json": "takes minutes; "
     "test_trace_answer.py runs two cases",
-    "adhesis trace trace.csv --work-of-adhesion 0.04 --young 1MPa --poisson 0.5 --stiffness 0 "
-    "--max-stress 0.5kPa --to out/preload": "as before",
     "adhesis trace long.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out/long": (
         "takes minutes on a busy machine; as the trace before"
     ),
