@@ -12,9 +12,11 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
+from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.campaign.rules import list_of, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.lengths import HIGHEST_IN_METRES, LONGEST_IN_METRES, parse_length
 from adhesis.solver.checks import MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
@@ -38,7 +40,30 @@ def load_campaign(path: Path | str) -> Campaign:
         data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    return parse_campaign(_decoded(data, str(path)), str(path))
+    text = _decoded(data, str(path))
+    campaign = parse_campaign(text, str(path))
+    _ask_for_units(str(path), tomllib.loads(text))
+    return campaign
+
+
+def _ask_for_units(source: str, document: dict[str, Any]) -> None:
+    """Refuse numbers that can hardly be in SI units, as the options of the command line do.
+
+    The text of a campaign in a results file is not asked: its loops have been computed.
+    """
+    for table, key, read, largest in (
+        ("profile", "period", parse_length, LONGEST_IN_METRES),
+        ("profile", "h_rms", parse_length, HIGHEST_IN_METRES),
+        ("material", "adhesion_range", parse_length, LONGEST_IN_METRES),
+        ("sweep", "work_of_adhesion", parse_work_of_adhesion, LARGEST_IN_JOULES),
+    ):
+        values = document.get(table, {}).get(key, [])
+        for value in values if isinstance(values, list) else [values]:
+            if not isinstance(value, str):
+                try:
+                    read(repr(value), largest)
+                except InputError as error:
+                    raise InputError(f"{source}: [{table}] {key} {error}") from None
 
 
 def _decoded(data: bytes, source: str) -> str:

@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 
+from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.loop.cycle import control_of, in_options, turning_points_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
@@ -80,12 +81,11 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _numbers(text: str, option: str) -> list[float]:
+    words = str(text).split(",")
     try:
-        values = [float(word) for word in str(text).split(",")]
-    except ValueError:
-        raise InputError(
-            f"{option} is {text!r}: it must be one number, or several with commas"
-        ) from None
+        values = [parse_work_of_adhesion(word.strip(), LARGEST_IN_JOULES) for word in words]
+    except InputError as error:
+        raise InputError(f"{option} {error}") from None
     if len(set(values)) < len(values):
         raise InputError(f"{option} is {text!r}: its values must differ")
     return values

@@ -253,9 +253,10 @@ def range_summary(result: HasRanges) -> str:
     if interior is None:
         return "no tension inside patches"
     return (
-        f"adhesion of a range below {result.valid_range:.3g} m is of zero range here: largest "
-        f"tension inside patches {interior.tension:.3g} Pa, on {interior.branch} at Δ/h_max = "
-        f"{interior.penetration:.4g}; at edges {result.edge_range:.3g} m"
+        "the zero-range model is valid if the real adhesion reaches less than "
+        f"{1e9 * result.valid_range:.3g} nm (tension inside patches of {interior.tension:.3g} Pa "
+        f"on {interior.branch} at Δ/h_max = {interior.penetration:.4g}; at edges: "
+        f"{1e9 * result.edge_range:.3g} nm)"
     )
 
 
@@ -324,9 +325,9 @@ def range_warnings(
         return out
     if range_ < DOUBTFUL_RANGE:
         out.append(
-            f"valid_range is {range_:.2g} m: the zero-range limit holds only for ranges of "
-            f"adhesion below it, and below {DOUBTFUL_RANGE:g} m hardly any interface has one, so "
-            "patches would open from inside and lose less (docs/zero-range.md)"
+            f"valid_range is {1e9 * range_:.3g} nm: the zero-range limit holds only for ranges of "
+            f"adhesion below it, and below {1e9 * DOUBTFUL_RANGE:g} nm hardly any interface has "
+            "one, so patches would open from inside and lose less (docs/zero-range.md)"
         )
     largest = float(np.max(contact_fraction, initial=0.0))
     gamma = problem.work_of_adhesion

@@ -314,7 +314,7 @@ def test_a_cell_that_is_new_is_tried_before_the_file_grows(tmp_path):
 
     run_campaign(load_campaign(write_campaign(tmp_path)), out, engine=replace(engine, check=check))
     assert tried == []
-    grown = load_campaign(write_campaign(tmp_path, work_of_adhesion="[0.01, 0.04, 1e25]"))
+    grown = load_campaign(write_campaign(tmp_path, work_of_adhesion='[0.01, 0.04, "1e25 J/m2"]'))
     with pytest.raises(InputError, match=r"cannot be computed: work_of_adhesion is 1e\+25 J/m²"):
         run_campaign(grown, out, engine=replace(engine, check=check))
     assert 1e25 in tried
