@@ -196,7 +196,8 @@ class Campaign:
             raise InputError(f"ranks is {ranks}: no mpirun was found, so take ranks=1")
         if ranks > most:
             raise InputError(
-                f"ranks is {ranks}: at most {most} are started here, on {launch.cores()} cores"
+                f"ranks is {ranks}: at most {most} are started here, on "
+                f"{checks.counted(launch.cores(), 'core')}"
             )
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "campaign.toml")

@@ -138,6 +138,7 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
     """Start ranks and wait for them; None if this process is to compute alone."""
     from adhesis.ensemble.run import launch
     from adhesis.ensemble.run.ranks import launched
+    from adhesis.solver.checks import counted
 
     ranks = int(_number("--ranks", args.ranks, whole=True))
     if ranks < 1:
@@ -145,8 +146,8 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
     most = launch.largest_number_of_ranks()
     if ranks > most:
         raise InputError(
-            f"--ranks is {args.ranks!r}: at most {most} are started here, on {launch.cores()} "
-            "cores; more ranks than cores compute no faster"
+            f"--ranks is {args.ranks!r}: at most {most} are started here, on "
+            f"{counted(launch.cores(), 'core')}; more ranks than cores compute no faster"
         )
     if launched()[0] > 1:
         raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
