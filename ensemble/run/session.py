@@ -21,6 +21,7 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Compute, Outcome, StopCheck
 from adhesis.ensemble.run.dispatch import SILENCE, Limits, Master, Worker, work_alone
 from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
+from adhesis.ensemble.run.launch import described_signal
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
 from adhesis.ensemble.run.progress import Counts, ProgressLine
@@ -466,7 +467,7 @@ class _Session:
 
     def _stop(self) -> str | None:
         if self._signals.received is not None:
-            return f"{self._signals.received} received"
+            return f"{described_signal(self._signals.received)} received"
         left = self._time_left()
         if left is not None and left <= 0:
             return "the walltime ends"

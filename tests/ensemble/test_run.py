@@ -90,14 +90,17 @@ def test_a_finished_campaign_computes_nothing_again(tmp_path):
     assert out.read_bytes() == before
 
 
-def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path):
+@pytest.mark.parametrize(
+    ("number", "name"), [(signal.SIGUSR1, "SIGUSR1"), (signal.SIGINT, "Ctrl-C (SIGINT)")]
+)
+def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, number, name):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = start("run", path, "--out", out, fake="hold=2")
     wait_until(lambda: done_rows(out) >= 2)
-    process.send_signal(signal.SIGUSR1)
+    process.send_signal(number)
     _, errors = process.communicate(timeout=150)  # the task would go on for ever
     assert process.returncode == 75
-    assert "stopped early: SIGUSR1 received" in errors
+    assert f"stopped early: {name} received" in errors
     kept = done_rows(out)
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}")
