@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
-from adhesis.ensemble.quantities import AXIS_UNITS
+from adhesis.ensemble.quantities import AXIS_UNITS, with_error
 from adhesis.ensemble.results.read import (
     NO_CHECKSUMS,
     NO_RANGES,
@@ -292,10 +292,13 @@ def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
         + "".join(f"{group[name]:{len(heading)}.4g}  " for name, heading in further.items())
         + f"{counts} "
         + (f"{mean:9.3g}" if mean is not None else " " * 9)
-        + (f"  {loss:.4g}" if loss is not None else "")
-        + (f" ± {error:.2g}" if error is not None else "")
+        + (f"  {_loss(loss, error)}" if loss is not None else "")
         + (f"  {group['precision']}" if "precision" in group else "")
     ).rstrip()
+
+
+def _loss(loss: float, error: float | None) -> str:
+    return f"{loss:.4g}" if error is None else with_error(loss, error)
 
 
 def _task(row: Mapping[str, Any]) -> str:

@@ -79,6 +79,7 @@ def main() -> None:
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists."""
     from adhesis.solver.loading.loop import run_loop
+    from adhesis.solver.loading.loop_result import strain_warnings
     from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
     from adhesis.solver.method import Branch, ContactState
     from adhesis.solver.model.control import Control
@@ -108,6 +109,9 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
             problem, loop.valid_range, loop.loss, loop.contact_fraction
         )
         + opening_warnings(loop.jumps, loop.loss),
+        "strain_warnings": strain_warnings(
+            problem, loop.mean_stress, loop.separation, loop.patches
+        ),
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),
