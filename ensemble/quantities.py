@@ -84,6 +84,11 @@ def _unit(path: tuple[str, ...]) -> str:
     return UNITS.get(name, "1")
 
 
+def bytes_text(size: float) -> str:
+    """Return a size in a unit that fits: "300 kB", "20 MB"."""
+    return f"{size / 1e6:.0f} MB" if size >= 1e7 else f"{size / 1e3:.0f} kB"
+
+
 def with_error(value: float, error: float) -> str:
     """Return "9700 ± 800" or "0.0351 ± 0.0012".
 

@@ -6,6 +6,7 @@ A file that breaks a rule is refused with the key, the value and the rule in one
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import MISSING, fields
@@ -98,7 +99,7 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
+        reason = _given_twice(text, str(error)) or " ".join(str(error).split())
         raise InputError(f"{source} is not valid TOML: {reason}") from error
     for name in document:
         if name not in TABLES:
@@ -114,6 +115,18 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     campaign = Campaign(text=text, lists=tuple(lists), **tables)
     _check_together(source, campaign)
     return campaign
+
+
+def _given_twice(text: str, error: str) -> str | None:
+    """Return what the error of TOML's reader means by a value that cannot be overwritten."""
+    found = re.match(r"Cannot overwrite a value \(at (?:line (\d+)|end of document)", error)
+    if found is None:
+        return None
+    lines = text.rstrip().splitlines()
+    lines = lines[: int(found[1])] if found[1] else lines
+    number = max((n for n, line in enumerate(lines, 1) if "=" in line), default=0)
+    key = lines[number - 1].partition("=")[0].strip()
+    return f"the key {key} on line {number} is given before, so remove one of the two"
 
 
 def _read_table(

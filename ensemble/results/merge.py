@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import h5py
@@ -116,6 +117,9 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
     with ExitStack() as stack:
         opened = [stack.enter_context(Results(part)) for part in parts]
         there = stack.enter_context(Results(out)) if out.exists() else None
+        for one, other in combinations(opened, 2):
+            if one.path.samefile(other.path):
+                raise InputError(f"{other.path} is named twice: give each file once")
         for part in opened:
             if there is not None and part.path.samefile(out):
                 raise InputError(f"{part.path} is to be merged into itself")

@@ -116,7 +116,7 @@ def test_a_run_starts_its_own_ranks(tmp_path, whole):
         assert set(results.column("rank").tolist()) <= {1, 2}  # rank 0 only handed out
     for words, sentence in (
         (("--ranks", "0"), "--ranks is '0': it must be a whole number of at least 1"),
-        (("--ranks", "many"), "--ranks is 'many'"),
+        (("--ranks", "many"), "--ranks is 'many': it must be a whole number of at least 1"),
     ):
         process = adhesis_here("run", path, "--out", out, *words)
         assert (process.returncode, len(process.stderr.splitlines())) == (2, 1)

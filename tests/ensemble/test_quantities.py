@@ -6,7 +6,7 @@ from math import inf, nan
 
 import pytest
 
-from adhesis.ensemble.quantities import with_error
+from adhesis.ensemble.quantities import bytes_text, with_error
 
 
 @pytest.mark.parametrize(
@@ -26,3 +26,7 @@ from adhesis.ensemble.quantities import with_error
 )
 def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: str) -> None:
     assert with_error(value, error) == text
+
+
+def test_a_small_size_is_not_zero() -> None:
+    assert [bytes_text(size) for size in (0, 345_678, 12_345_678)] == ["0 kB", "346 kB", "12 MB"]

@@ -269,7 +269,8 @@ def refused(folder, *words, **changes):
     """Run with bad input: one sentence, exit code 2, nothing written."""
     path = write_campaign(folder, **changes)
     before = {p: p.read_bytes() for p in folder.iterdir() if p.is_file()}
-    process = adhesis_here("run", path, "--out", folder / "r.h5", *words)
+    out = () if "--out" in words else ("--out", folder / "r.h5")
+    process = adhesis_here("run", path, *out, *words)
     assert process.returncode == 2, process.stderr
     assert process.stdout == ""
     assert len(process.stderr.splitlines()) == 1, process.stderr
@@ -289,7 +290,7 @@ def test_bad_campaigns_leave_nothing_behind(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"work_of_adhesion": "[0.01, 1e25]"}, "work_of_adhesion is 1e+25 J/m²"),
+        ({"work_of_adhesion": '[0.01, "1e25 J/m2"]'}, "work_of_adhesion is 1e+25 J/m²"),
         ({"work_of_adhesion": "[1e-25, 0.01]"}, "work_of_adhesion is 1e-25 J/m²"),
         ({"young": "[1e6, 1e15]"}, "work_of_adhesion is 0.01 J/m²"),
     ],
@@ -331,6 +332,17 @@ def test_bad_options(tmp_path):
     assert "--max-failures is '-1'" in refused(tmp_path, "--max-failures", "-1")
     assert "no folder" in refused(tmp_path, "--out", tmp_path / "none" / "r.h5")
     assert "is a directory" in refused(tmp_path, "--out", tmp_path)
+    sentence = "the name of a new results file must end in .h5"
+    assert sentence in refused(tmp_path, "--out", tmp_path / "new.txt")
+    itself = write_campaign(tmp_path)
+    assert "the campaign file itself" in refused(tmp_path, "--out", itself)
+
+
+def test_an_existing_results_file_keeps_its_name(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "old.dat"
+    run(tmp_path)
+    (tmp_path / "r.h5").rename(out)
+    assert adhesis("run", path, "--out", out, fake="").returncode == 0
 
 
 def test_a_results_file_of_another_campaign(tmp_path):

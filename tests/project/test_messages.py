@@ -31,7 +31,7 @@ SENTENCES = {
     "solver/model/problem.py": ("full_contact",),
     "solver/loading/loop_result.py": ("warnings", "strain_warnings"),
     "solver/loading/zero_range.py": ("range_warnings",),
-    "ensemble/loop/heights.py": ("_not_one_column", "closure_warning"),
+    "ensemble/loop/heights.py": ("_not_one_column", "closure_warning", "few_heights_warning"),
 }
 
 

@@ -139,8 +139,14 @@ def source_of(given: Any) -> Source:
     TypeError
         If it is neither.
     """
-    if not hasattr(given, "read"):
+    if isinstance(given, str | os.PathLike):
         return Source(str(checks.path("source", given)))
+    if not hasattr(given, "read"):
+        raise TypeError(
+            f"source is {checks.shown(given)}: it must be a path, an open file or other stream, an "
+            "array or list of heights (or of positions and heights), or a pandas DataFrame or "
+            "Series"
+        )
     content = given.read()
     name = getattr(given, "name", None)
     return Source(
