@@ -14,6 +14,7 @@ from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.solver.checks import counted
+from adhesis.solver.loading.zero_range import stress_text
 
 
 def summary(answer: Answer) -> str:
@@ -59,7 +60,7 @@ def _range(answer: Answer) -> str:
     return (
         "the zero-range model is valid if the real adhesion reaches less than "
         f"{length_text(answer.valid_range, 3)} (tension inside patches of up to "
-        f"{1e-6 * answer.largest_interior_tension:.3g} MPa)"
+        f"{stress_text(answer.largest_interior_tension)})"
     )
 
 

@@ -237,6 +237,11 @@ class HasRanges(Protocol):
         ...
 
 
+def stress_text(pascals: float) -> str:
+    """Return a stress in a unit of its size: "100 kPa"."""
+    return f"{1e-6 * pascals:.3g} MPa" if pascals >= 1e6 else f"{1e-3 * pascals:.3g} kPa"
+
+
 def range_summary(result: HasRanges) -> str:
     """Return in a line for a terminal below which ranges of adhesion the zero-range limit holds."""
     interior = result.interior
@@ -254,9 +259,9 @@ def range_summary(result: HasRanges) -> str:
         return "no tension inside patches"
     return (
         "the zero-range model is valid if the real adhesion reaches less than "
-        f"{1e9 * result.valid_range:.3g} nm (tension inside patches of {interior.tension:.3g} Pa "
-        f"on {interior.branch} at Δ/h_max = {interior.penetration:.4g}; at edges: "
-        f"{1e9 * result.edge_range:.3g} nm)"
+        f"{1e9 * result.valid_range:.3g} nm (tension inside patches of "
+        f"{stress_text(interior.tension)} on {interior.branch} at Δ/h_max = "
+        f"{interior.penetration:.4g}; at edges: {1e9 * result.edge_range:.3g} nm)"
     )
 
 
