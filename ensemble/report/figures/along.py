@@ -79,7 +79,8 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
                 aside = (order - (len(gammas) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 found = [cell.estimates[name] for cell in line]
-                errorbar(axes, x, found, k, gamma_label(gamma), unit=unit)
+                above = name != "pull_off_penetration"
+                errorbar(axes, x, found, k, gamma_label(gamma), unit=unit, from_zero=above)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
