@@ -23,7 +23,7 @@ _WITH_UNIT: dict[str, tuple[Callable[[str], float], str]] = {
 
 @dataclass(frozen=True)
 class Rule:
-    """What a value must be.
+    """Rule for a value.
 
     Attributes
     ----------

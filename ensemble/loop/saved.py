@@ -38,7 +38,7 @@ _PARTS: dict[str, tuple[str, type]] = {"jumps": ("jump", Jump), "minor_loops": (
 
 @dataclass(frozen=True)
 class SavedReport(MethodReport):
-    """What a method reported of itself before its loop was saved.
+    """Report of a method on itself from before its loop was saved.
 
     Attributes
     ----------

@@ -53,7 +53,7 @@ _COPIED = tuple(d for d in DATASETS if d not in TASK_DATASETS and d is not STATU
 
 @dataclass(frozen=True)
 class Merged:
-    """What a merge has left: rows by status, how many it took over, and what it left out.
+    """Result of a merge: rows by status, how many it took over, and what it left out.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class _Source:
         return bool(np.any(self.taken[low:high]))
 
     def places(self, dataset: Dataset) -> tuple[Rows, NDArray[np.bool_]]:
-        """Where the rows of a dataset go, and which of them are given."""
+        """Return the places of the rows of a dataset, and which of them are given."""
         if dataset.dims[0] == KEPT:
             return self.kept, self.taken[self.kept_rows]
         return self.target, self.taken

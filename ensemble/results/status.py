@@ -1,4 +1,4 @@
-"""How far a campaign is: counts, times, failures and losses so far, from its results file alone.
+"""Report counts, times, failures and losses of a campaign so far, from its results file alone.
 
 Never loads MPI: it works on a login node, and while the run writes. It reads all rows with a
 result, for their checksums.
@@ -203,7 +203,7 @@ def _groups(
         ]
 
     def known(i: int) -> dict[str, Any]:
-        """How well the steered quantity of a cell is known, and how well it is to be."""
+        """Return the precision of the steered quantity of a cell, and the wanted one."""
         if stop.relative_error is None:
             return {}
         values = column[stop.quantity][done & (group_of == i)]

@@ -62,7 +62,7 @@ class RowSummary:
 
 
 class RowWriter(Protocol):
-    """Where rows go; :class:`adhesis.ensemble.results.write.Writer`."""
+    """Destination of rows: :class:`adhesis.ensemble.results.write.Writer`."""
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
         """Write the row of a task that was computed."""
@@ -71,7 +71,7 @@ class RowWriter(Protocol):
         """Write the row of a task that failed."""
 
     def mark(self, rows: Iterable[int], *, needed: bool) -> None:
-        """Say of rows without a result whether they are to be computed."""
+        """Mark rows without a result as to be computed, or as not needed."""
 
     def __enter__(self) -> Self: ...
 
@@ -80,7 +80,7 @@ class RowWriter(Protocol):
 
 @dataclass(frozen=True)
 class Engine:
-    """What a run works with; tests and benchmarks pass in their own.
+    """Functions that a run works with; tests and benchmarks pass in their own.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class Options:
-    """How a run goes.
+    """Options of a run.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run has left: tasks by status in the file, and what it did itself.
+    """Result of a run: tasks by status in the file, and what it did itself.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ def summary(answer: Answer) -> str:
 
 
 def _scope(answer: Answer) -> str:
-    """Say of what body the loss is, and whether anything presses it."""
+    """Describe of what body the loss is, and whether anything presses it."""
     largest = max(answer.main["states"]["mean_stress"])
     pressed = (
         f"the mean stress reaches a compression of {1e-3 * largest:.3g} kPa"
@@ -54,7 +54,7 @@ def _scope(answer: Answer) -> str:
 
 
 def _range(answer: Answer) -> str:
-    """Say below which range of adhesion the zero-range limit holds."""
+    """Describe below which range of adhesion the zero-range limit holds."""
     if answer.valid_range is None:
         return "no tension inside patches"
     return (

@@ -102,7 +102,7 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
 def _lines(
     data: Aggregate, axis: Axis
 ) -> tuple[list[tuple[str, float]], dict[tuple[float, float], list[Cell]]]:
-    """What is the same on the other further axes as in all other figures, and the cells there."""
+    """Return the values on the other further axes that all figures share, and the cells there."""
     moving = together(data, axis)
 
     def at(cell: Cell) -> list[tuple[str, float]]:

@@ -362,7 +362,7 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
 
 
 def _apart(data: Aggregate, k: int, count: int) -> float:
-    """How far the k-th curve over γ is moved aside, so that intervals can be distinguished."""
+    """Return the offset of the k-th curve over γ, so that intervals can be distinguished."""
     return (k - (count - 1) / 2) * 0.01 * max(data.works_of_adhesion)
 
 

@@ -14,7 +14,7 @@ _CSV_UNITS = {"1": "", "m": " [m]", "m2": " [m^2]", "Pa": " [Pa]", "Pa m-1": " [
 
 
 def key_columns(data: Aggregate) -> tuple[TableColumn, ...]:
-    """What a row is about: H, γ, and every further axis."""
+    """Return the columns of what a row is about: H, γ, and every further axis."""
     return (*KEY, *axis_columns(data.further))
 
 
@@ -30,5 +30,5 @@ def axis_columns(axes: Iterable[Axis]) -> tuple[TableColumn, ...]:
 
 
 def key(cell: Cell) -> list[Value]:
-    """Where a cell stands on the axes, under :func:`key_columns`."""
+    """Return the place of a cell on the axes, under :func:`key_columns`."""
     return [cell.hurst, cell.work_of_adhesion, *(value for _, value in cell.others)]

@@ -1,4 +1,4 @@
-"""What measurements are read from: a file, or the content of a stream.
+"""Open sources of measurements: a file, or the content of a stream.
 
 Files that have to be unpacked or exported first are refused: archives, workbooks, pictures.
 """

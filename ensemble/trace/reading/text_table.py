@@ -62,7 +62,7 @@ class Table:
 
     @property
     def form(self) -> str:
-        """How the numbers are written, in words."""
+        """Description of how the numbers are written."""
         count = len(self.columns)
         form = "one column" if count == 1 else f"{count} columns, {DELIMITERS[self.delimiter]}"
         return form + (", decimal commas" if self.decimal == "," else "")
