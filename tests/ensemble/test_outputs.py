@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import adhesis.ensemble.command.trace as trace_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json
+from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.synthetic_results import campaign, rows, write
@@ -285,7 +285,13 @@ def test_a_report_on_a_full_disk_ends_in_one_sentence(ask: Ask) -> None:
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY)); "
         "sys.exit(main(['report', 'r.h5', '--to', 'out']))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        python("-c", code),
+        env=python_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 74, done.stderr
     assert done.stderr.splitlines() == [
         "adhesis report: the report in out could not be written (File too large)"
