@@ -165,6 +165,10 @@ class Campaign:
         path = checks.path("out", out)
         ranks = checks.whole("ranks", ranks, _RANKS)
         checks.flag("progress", progress)
+        from adhesis.ensemble.results.layout import check_new_file
+
+        if not path.exists():
+            check_new_file("out", path)
         if ranks == 1:
             self._run_here(path, progress)
         else:
@@ -196,7 +200,8 @@ class Campaign:
             raise InputError(f"ranks is {ranks}: no mpirun was found, so take ranks=1")
         if ranks > most:
             raise InputError(
-                f"ranks is {ranks}: at most {most} are started here, on {launch.cores()} cores"
+                f"ranks is {ranks}: at most {most} are started here, on "
+                f"{checks.counted(launch.cores(), 'core')}"
             )
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "campaign.toml")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import re
 import shutil
@@ -11,11 +10,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from docutils import nodes
-from sphinx.util.docutils import SphinxDirective
-
 import adhesis
-from adhesis.ensemble.command.main import parser_of
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
@@ -97,51 +92,6 @@ def public_name(app: Any, env: Any, node: Any, content: Any) -> Any:
     )
 
 
-class Command(SphinxDirective):
-    """List the options of a command, as its parser declares them, with its examples."""
-
-    required_arguments = 1
-
-    def run(self) -> list[nodes.Node]:
-        """Make a paragraph, a list of options for each group, and the examples."""
-        parser = parser_of(self.arguments[0])
-        first, *_ = (parser.description or "").split("\n\n")
-        made: list[nodes.Node] = [nodes.paragraph(text=" ".join(first.split()))]
-        usage = " ".join(parser.format_usage().split()).removeprefix("usage: ")
-        made.append(nodes.literal_block(usage, usage, classes=["usage"], language="text"))
-        for group in parser._action_groups:
-            shown = [a for a in group._group_actions if "--help" not in a.option_strings]
-            if not shown:
-                continue
-            title = (group.title or "").removeprefix("positional ").capitalize()
-            made.append(nodes.rubric(text=title))
-            entries = nodes.definition_list(classes=["options"])
-            for action in shown:
-                term = nodes.term()
-                term += nodes.literal(text=self._name(action))
-                text = (action.help or "").replace("%%", "%") or "–"
-                entries += nodes.definition_list_item(
-                    "", term, nodes.definition("", nodes.paragraph(text=text))
-                )
-            made.append(entries)
-        examples = (parser.epilog or "").partition("\n")[2]
-        made.append(nodes.rubric(text="Examples"))
-        text = "\n".join(line.strip() for line in examples.splitlines())
-        made.append(nodes.literal_block(text, text, language="text"))
-        return made
-
-    @staticmethod
-    def _name(action: argparse.Action) -> str:
-        if not action.option_strings:
-            return str(action.metavar or action.dest)
-        names = ", ".join(action.option_strings)
-        if action.nargs == 0:
-            return names
-        choices = "|".join(action.choices or ())
-        value = action.metavar or choices or action.dest.upper()
-        return f"{names} {value}"
-
-
 def films(app: Any, error: Exception | None) -> None:
     """Write the films of docs/python.md and docs/tutorial.md beside their pages.
 
@@ -164,7 +114,6 @@ def films(app: Any, error: Exception | None) -> None:
 
 def setup(app: Any) -> None:
     """Connect them."""
-    app.add_directive("command", Command)
     app.connect("build-finished", films)
     app.connect("source-read", start_page)
     app.connect("autodoc-process-docstring", plain, priority=400)  # ahead of napoleon

@@ -39,6 +39,10 @@ class InputError(_Printable, ValueError):
     """
 
 
+class UnitError(InputError):
+    """A number has a unit that is none of its quantity; the text begins with "is"."""
+
+
 class RankError(InputError):
     """A bad input that one rank alone may have, such as a library that is missing on its node."""
 

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 def interval_method(n: int) -> str:
-    """How the interval of ``n`` values is found: "transformed", "student" or "none"."""
+    """Return the method of the interval of ``n`` values: "transformed", "student" or "none"."""
     return "transformed" if n >= FEWEST_FOR_SKEWNESS else "student" if n >= 2 else "none"
 
 

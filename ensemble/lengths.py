@@ -8,10 +8,10 @@ import re
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 
-from adhesis.ensemble.errors import InputError, quoted
+from adhesis.ensemble.errors import InputError, UnitError, quoted
 
 # A larger number without a unit is likely to be in another unit than metres, and is asked about.
-_LONGEST_IN_METRES = 1.0  # m
+LONGEST_IN_METRES = 1.0  # m
 HIGHEST_IN_METRES = 1e-3  # m, of the heights of a roughness
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "Å": 1e-10, "inch": 25.4e-3}
@@ -74,7 +74,7 @@ def _unit_or_none(name: str) -> str | None:
 
 def length(text: str) -> float:
     """Read an option that is a length, in m; to be given to argparse."""
-    return _of_an_option(text, _LONGEST_IN_METRES)
+    return _of_an_option(text, LONGEST_IN_METRES)
 
 
 def height(text: str) -> float:
@@ -156,7 +156,7 @@ def number_with_unit(
     unit = named(found[2])
     if unit is None:
         names = ", ".join(units)
-        raise InputError(f"is {quoted(text)}: its unit must be one of {names}")
+        raise UnitError(f"is {quoted(text)}: its unit must be one of {names}")
     # Decimal numbers, so that 7um is the same number as 7e-6.
     return float(Decimal(found[1]) * Decimal(repr(units[unit])))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -24,6 +25,12 @@ _NAMES = {
 }
 UNITS = {name: unit for unit, names in _NAMES.items() for name in names.split()}
 """Unit by the name of a quantity; others are dimensionless (penetrations are in units of h_max)."""
+
+_TWO_DIGITS = 2.95  # an error below has two significant digits
+_MOST_PLACES = 9
+
+AXIS_UNITS = {"m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
+"""Units of the axes of a campaign for people, by their spelling in results files."""
 
 
 def with_units(table: Any) -> Any:
@@ -75,6 +82,26 @@ def _unit(path: tuple[str, ...]) -> str:
     if name in ("value", "uncertainty"):
         return UNITS.get(parent, "1")
     return UNITS.get(name, "1")
+
+
+def bytes_text(size: float) -> str:
+    """Return a size in a unit that fits: "300 kB", "20 MB"."""
+    return f"{size / 1e6:.0f} MB" if size >= 1e7 else f"{size / 1e3:.0f} kB"
+
+
+def with_error(value: float, error: float) -> str:
+    """Return "9700 ± 800" or "0.0351 ± 0.0012".
+
+    The last digit is the first one of the error, or the second where the first is 1 or 2.
+    """
+    if not 0 < error < math.inf:
+        return f"{value:.4g} ± {error:g}"
+    exponent = math.floor(math.log10(error))
+    places = (error < _TWO_DIGITS * 10.0**exponent) - exponent
+    if places > _MOST_PLACES:
+        return f"{value:.4g} ± {error:.2g}"
+    shown = max(places, 0)
+    return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f}"
 
 
 def in_works_of_adhesion(loss: float, work_of_adhesion: float) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection
 from contextlib import ExitStack
 
 from adhesis.ensemble.reporter import bar, log
+from adhesis.solver.checks import counted
 from adhesis.solver.precompile import (
     COMPILED_METHODS,
     Compilation,
@@ -44,7 +45,7 @@ def warm_up(
     show_bar : bool
         Show a bar instead of the lines between the first and the last, if stderr is a terminal.
     """
-    total = max(1, functions_of(methods, many_gaps=many_gaps))
+    total = functions_of(methods, many_gaps=many_gaps)  # 0 for code of an earlier source
     show_bar = show_bar and sys.stderr.isatty()
     next_report = _MOMENT
 
@@ -57,15 +58,18 @@ def warm_up(
             if passed < next_report:
                 return
             if next_report == _MOMENT:
-                write(
-                    f"compiling {_listed(methods)} for {processor()}: about {total} functions, once"
-                )
+                about = f"about {counted(total, 'function')}, " if total else ""
+                write(f"compiling {_listed(methods)} for {processor()}: {about}once")
                 if show_bar:
                     show = stack.enter_context(bar("compiling", remaining=True))
             elif show is None:
-                write(f"compiling: {seen.functions} of about {total} functions in {passed:.0f} s")
+                done = f"{seen.functions} of about {total} functions"
+                if seen.functions > total:
+                    done = f"{counted(seen.functions, 'function')} so far"
+                write(f"compiling: {done} in {passed:.0f} s")
             if show is not None:
-                show(min(seen.functions, total), total, f"compiling, {seen.functions} functions")
+                known = total if seen.functions <= total else None
+                show(seen.functions, known, f"compiling, {counted(seen.functions, 'function')}")
             next_report = passed if show is not None else passed + _BETWEEN_LINES
 
         caught = stack.enter_context(warnings.catch_warnings(record=True))
@@ -77,7 +81,7 @@ def warm_up(
         places = (compiled_in(method, many_gaps=many_gaps) for method in methods)
         kept = sorted({str(place) for place in places if place is not None})
         where = f", kept in {' and '.join(kept)}" if kept else ""
-        write(f"compiled {seen.functions} functions in {seen.seconds:.0f} s{where}")
+        write(f"compiled {counted(seen.functions, 'function')} in {seen.seconds:.0f} s{where}")
     return seen
 
 

@@ -63,6 +63,8 @@ if [ -n "$total" ]; then
     if [ "$left" -lt 60 ]; then left=60; fi
     walltime=(--walltime "$left")
 fi
+# one that is given takes its place
+case " ${options[*]-} " in *" --walltime"*) walltime=() ;; esac
 
 # submit OPTION…: a job script from stdin, with name, queue, account and project of this job
 submit() {

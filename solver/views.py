@@ -171,9 +171,9 @@ class ResultViews(NotebookDisplay):
         Raises
         ------
         InputError
-            If the name ends otherwise.
+            If the name ends otherwise, or the file cannot be made there.
         OSError
-            If the file cannot be written.
+            If writing fails, as on a full disk.
         TypeError
             If it is no path.
 

@@ -111,7 +111,7 @@ class Cell:
 
     @property
     def precision(self) -> Precision | None:
-        """How well the mean of the quantity of ``[stop]`` is known; None without ``[stop]``."""
+        """Precision of the mean of the quantity of ``[stop]``; None without ``[stop]``."""
         stop = self.campaign.stop
         if stop.relative_error is None:
             return None

@@ -35,7 +35,7 @@ class Estimate:
 
     @property
     def relative_error(self) -> float:
-        """How far the interval reaches from the mean, over the mean; infinite without one."""
+        """Distance of the further end of the interval over the mean; infinite without one."""
         return relative_error(self.mean, self.low, self.high)
 
 

@@ -1,4 +1,4 @@
-"""How two campaigns differ, by meaning: what has grown, what is another campaign's.
+"""Compare two campaigns by meaning: what has grown, and what is another campaign's.
 
 Order, comments and the spelling of numbers do not matter, and neither do the few keys that cannot
 change a result.
@@ -16,7 +16,7 @@ from adhesis.ensemble.campaign.tasks import Task
 
 @dataclass(frozen=True)
 class Changes:
-    """How a campaign differs from the one of a results file.
+    """Differences of a campaign from the one of a results file.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ def differing(one: Campaign, two: Campaign) -> list[str]:
 
 
 def compare(old: Campaign, new: Campaign) -> Changes:
-    """Say how ``new`` differs from ``old``; keys that cannot change a result are left out."""
+    """Compare two campaigns; keys that cannot change a result are left out."""
     before, after = old.values(), new.values()
     grown, other = [], []
     missing = {old.identity(t)[:2] + old.identity(t)[4:] for t in _firsts(old)} - {

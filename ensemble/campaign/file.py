@@ -6,15 +6,18 @@ A file that breaks a rule is refused with the key, the value and the rule in one
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
+from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.campaign.rules import list_of, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.lengths import HIGHEST_IN_METRES, LONGEST_IN_METRES, parse_length
 from adhesis.solver.checks import MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
@@ -38,7 +41,30 @@ def load_campaign(path: Path | str) -> Campaign:
         data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    return parse_campaign(_decoded(data, str(path)), str(path))
+    text = _decoded(data, str(path))
+    campaign = parse_campaign(text, str(path))
+    _ask_for_units(str(path), tomllib.loads(text))
+    return campaign
+
+
+def _ask_for_units(source: str, document: dict[str, Any]) -> None:
+    """Refuse numbers that can hardly be in SI units, as the options of the command line do.
+
+    The text of a campaign in a results file is not asked: its loops have been computed.
+    """
+    for table, key, read, largest in (
+        ("profile", "period", parse_length, LONGEST_IN_METRES),
+        ("profile", "h_rms", parse_length, HIGHEST_IN_METRES),
+        ("material", "adhesion_range", parse_length, LONGEST_IN_METRES),
+        ("sweep", "work_of_adhesion", parse_work_of_adhesion, LARGEST_IN_JOULES),
+    ):
+        values = document.get(table, {}).get(key, [])
+        for value in values if isinstance(values, list) else [values]:
+            if not isinstance(value, str):
+                try:
+                    read(repr(value), largest)
+                except InputError as error:
+                    raise InputError(f"{source}: [{table}] {key} {error}") from None
 
 
 def _decoded(data: bytes, source: str) -> str:
@@ -73,7 +99,7 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
+        reason = _given_twice(text, str(error)) or " ".join(str(error).split())
         raise InputError(f"{source} is not valid TOML: {reason}") from error
     for name in document:
         if name not in TABLES:
@@ -89,6 +115,18 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     campaign = Campaign(text=text, lists=tuple(lists), **tables)
     _check_together(source, campaign)
     return campaign
+
+
+def _given_twice(text: str, error: str) -> str | None:
+    """Return what the error of TOML's reader means by a value that cannot be overwritten."""
+    found = re.match(r"Cannot overwrite a value \(at (?:line (\d+)|end of document)", error)
+    if found is None:
+        return None
+    lines = text.rstrip().splitlines()
+    lines = lines[: int(found[1])] if found[1] else lines
+    number = max((n for n, line in enumerate(lines, 1) if "=" in line), default=0)
+    key = lines[number - 1].partition("=")[0].strip()
+    return f"the key {key} on line {number} is given before, so remove one of the two"
 
 
 def _read_table(

@@ -47,7 +47,7 @@ def fewest(at: Sequence[int]) -> int:
 
 @dataclass(frozen=True)
 class Precision:
-    """How well the mean of a cell is known, and whether that is as well as wanted.
+    """Precision of the mean of a cell, and whether it is the wanted one.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Precision:
 
     @property
     def relative_error(self) -> float:
-        """How far the interval reaches from the mean, over the mean; infinite without one."""
+        """Distance of the further end of the interval over the mean; infinite without one."""
         return interval.relative_error(self.mean, self.low, self.high)
 
     @property

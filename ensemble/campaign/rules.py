@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.adhesions import work_of_adhesion_with_unit
+from adhesis.ensemble.errors import InputError, UnitError
 from adhesis.ensemble.lengths import length_with_unit
 from adhesis.ensemble.stresses import stress_with_unit
 from adhesis.solver import checks
@@ -16,12 +17,13 @@ from adhesis.solver.checks import Bounds
 _WITH_UNIT: dict[str, tuple[Callable[[str], float], str]] = {
     "m": (length_with_unit, ', or a length as "2 mm"'),
     "Pa": (stress_with_unit, ', or a stress as "20 kPa"'),
+    "J/m²": (work_of_adhesion_with_unit, ', or a text as "20 mJ/m2"'),
 }
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What a value must be.
+    """Rule for a value.
 
     Attributes
     ----------
@@ -44,6 +46,8 @@ class Rule:
         """
         try:
             return self.read(value)
+        except UnitError as error:
+            raise InputError(f"{where} {error}") from None
         except ValueError:
             raise InputError(f"{where} is {shown(value)}: it must be {self.text}") from None
 

@@ -187,7 +187,7 @@ class CycleTable:
 
     @property
     def turning_point(self) -> float:
-        """Where unloading starts: Δ/h_max, u_tot/h_max of a stiffness, p̄ in Pa under a load."""
+        """Turning point: Δ/h_max, u_tot/h_max of a stiffness, p̄ in Pa under a load."""
         point = self.max_stress if self.under_load else self.max_penetration
         assert point is not None  # the file is read so
         return point
@@ -374,7 +374,7 @@ class Campaign:
         return None
 
     def branch_of(self, task: Task) -> Hashable | None:
-        """What the tasks that share a task's loading branch have in common; None if it has its own.
+        """Return a key of the tasks that share a task's loading branch; None if it has its own.
 
         They differ in their turning point alone.
         """
@@ -465,7 +465,7 @@ class Campaign:
         return 1.0 if self.has_axis("max_penetration") else self.cycle.deepest
 
     def penetration_unit(self, task: Task) -> float:
-        """What the penetration axes of the results file are to be multiplied by to be Δ/h_max."""
+        """Return the factor that turns the penetration axes of the results file into Δ/h_max."""
         several = self.has_axis("max_penetration")
         return self.at(task).cycle.turning_point if several else 1.0
 

@@ -49,7 +49,7 @@ class Task:
 
     @property
     def cell(self) -> tuple[float, ...]:
-        """Where the task stands on the axes of the sweep: all realisations of a cell share it."""
+        """Place of the task on the axes of the sweep, which all realisations of a cell share."""
         return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
 
     @property

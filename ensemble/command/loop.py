@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, one_of, refused_as_input
-from adhesis.ensemble.loop.cycle import Cycle, cycle_of
-from adhesis.ensemble.loop.heights import closure_warning, read_heights
+from adhesis.ensemble.loop.cycle import Cycle, cycle_of, in_options
+from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, read_heights
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
     FieldStates,
@@ -78,7 +78,7 @@ def execute(args: argparse.Namespace) -> int:
         results = _run(args, method, cycle, picked.visit if penetrations else None)
         fields = picked.collect(nodes) if penetrations else {}
     except PathError as error:
-        print(f"adhesis loop: {error}", file=sys.stderr)
+        print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return 1
     writing = Writing()
     if args.json is not None:
@@ -232,8 +232,11 @@ def _given_heights(args: argparse.Namespace) -> tuple[Profile, list[str]]:
     heights = read_heights(
         args.heights, unit=args.unit, delimiter=delimiter_of(args), decimal=args.decimal
     )
-    warning = closure_warning(heights, str(args.heights)) if np.all(np.isfinite(heights)) else None
-    return profile_from_heights(heights, args.period), [warning] if warning else []
+    warnings = []
+    if np.all(np.isfinite(heights)):
+        found = (closure_warning, few_heights_warning)
+        warnings = [text for make in found if (text := make(heights, str(args.heights)))]
+    return profile_from_heights(heights, args.period), warnings
 
 
 def _self_affine(args: argparse.Namespace) -> Profile:
@@ -324,12 +327,13 @@ def _film(results: tuple[LoopResult, ...] | PathResult, path: Path, quiet: bool)
     result = results if isinstance(results, PathResult) else results[0]
     done = ""
 
-    def progress(number: int, total: int) -> None:
+    def progress(number: int, total: int, what: str = "computed") -> None:
         nonlocal done
-        done = f"film: {number} of {total} frames computed"
+        done = f"film: {number} of {total} frames {what}"
 
     with nullcontext() if quiet else ticking(lambda: done):
-        film_of(result, progress=progress).save(path)
+        film = film_of(result, progress=progress)
+        film.save(path, progress=lambda number, total: progress(number, total, "drawn"))
 
 
 # ---------------------------------------------------------------------- progress

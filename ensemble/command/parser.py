@@ -9,6 +9,8 @@ from typing import Any, NoReturn
 
 from adhesis.ensemble.errors import InputError, quoted
 
+_GIVEN = "_given"  # of a namespace: the options so far
+
 
 class Parser(argparse.ArgumentParser):
     """Parser of one command: raises InputError instead of printing the usage and exiting.
@@ -30,6 +32,8 @@ class Parser(argparse.ArgumentParser):
             formatter_class=argparse.RawDescriptionHelpFormatter,
             exit_on_error=False,
         )
+        for action in (None, "store"):
+            self.register("action", action, _StoreOnce)
         for kind, convert in ((None, _text), (int, _whole_number), (float, _number), (Path, _path)):
             self.register("type", kind, convert)
 
@@ -43,8 +47,11 @@ class Parser(argparse.ArgumentParser):
         SystemExit
             After ``--help``.
         """
+        args = argparse.Namespace(**{_GIVEN: set()})
         try:
-            return self.parse_args(words)
+            self.parse_args(words, args)
+            delattr(args, _GIVEN)
+            return args
         except argparse.ArgumentError as error:
             link = " " if error.message.startswith("is ") else ": "
             self.error(f"{error.argument_name}{link}{error.message}")
@@ -57,6 +64,23 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise an InputError that names the help."""
         raise InputError(f"{message} ({self.prog} --help lists the options)")
+
+
+class _StoreOnce(argparse._StoreAction):
+    """Store the value of an option, which may be given once."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        given: set[str] = getattr(namespace, _GIVEN, set())
+        if option_string is not None and self.dest in given:
+            raise argparse.ArgumentError(self, "is given twice: give it once")
+        given.add(self.dest)
+        super().__call__(parser, namespace, values, option_string)
 
 
 def _text(value: str) -> str:

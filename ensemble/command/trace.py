@@ -6,8 +6,9 @@ import argparse
 import sys
 import time
 
+from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.errors import InputError, refused_as_input
-from adhesis.ensemble.loop.cycle import control_of, turning_points_of
+from adhesis.ensemble.loop.cycle import control_of, in_options, turning_points_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.reporter import StatusLine
@@ -60,7 +61,7 @@ def execute(args: argparse.Namespace) -> int:
     try:
         answer = run_plan(prepared, cycle, plan, None if args.quiet else _Progress(plan))
     except NoAnswer as error:
-        print(f"adhesis trace: {error}", file=sys.stderr)
+        print(f"adhesis trace: {in_options(str(error), args)}", file=sys.stderr)
         return 1
     from adhesis.ensemble.trace.trace_page import summary, write_page
 
@@ -80,12 +81,11 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _numbers(text: str, option: str) -> list[float]:
+    words = str(text).split(",")
     try:
-        values = [float(word) for word in str(text).split(",")]
-    except ValueError:
-        raise InputError(
-            f"{option} is {text!r}: it must be one number, or several with commas"
-        ) from None
+        values = [parse_work_of_adhesion(word.strip(), LARGEST_IN_JOULES) for word in words]
+    except InputError as error:
+        raise InputError(f"{option} {error}") from None
     if len(set(values)) < len(values):
         raise InputError(f"{option} is {text!r}: its values must differ")
     return values

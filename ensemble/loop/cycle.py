@@ -74,7 +74,8 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     if args.path is not None:
         words = [word.strip() for word in args.path.split(",")]
         out = words[-1] == _OUT
-        points = _numbers("--path", words[:-1] if out else words)
+        rule = "numbers with commas between them"
+        points = _numbers("--path", words[:-1] if out else words, rule)
         return Cycle(control, points, True, out, args.load_steps)
     points = turning_points_of(args, control)
     return Cycle(control, tuple(sorted(points)), False, True, args.load_steps)
@@ -99,7 +100,10 @@ def turning_points_of(args: argparse.Namespace, control: Control) -> tuple[float
     if text is None:
         points: tuple[float, ...] = (_MAX_PENETRATION,)
     else:
-        points = _stresses(name, words) if control.is_load else _numbers(name, words)
+        rule = "one or more numbers, as 1.5 or 0.5,1.5"
+        if control.is_fixed:
+            rule = "one or more numbers between 0 and 1, as 0.9 or 0.3,0.6"
+        points = _stresses(name, words) if control.is_load else _numbers(name, words, rule)
     if len(set(points)) < len(points):
         raise InputError(f"{name} is {text}: turning points must differ")
     return points
@@ -122,19 +126,32 @@ def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
     return Control(math.inf if args.stiffness is None else args.stiffness)
 
 
+def in_options(text: str, args: argparse.Namespace) -> str:
+    """Return a message on a path with the options that prescribe a stiffness or the separation."""
+    option = "--stiffness" if args.layer is None else "--layer"
+    for words, replacement in (
+        ("give a stiffness", "give --stiffness K"),
+        (
+            "give a larger stiffness",
+            "give a thinner --layer" if args.layer is not None else "give a larger --stiffness",
+        ),
+        ("prescribe the separation", f"prescribe the separation by leaving {option} out"),
+    ):
+        text = text.replace(words, replacement)
+    return text
+
+
 def _refuse_several(args: argparse.Namespace, *names: str) -> None:
     given = [f"--{n.replace('_', '-')}" for n in names if getattr(args, n) is not None]
     if len(given) > 1:
         raise InputError(f"{' and '.join(given)} are given: a loop has one of them")
 
 
-def _numbers(option: str, words: list[str]) -> tuple[float, ...]:
+def _numbers(option: str, words: list[str], rule: str) -> tuple[float, ...]:
     try:
         values = tuple(float(word) for word in words)
     except ValueError:
-        raise InputError(
-            f"{option} is {','.join(words)!r}: it must be numbers with commas between them"
-        ) from None
+        raise InputError(f"{option} is {','.join(words)!r}: it must be {rule}") from None
     if not values:
         raise InputError(f"{option} holds no turning point")
     return values

@@ -32,7 +32,7 @@ from adhesis.ensemble.outputs import whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.ensemble.report.html import whole_page
 from adhesis.solver import checks
-from adhesis.solver.checks import counted
+from adhesis.solver.checks import counted, function
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.model.profile import Array
@@ -122,13 +122,20 @@ class Film:
             'style="width:100%;max-width:60rem;height:48rem;border:0"></iframe>'
         )
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
         """Write the film.
 
         Parameters
         ----------
         path : path
             Its ending is the format: ``.html``, ``.gif`` or ``.mp4``.
+        progress : callable, optional
+            Called with the number of frames drawn so far, and of all.
 
         Raises
         ------
@@ -137,13 +144,14 @@ class Film:
         OSError
             If the file cannot be written.
         TypeError
-            If ``path`` is no path.
+            If ``path`` is no path, or ``progress`` no function.
         """
         path = check_film("path", path)
+        function("progress", progress)
         if path.suffix.lower() == ".html":
             data = self.page.encode()
         else:
-            data = self._animation(path.suffix.lower())
+            data = self._animation(path.suffix.lower(), progress)
         with whole_file(path) as stream:
             stream.write(data)
 
@@ -178,7 +186,7 @@ class Film:
         name = "path: work" if isinstance(self._result, PathResult) else "loop: loss"
         return f"{name} {work:.4g} J/m² at γ = {problem.work_of_adhesion:g} J/m²"
 
-    def _animation(self, ending: str) -> bytes:
+    def _animation(self, ending: str, progress: Callable[[int, int], None] | None) -> bytes:
         """Return the film as matplotlib's own writer makes it."""
         drawing = _Drawing(self._result, self._scenes)
         writer = PillowWriter(fps=_RATE) if ending == ".gif" else FFMpegWriter(fps=_RATE)
@@ -186,9 +194,11 @@ class Film:
             file = Path(folder, f"film{ending}")
             drawing.freeze()
             with writer.saving(drawing.figure, str(file), dpi=_DPI):
-                for scene in self._scenes.scenes:
+                for number, scene in enumerate(self._scenes.scenes, 1):
                     drawing.show(scene, texts=True)
                     writer.grab_frame()
+                    if progress is not None:
+                        progress(number, len(self))
             return file.read_bytes()
 
 

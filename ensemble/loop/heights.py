@@ -131,6 +131,16 @@ def _unit_of(source: Source, table: Table, given: str | None) -> str | None:
     return None
 
 
+def few_heights_warning(heights: Array, name: str) -> str | None:
+    """Return a warning if so few heights hardly make a profile, else None."""
+    if heights.size >= _MIN_POINTS:
+        return None
+    return (
+        f"{name} holds {heights.size} heights only: fewer than {_MIN_POINTS} make a profile of a "
+        "few waves, so check the file"
+    )
+
+
 def closure_warning(heights: Array, name: str) -> str | None:
     """Return a warning if the ends of one period do not meet, else None.
 

@@ -11,6 +11,7 @@ import argparse
 import math
 from pathlib import Path
 
+from adhesis.ensemble.adhesions import work_of_adhesion
 from adhesis.ensemble.lengths import height, length
 from adhesis.ensemble.stresses import stress
 from adhesis.ensemble.trace.trace_arguments import (
@@ -55,9 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact = parser.add_argument_group("contact and cycle")
     contact.add_argument(
         "--work-of-adhesion",
-        type=float,
+        type=work_of_adhesion,
         metavar="G",
-        help="J/m² (required unless the profile is that of --hurst; there 0.04)",
+        help="in J/m², or 20mJ/m2 (required unless the profile is that of --hurst; there 0.04)",
     )
     contact.add_argument(
         "--young", type=stress, metavar="E", help="in Pa, or 1MPa (likewise; with --hurst 1e6)"

@@ -1,4 +1,4 @@
-"""What ``adhesis loop`` writes: the JSON of a loop, and the fields at chosen penetrations.
+"""Make what ``adhesis loop`` writes: the JSON of a loop, the fields at chosen penetrations.
 
 How files are written is in :mod:`adhesis.ensemble.outputs`.
 """

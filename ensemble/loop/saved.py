@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.outputs import check_outputs, whole_file, write_netcdf
 from adhesis.ensemble.quantities import UNITS, with_units
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
@@ -39,7 +38,7 @@ _PARTS: dict[str, tuple[str, type]] = {"jumps": ("jump", Jump), "minor_loops": (
 
 @dataclass(frozen=True)
 class SavedReport(MethodReport):
-    """What a method reported of itself before its loop was saved.
+    """Report of a method on itself from before its loop was saved.
 
     Attributes
     ----------
@@ -145,11 +144,8 @@ def save(result: Result, path: str | os.PathLike[str]) -> None:
     path = checks.path("path", path)
     if path.suffix != ".nc":
         raise InputError(f"path is {path}: the name must end in .nc")
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "result.nc")
-        to_xarray(result).to_netcdf(file, engine="h5netcdf")
-        with whole_file(path) as stream:
-            stream.write(file.read_bytes())
+    check_outputs({"path": path}, {})
+    write_netcdf(path, to_xarray(result))
 
 
 def load(path: str | os.PathLike[str]) -> Result:

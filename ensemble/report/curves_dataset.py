@@ -10,6 +10,7 @@ import xarray as xr
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.mean_curves import QUANTILES
+from adhesis.ensemble.outputs import write_netcdf
 from adhesis.ensemble.report.tables.key import key
 from adhesis.solver.method import BRANCHES
 
@@ -105,8 +106,7 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
 
 def write_curves(data: Aggregate, path: Path) -> None:
     """Write :func:`curves_dataset` as NetCDF 4, replacing a file that is there."""
-    path.unlink(missing_ok=True)
-    curves_dataset(data).to_netcdf(path, engine="h5netcdf")
+    write_netcdf(path, curves_dataset(data))
 
 
 def _about(unit: str, text: str) -> dict[str, str]:

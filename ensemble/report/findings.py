@@ -1,4 +1,4 @@
-"""What the numbers say, as sentences: trends, agreement with the paper, errors, what is missing."""
+"""Put findings into sentences: trends, agreement with the paper, errors, what is missing."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _numerical(data: Aggregate) -> str:
 
 
 def precision(data: Aggregate) -> list[str]:
-    """Which cells have met the precision that ``[stop]`` asks for; none without ``[stop]``."""
+    """Report the cells that have met the precision of ``[stop]``; none without ``[stop]``."""
     known = [(cell_name(cell), cell.precision) for cell in data.cells]
     cells = [(name, found) for name, found in known if found is not None]
     if not cells:
@@ -164,7 +164,7 @@ def agreement(data: Aggregate) -> list[str]:
 
 
 def readings(data: Aggregate) -> list[str]:
-    """Which campaign comes nearest to the paper's table, of this one and those beside it."""
+    """Report which campaign is nearest to the paper's table, of this one and those beside it."""
     deviations = []
     for name, cells in (
         (data.path.name, data.cells),

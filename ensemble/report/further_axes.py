@@ -1,4 +1,4 @@
-"""How the further axes of a campaign, beside H and γ, are named in tables and figures."""
+"""Name the further axes of a campaign, beside H and γ, in tables and figures."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def cell_name(cell: Cell) -> str:
 
 
 def axis_label(axis: Axis) -> str:
-    """What stands at an axis of a figure."""
+    """Return the label of an axis of a figure."""
     return _LABELS.get(axis.name, axis.name)
 
 
@@ -60,7 +60,7 @@ def lines_along(data: Aggregate, axis: Axis) -> list[list[Cell]]:
 
 
 def common(data: Aggregate) -> list[tuple[str, float]]:
-    """What all cells have alike on the further axes.
+    """Return the values on the further axes that all cells have in common.
 
     Of :attr:`Aggregate.shown` that is all, but for keys that vary with H or γ.
     """

@@ -59,7 +59,8 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
     if growth.rows:
         out += [
             "### Growth of the loss with γ, profile by profile",
-            "The same profiles serve every γ, so the growth is known better than the losses.",
+            "The same profiles serve every γ, so the growth is known better than from two "
+            "independent sets of profiles.",
             growth.markdown(),
         ]
     if data.companions:
@@ -186,7 +187,11 @@ def _origin(data: Aggregate) -> str:
         for name in shown
         if data.attributes.get(name)
     ]
-    return f"Results file: {'; '.join(parts)}." if parts else ""
+    results = f"Results file: {'; '.join(parts)}. " if parts else ""
+    return (
+        f"{results}Names of files with the number of a figure or table (fig3, table1) follow "
+        f"{paper.REFERENCE}."
+    )
 
 
 def _toml(text: str) -> str:

@@ -114,7 +114,7 @@ class CampaignResults:
         page = table_of([*rows, ("axes", ", ".join(self.axes))])
         if not self._counts["done"]:
             return page
-        figure: Any = self.plot.loss_against_adhesion()[0].figure
+        figure: Any = self.plot.loss_against_hurst()[0].figure
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=110)
         names = [f"loss_dimensionless_{part}" for part in ("mean", "ci_low", "ci_high")]

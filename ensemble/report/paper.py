@@ -37,7 +37,7 @@ M2: dict[float, float] = {0.7: 5.1e-3, 0.8: 2.7e-3, 0.9: 1.5e-3}
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """What a figure of the paper shows, by its caption.
+    """Content of a figure of the paper, by its caption.
 
     Attributes
     ----------

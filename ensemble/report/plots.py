@@ -71,9 +71,11 @@ class Plots:
         """Mean stress and contact fraction against penetration, a row for each H."""
         return self._draw("loop_against_penetration")
 
-    def loss_against_adhesion(self) -> list[Axes]:
-        """Losses of the Hurst exponents, a panel for each work of adhesion, with intervals."""
-        return self._draw("loss_against_adhesion")
+    def loss_against_hurst(self) -> list[Axes]:
+        """Loss against the Hurst exponent, a panel for each work of adhesion, with intervals."""
+        return self._draw("loss_against_hurst")
+
+    loss_against_adhesion = loss_against_hurst  # its earlier name
 
     def loss_against_slope(self) -> list[Axes]:
         """Loss against mean square slope, a panel for each work of adhesion, with intervals."""

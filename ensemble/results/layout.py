@@ -25,6 +25,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.quantities import bytes_text
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results, stretches
 from adhesis.ensemble.results.schema import (
@@ -44,6 +45,12 @@ from adhesis.ensemble.task.dataset import KEPT, Dataset, sizes_of
 from adhesis.solver.runtime.uninterrupted import signals_held
 
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
+
+
+def check_new_file(option: str, path: Path) -> None:
+    """Refuse a results file that is to be made with another ending than .h5."""
+    if path.suffix != ".h5":
+        raise InputError(f"{option} is {path}: the name of a new results file must end in .h5")
 
 
 def create(
@@ -83,7 +90,7 @@ def create(
             free = shutil.disk_usage(path.parent).free
             if needed > free:
                 raise InputError(
-                    f"{path} needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB free"
+                    f"{path} needs {bytes_text(needed)} and the disk has {bytes_text(free)} free"
                 )
             # Made anew, so that a link of that name is removed and not followed.
             unfinished.unlink(missing_ok=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import h5py
@@ -52,7 +53,7 @@ _COPIED = tuple(d for d in DATASETS if d not in TASK_DATASETS and d is not STATU
 
 @dataclass(frozen=True)
 class Merged:
-    """What a merge has left: rows by status, how many it took over, and what it left out.
+    """Result of a merge: rows by status, how many it took over, and what it left out.
 
     Attributes
     ----------
@@ -87,7 +88,7 @@ class _Source:
         return bool(np.any(self.taken[low:high]))
 
     def places(self, dataset: Dataset) -> tuple[Rows, NDArray[np.bool_]]:
-        """Where the rows of a dataset go, and which of them are given."""
+        """Return the places of the rows of a dataset, and which of them are given."""
         if dataset.dims[0] == KEPT:
             return self.kept, self.taken[self.kept_rows]
         return self.target, self.taken
@@ -116,6 +117,9 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
     with ExitStack() as stack:
         opened = [stack.enter_context(Results(part)) for part in parts]
         there = stack.enter_context(Results(out)) if out.exists() else None
+        for one, other in combinations(opened, 2):
+            if one.path.samefile(other.path):
+                raise InputError(f"{other.path} is named twice: give each file once")
         for part in opened:
             if there is not None and part.path.samefile(out):
                 raise InputError(f"{part.path} is to be merged into itself")

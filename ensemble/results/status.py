@@ -1,4 +1,4 @@
-"""How far a campaign is: counts, times, failures and losses so far, from its results file alone.
+"""Report counts, times, failures and losses of a campaign so far, from its results file alone.
 
 Never loads MPI: it works on a login node, and while the run writes. It reads all rows with a
 result, for their checksums.
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.quantities import AXIS_UNITS, with_error
 from adhesis.ensemble.results.read import (
     NO_CHECKSUMS,
     NO_RANGES,
@@ -50,18 +51,17 @@ def read_status(path: Path | str) -> dict[str, Any]:
         ``checksums`` and ``valid_ranges``, whether the file has any; ``computed_by``, the number of
         done rows by the versions and the processor that computed them; ``seconds`` per done task
         (``mean``, ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each
-        cell (a value of each of the ``axes``) with its counts, its mean time, its mean loss with
-        standard error (J/m², and W~), and with ``[stop]`` how well the mean of the steered
-        ``quantity`` is known: ``relative_error``, ``interval_low`` and ``interval_high`` (None
-        where unknown), ``wanted_relative_error``, whether it was ``met`` (None while tasks of the
-        cell are pending), and all this as a sentence (``precision``); ``failures``, one dict for
-        each failed task; ``doubtful``, one for each loss whose own checks say that it is wrong
-        (:mod:`adhesis.ensemble.task.doubt`), the worst first; ``beyond_limit``, one for each loss
-        that is beyond what zero range describes
+        cell (a value of each of the ``axes``, in the ``axis_units``) with its counts, its mean
+        time, its mean loss with standard error (J/m², and W~), and with ``[stop]`` how well the
+        mean of the steered ``quantity`` is known: ``relative_error``, ``interval_low`` and
+        ``interval_high`` (None where unknown), ``wanted_relative_error``, whether it was ``met``
+        (None while tasks of the cell are pending), and all this as a sentence (``precision``);
+        ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
+        checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the worst first;
+        ``beyond_limit``, one for each loss that is beyond what zero range describes
         (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least valid range first;
-        ``opens``, whether patches may open from inside;
-        ``last_row``, when the file was last written to (as ``time.time()`` counts), None before the
-        first row.
+        ``opens``, whether patches may open from inside; ``last_row``, when the file was last
+        written to (as ``time.time()`` counts), None before the first row.
 
     Raises
     ------
@@ -73,7 +73,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         stop = results.campaign.stop
         opens = results.campaign.material.opens
         axes = ["hurst", "work_of_adhesion"]
-        axes += [dataset.name for dataset in axis_datasets(results.campaign)]
+        further = axis_datasets(results.campaign)
+        axes += [dataset.name for dataset in further]
+        units = dict(zip(axes, ["1", "J m-2", *(dataset.unit for dataset in further)], strict=True))
         state = results.status()
         names = (
             *dict.fromkeys((*_TASK, *axes)),
@@ -116,6 +118,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "beyond_limit": _beyond_limit(state, column, opens=opens),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
+        "axis_units": units,
         "groups": _groups(state, column, axes, stop),
         "failures": failures,
     }
@@ -200,7 +203,7 @@ def _groups(
         ]
 
     def known(i: int) -> dict[str, Any]:
-        """How well the steered quantity of a cell is known, and how well it is to be."""
+        """Return the precision of the steered quantity of a cell, and the wanted one."""
         if stop.relative_error is None:
             return {}
         values = column[stop.quantity][done & (group_of == i)]
@@ -259,9 +262,10 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         )
     groups = status["groups"]
     if len(groups) <= _MOST_GROUPS_SHOWN:
-        further = status["axes"][2:]
-        names = "".join(f"{name}  " for name in further)
-        lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  loss W~"]
+        further = {name: _heading(name, status["axis_units"][name]) for name in status["axes"][2:]}
+        names = "".join(f"{heading}  " for heading in further.values())
+        loss = "loss W~ ± standard error of the mean"
+        lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  {loss}"]
         lines += [_group_line(group, further) for group in groups]
     if status["damaged"]:
         lines += ["", *damage_lines(status["damaged"])]
@@ -274,19 +278,27 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
     return printable("\n".join(lines))
 
 
-def _group_line(group: dict[str, Any], further: Sequence[str]) -> str:
+def _heading(name: str, unit: str) -> str:
+    """Return "max_stress in Pa", or the name alone of a dimensionless key."""
+    return name if unit == "1" else f"{name} in {AXIS_UNITS[unit]}"
+
+
+def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
     counts = f"{group['done']:8d} {group['pending']:8d} {group['failed']:7d}"
     mean, loss = group["mean_seconds"], group["loss_dimensionless"]
     error = group["loss_dimensionless_standard_error"]
     return (
         f"{group['hurst']:5.4g}  {group['work_of_adhesion']:9.4g} "
-        + "".join(f"{group[name]:{len(name)}.4g}  " for name in further)
+        + "".join(f"{group[name]:{len(heading)}.4g}  " for name, heading in further.items())
         + f"{counts} "
         + (f"{mean:9.3g}" if mean is not None else " " * 9)
-        + (f"  {loss:.4g}" if loss is not None else "")
-        + (f" ± {error:.2g}" if error is not None else "")
+        + (f"  {_loss(loss, error)}" if loss is not None else "")
         + (f"  {group['precision']}" if "precision" in group else "")
     ).rstrip()
+
+
+def _loss(loss: float, error: float | None) -> str:
+    return f"{loss:.4g}" if error is None else with_error(loss, error)
 
 
 def _task(row: Mapping[str, Any]) -> str:

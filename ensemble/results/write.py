@@ -166,7 +166,7 @@ class Writer:
         return {ORIGIN.name: encode_text(self._origin(rank), ORIGIN_LENGTH)}
 
     def _place(self, name: str, row: int) -> int | None:
-        """Where the row of a task stands in a dataset; None where it has none."""
+        """Return the place of the row of a task in a dataset; None where it has none."""
         return self._kept.get(row) if name in _KEPT_NAMES else row
 
     @contextmanager

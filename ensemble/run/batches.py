@@ -1,4 +1,4 @@
-"""Which realisations are computed next where a campaign has a ``[stop]``: batch by batch, by cell.
+"""Choose the next realisations where a campaign has a ``[stop]``: batch by batch, by cell.
 
 What is computed depends on the campaign alone: a cell's next batch is decided when the one before
 is complete, whatever the number of ranks and of restarts.

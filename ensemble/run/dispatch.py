@@ -74,7 +74,7 @@ class Channel(Protocol):
 
 @dataclass
 class Limits:
-    """What ends a run early.
+    """Reasons that end a run early.
 
     Attributes
     ----------

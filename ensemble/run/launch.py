@@ -40,6 +40,8 @@ ONE_THREAD = dict.fromkeys(
 # write their exit code and last message. After a nonzero exit code mpirun prints a page of text, in
 # which the message of the rank is lost.
 STARTED = "ADHESIS_STARTED"
+# Beside that file: the name of the signal that :func:`run_ranks` has passed on as SIGUSR1.
+_SIGNAL = ".signal"
 _RANKS_PER_CORE = 16
 KILLED = 137  # exit code that a shell reports for a process ended by signal 9
 
@@ -48,6 +50,9 @@ KILLED = 137  # exit code that a shell reports for a process ended by signal 9
 # on. Open MPI 4.1.4 was seen to hang once all ranks had ended, in PMIx_server_finalize.
 _LAUNCHER_ENDS, _LAUNCHER_KILLED = 10.0, 15.0
 _LOOK_EVERY = 0.5  # s
+
+# Open MPI reports each signal that it passes on, in a line of its own.
+_QUIET = {"OMPI_MCA_orte_execute_quiet": "1"}
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
 _LIBC = ctypes.CDLL(None)
@@ -145,6 +150,15 @@ def hand_over(code: int, sentence: str = "") -> bool:
     return True
 
 
+def described_signal(name: str) -> str:
+    """Return which signal stops a run: of ranks that are started here, the one to the starter."""
+    started = os.environ.get(STARTED, "")
+    if name == "SIGUSR1" and started:
+        with suppress(OSError):  # that process got SIGUSR1 itself, or is on another node
+            name = Path(started + _SIGNAL).read_text() or name
+    return "Ctrl-C (SIGINT)" if name == "SIGINT" else name
+
+
 def run_ranks(
     launcher: str,
     ranks: int,
@@ -177,7 +191,7 @@ def run_ranks(
     program = program or python("-m", "mpi4py", "-m", "adhesis")
     handle, handed_over = tempfile.mkstemp(prefix="adhesis-")
     started = {STARTED: handed_over}
-    env = python_environment(launch_environment(ranks)) | ONE_THREAD | started
+    env = python_environment(launch_environment(ranks)) | ONE_THREAD | _QUIET | started
     process = subprocess.Popen(
         [launcher, "-n", str(ranks), *program, *words],
         env=env,
@@ -190,7 +204,7 @@ def run_ranks(
         preexec_fn=end_with_parent,  # else ranks would continue and keep the results file locked
     )
     threading.Thread(target=_see_end, args=(process, handed_over), daemon=True).start()
-    with _signals_passed_to(process), open(handle, encoding="utf-8") as stream:
+    with _signals_passed_to(process, handed_over), open(handle, encoding="utf-8") as stream:
         try:
             if process.stdout is not None and output is not None:
                 for line in process.stdout:
@@ -198,6 +212,7 @@ def run_ranks(
             code = process.wait()
         finally:
             os.unlink(handed_over)
+            Path(handed_over + _SIGNAL).unlink(missing_ok=True)
         own, _, sentence = stream.read().partition("\n")
     return int(own or code), sentence
 
@@ -218,13 +233,15 @@ def _see_end(process: subprocess.Popen[str], handed_over: str) -> None:
 
 
 @contextmanager
-def _signals_passed_to(process: subprocess.Popen[str]) -> Iterator[None]:
+def _signals_passed_to(process: subprocess.Popen[str], handed_over: str) -> Iterator[None]:
     """Turn signals to this process into stops of the ranks, by SIGUSR1, which mpirun passes on."""
     interrupted = False
 
     def stop(number: int, _: FrameType | None) -> None:
         nonlocal interrupted
         again = interrupted and number == signal.SIGINT
+        with suppress(OSError):  # the ranks report SIGUSR1 without it
+            Path(handed_over + _SIGNAL).write_text(signal.Signals(number).name)
         process.send_signal(signal.SIGTERM if again else signal.SIGUSR1)
         interrupted = interrupted or number == signal.SIGINT
 

@@ -27,6 +27,7 @@ from typing import Any, Self
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.escape import one_line
 from adhesis.ensemble.outputs import target_of
+from adhesis.solver.checks import counted
 
 # Two bytes far beyond the text are locked: for the run as a whole, and for ranks that write.
 _RUN, _WRITERS = 1 << 30, (1 << 30) + 1
@@ -226,7 +227,7 @@ def described(record: Mapping[str, Any]) -> str:
     if not record:
         return "of which nothing more is known"
     return one_line(
-        f"host {record['host']}, process {record['pid']}, {record['ranks']} ranks, "
+        f"host {record['host']}, process {record['pid']}, {counted(record['ranks'], 'rank')}, "
         f"since {record['since']}"
     )
 

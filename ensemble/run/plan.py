@@ -1,4 +1,4 @@
-"""What there is to do: a campaign compared with its results file, which is made or extended."""
+"""Plan a run: compare the campaign with its results file, which is made or extended."""
 
 from __future__ import annotations
 
@@ -273,7 +273,7 @@ def _plan(results: Results, status: NDArray[np.uint8]) -> Plan:
 
 
 def group_of(campaign: Campaign, task: Task) -> Group:
-    """What tasks that take about the same time have in common: their cell.
+    """Return a key of the tasks that take about the same time: their cell.
 
     Of tasks that share a loading branch it leaves out where they turn.
     """

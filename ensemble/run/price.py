@@ -44,7 +44,7 @@ Cell = tuple[float, ...]
 
 @dataclass(frozen=True)
 class CellPrice:
-    """What the tasks of one cell cost.
+    """Cost of the tasks of one cell.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class CellPrice:
 
 @dataclass(frozen=True, repr=False)
 class Price:
-    """What a campaign costs.
+    """Cost of a campaign.
 
     Attributes
     ----------

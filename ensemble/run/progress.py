@@ -28,7 +28,7 @@ def duration(seconds: float) -> str:
 
 @dataclass
 class Counts:
-    """What a run has to do and has done."""
+    """Numbers of tasks that a run has to do and has done."""
 
     total: int
     done_before: int

@@ -1,4 +1,4 @@
-"""What this project asks of MPI: messages, an honest count of ranks, no rank left waiting.
+"""Use MPI: messages, an honest count of ranks, no rank left waiting.
 
 The only module of a run that imports mpi4py, and only inside its functions: one process runs where
 there is no MPI (:mod:`adhesis.ensemble.doctor.probe`, in processes of its own, tries MPI out).

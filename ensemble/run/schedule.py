@@ -1,4 +1,4 @@
-"""Which task next: round by round, within a round the longest first, by estimates that improve.
+"""Choose the next task: by rounds, in a round the longest first, by estimates that improve.
 
 Tasks come in groups that take about the same time (a cell of the sweep, say) and in rounds (its
 realisations): a round is handed out before the next one begins, so that a run which is interrupted

@@ -21,6 +21,7 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Compute, Outcome, StopCheck
 from adhesis.ensemble.run.dispatch import SILENCE, Limits, Master, Worker, work_alone
 from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
+from adhesis.ensemble.run.launch import described_signal
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
 from adhesis.ensemble.run.progress import Counts, ProgressLine
@@ -61,7 +62,7 @@ class RowSummary:
 
 
 class RowWriter(Protocol):
-    """Where rows go; :class:`adhesis.ensemble.results.write.Writer`."""
+    """Destination of rows: :class:`adhesis.ensemble.results.write.Writer`."""
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
         """Write the row of a task that was computed."""
@@ -70,7 +71,7 @@ class RowWriter(Protocol):
         """Write the row of a task that failed."""
 
     def mark(self, rows: Iterable[int], *, needed: bool) -> None:
-        """Say of rows without a result whether they are to be computed."""
+        """Mark rows without a result as to be computed, or as not needed."""
 
     def __enter__(self) -> Self: ...
 
@@ -79,7 +80,7 @@ class RowWriter(Protocol):
 
 @dataclass(frozen=True)
 class Engine:
-    """What a run works with; tests and benchmarks pass in their own.
+    """Functions that a run works with; tests and benchmarks pass in their own.
 
     Attributes
     ----------
@@ -111,7 +112,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class Options:
-    """How a run goes.
+    """Options of a run.
 
     Attributes
     ----------
@@ -136,7 +137,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run has left: tasks by status in the file, and what it did itself.
+    """Result of a run: tasks by status in the file, and what it did itself.
 
     Attributes
     ----------
@@ -466,7 +467,7 @@ class _Session:
 
     def _stop(self) -> str | None:
         if self._signals.received is not None:
-            return f"{self._signals.received} received"
+            return f"{described_signal(self._signals.received)} received"
         left = self._time_left()
         if left is not None and left <= 0:
             return "the walltime ends"

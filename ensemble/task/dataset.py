@@ -1,4 +1,4 @@
-"""What one dataset of the results is, and one dimension: names, units, meanings, shapes."""
+"""Describe a dataset of the results, and a dimension: names, units, meanings, shapes."""
 
 from __future__ import annotations
 

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.lengths import length_text
+from adhesis.ensemble.quantities import with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.pool import Pool, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
@@ -46,7 +48,7 @@ QUANTITIES = {
 # the root of their sum of squares. Measured on profiles of known loss: docs/measured-profile.md.
 COVERAGE = 2.0
 # Never more certain than this: scatter between traces of one surface is not even looked at.
-_LEAST = 0.02
+LEAST = 0.02
 
 _NOT_CONVERGED = 0.10
 _PROCESSES = Bounds(0, 4096, whole=True)
@@ -57,6 +59,23 @@ DOUBTS = {
     "noise": "noise of the instrument",
 }
 
+
+_REMEDIES = {
+    "cut-off": "resolve shorter waves",
+    "continuation": "measure a longer trace, or several",
+    "form": "measure a longer trace, or give the degree of the form",
+    "noise": "average several scans",
+    "numerics": "ask for a better accuracy",
+}
+# What makes shorter waves known, by what limits the cut-off.
+_SHORTER_WAVES = {
+    "noise": "the noise of the instrument hides shorter waves: average several scans",
+    "step": "a finer step would resolve shorter waves",
+    "tip": "a sharper tip would resolve shorter waves",
+    "given": "the trace holds shorter waves than the cut-off that was given",
+}
+# The longest cut-offs are drawn, and no doubts.
+_FOR_THE_FIGURE = ("cut-off × 16", "cut-off × 8", "cut-off × 4", "cut-off × 2")
 
 # Turning point Δ/h_max of the answer where none is given.
 MAX_PENETRATION = 0.9
@@ -119,7 +138,7 @@ class Answer(ByValue):
     def __repr__(self) -> str:
         """One line: the loss with its uncertainty, and the warnings counted."""
         return (
-            f"Answer(loss={self.loss.value:.6g} ± {self.loss.uncertainty:.2g} J/m², "
+            f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty)} J/m², "
             f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
         )
 
@@ -408,10 +427,11 @@ def _several(name: str, value: Several) -> Sequence[float]:
 def _quantity(answer: Answer, name: str) -> Quantity:
     value = float(answer.main[name])
     doubts = {}
+    neighbours = _neighbours(answer)
     for doubt in DOUBTS:
         changes = []
         for run in answer.plan.runs:
-            if run.group != doubt or not _counts(run.name):
+            if run.group != doubt or (doubt == "cut-off" and run.name not in neighbours):
                 continue
             change = answer.change(run.name, name)
             if change is not None:
@@ -423,35 +443,42 @@ def _quantity(answer: Answer, name: str) -> Quantity:
         numerics = abs(answer.main["audit_residual"]) if error is None else abs(error) / abs(value)
         doubts["numerics"] = float(numerics)
     spread = float(np.sqrt(sum(d * d for d in doubts.values())))
-    return Quantity(value, abs(value) * max(_LEAST, COVERAGE * spread), doubts)
+    return Quantity(value, abs(value) * max(LEAST, COVERAGE * spread), doubts)
 
 
-def _counts(name: str) -> bool:
-    """Of the cut-offs, only the neighbours count as doubts; the others are for the figure."""
-    if not name.startswith("cut-off"):
-        return True
-    return float(name.split("×")[1]) <= 2.01
+def _cut_offs(answer: Answer) -> dict[float, str]:
+    """Return the names of the loops that ended by their shortest wave over the answer's."""
+    names = [run.name for run in answer.plan.runs if run.group == "cut-off"]
+    ended = [name for name in names if answer.result(name) is not None]
+    return {1.0: "answer"} | {float(name.split("×")[1]): name for name in ended}
+
+
+def _neighbours(answer: Answer) -> list[str]:
+    """Return the loops of the cut-offs next to the answer's, which count as a doubt.
+
+    The others, up to sixteen times as long, are for the figure.
+    """
+    names = _cut_offs(answer)
+    longer = sorted(factor for factor in names if factor > 1)[:1]
+    return [name for factor, name in names.items() if factor < 1 or factor in longer]
 
 
 def _warnings(answer: Answer, loss: Quantity) -> list[str]:
-    found = []
+    found = [*answer.main["range_warnings"], *answer.main["strain_warnings"]]
     for run in answer.plan.runs:
         text = answer.results.get(run.name)
         if isinstance(text, str):
-            found.append(f"the loop “{run.name}” did not end ({text}): its doubt is not counted")
-    last = answer.change("cut-off × 2")
-    if last is not None and abs(last) > _NOT_CONVERGED:
-        found.append(
-            f"the short-wave end is not converged: the last halving of the shortest wave changes "
-            f"the loss by {-100 * last / (1 + last):+.0f} %; a finer step or a sharper tip would "
-            "resolve shorter waves"
-        )
+            counts = run.group in DOUBTS and not run.name.startswith(_FOR_THE_FIGURE)
+            lacks = "its doubt is not counted" if counts else "it is missing from table and figure"
+            found.append(f"the loop “{run.name}” did not end ({text}): {lacks}")
+    found += _not_converged(answer)
     if loss.relative > 0.5:
+        largest = max(loss.doubts, key=lambda name: loss.doubts[name])
         found.append(
-            f"the loss is known to {100 * loss.relative:.0f} % only: measure a longer trace, or "
-            "several"
+            f"the loss is known to {100 * loss.relative:.0f} % only, mostly for the doubt "
+            f"“{largest}” ({DOUBTS.get(largest, 'error of the loop itself')}; standard uncertainty "
+            f"{100 * loss.doubts[largest]:.0f} %): {_REMEDIES[largest]}"
         )
-    found += answer.main["range_warnings"]
     races = answer.main["races"]
     if races:
         found.append(
@@ -459,6 +486,27 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
             f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
     return found
+
+
+def _not_converged(answer: Answer) -> list[str]:
+    """Return a warning where the shortest two cut-offs that were computed differ in their loss."""
+    names = _cut_offs(answer)
+    finest, coarser = sorted(names)[:2] if len(names) > 1 else (1.0, 1.0)
+    one, other = answer.result(names[finest]), answer.result(names[coarser])
+    assert one is not None
+    assert other is not None
+    change = one["loss"] / other["loss"] - 1 if other["loss"] else 0.0
+    if abs(change) <= _NOT_CONVERGED:
+        return []
+    cut_off, limits = answer.prepared.cut_off, answer.prepared.limits
+    limit = max(limits, key=lambda name: limits[name])
+    if cut_off > 1.01 * limits[limit]:
+        limit = "given"
+    return [
+        f"the short-wave end is not converged: a shortest wave of {length_text(finest * cut_off)} "
+        f"instead of {length_text(coarser * cut_off)} changes the loss by {100 * change:+.0f} %; "
+        f"{_SHORTER_WAVES[limit]}"
+    ]
 
 
 def run_rows(answer: Answer) -> list[dict[str, Any]]:

@@ -91,7 +91,7 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     above.plot(by_x * measured, by_z * heights, color=_GREY, lw=0.7)
     fit = prepared.filled - level
     sign = -1.0 if any(step.name == "turned over" for step in prepared.steps) else 1.0
-    above.plot(by_x * x, sign * by_z * fit, color=_ORANGE, lw=1.0, label="form taken off")
+    above.plot(by_x * x, sign * by_z * fit, color=_ORANGE, lw=1.0, label="form subtracted")
     if prepared.gaps.any():
         gaps = np.flatnonzero(prepared.gaps)
         above.plot(

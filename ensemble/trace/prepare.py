@@ -262,8 +262,8 @@ def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) ->
     steps.append(
         Step(
             "outliers",
-            f"{counted(count, 'outlier')} of up to {length_text(highest)} taken out, as drop-outs "
-            "are",
+            f"{counted(count, 'outlier')} ({'' if count == 1 else 'up to '}{length_text(highest)}) "
+            f"removed and treated as {'a drop-out' if count == 1 else 'drop-outs'}",
             {"points": count, "highest": highest},
         )
     )
@@ -334,7 +334,7 @@ def _degree(filled: Array, wanted: int | None, steps: list[Step], warnings: list
             if found > 1
             else "no form beyond a tilt stands out"
         )
-    said = f"{name} taken off ({why})"
+    said = f"{name} subtracted ({why})"
     numbers = {"degree": degree, "rise": float(line)}
     if bow > 0:
         said += f": {length_text(bow)} from lowest to highest beside the tilt"

@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--work-of-adhesion",
         required=True,
         metavar="G",
-        help="J/m²; of several (0.04,0.02,0.08) the first is the answer's, the others make a "
-        "table, as of several turning points",
+        help="in J/m², or 20mJ/m2; of several (0.04,0.02,0.08) the first is the answer's, the "
+        "others make a table, as of several turning points",
     )
     contact.add_argument("--young", type=stress, required=True, metavar="E", help="in Pa, or 1MPa")
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
@@ -106,7 +106,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument("--channel", type=int, metavar="K", help="of an instrument's file, from 0")
     making = parser.add_argument_group("preparing a trace")
     making.add_argument(
-        "--degree", type=int, metavar="N", help="polynomial taken off (default 1, or as is seen)"
+        "--degree", type=int, metavar="N", help="polynomial subtracted (default 1, or as is seen)"
     )
     making.add_argument(
         "--cut-off",

@@ -9,11 +9,12 @@ from adhesis._version import __version__
 from adhesis.ensemble.escape import code_span, markdown, printable
 from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.outputs import staged_folder, write_json
-from adhesis.ensemble.quantities import in_works_of_adhesion
+from adhesis.ensemble.quantities import in_works_of_adhesion, with_error
 from adhesis.ensemble.report.html import html_page
-from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, Answer, Quantity, document
+from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.solver.checks import counted
+from adhesis.solver.loading.zero_range import stress_text
 
 
 def summary(answer: Answer) -> str:
@@ -30,23 +31,36 @@ def summary(answer: Answer) -> str:
         f"{loop['waves']} waves, {loop['patches']} patch{'es' if loop['patches'] != 1 else ''} at "
         f"most, {counted(loop['jumps'], 'jump')}, "
         f"audit {loop['audit_residual']:.0e}",
+        f"scope       {_scope(answer)}",
         f"range       {_range(answer)}",
         "doubts      "
         + ", ".join(f"{name} {_percent(share)}" for name, share in answer.loss.doubts.items())
         + " of the loss (standard uncertainties; the half-width of the interval is "
-        f"{COVERAGE:g} times the root of the sum of their squares)",
+        f"{COVERAGE:g} times the root of the sum of their squares, at least {100 * LEAST:g} %)",
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
     return printable("\n".join(lines))
 
 
+def _scope(answer: Answer) -> str:
+    """Describe of what body the loss is, and whether anything presses it."""
+    largest = max(answer.main["states"]["mean_stress"])
+    pressed = (
+        f"the mean stress reaches a compression of {1e-3 * largest:.3g} kPa"
+        if largest > 0
+        else "the mean stress is a tension on the whole loop"
+    )
+    return f"one period of parallel grooves, {length_text(answer.main['period'])} wide; {pressed}"
+
+
 def _range(answer: Answer) -> str:
-    """Say below which range of adhesion the zero-range limit holds."""
+    """Describe below which range of adhesion the zero-range limit holds."""
     if answer.valid_range is None:
         return "no tension inside patches"
     return (
-        f"adhesion of a range below {length_text(answer.valid_range, 3)} is of zero range here: "
-        f"largest tension inside patches {1e-6 * answer.largest_interior_tension:.3g} MPa"
+        "the zero-range model is valid if the real adhesion reaches less than "
+        f"{length_text(answer.valid_range, 3)} (tension inside patches of up to "
+        f"{stress_text(answer.largest_interior_tension)})"
     )
 
 
@@ -70,17 +84,8 @@ def write_all(answer: Answer, folder: Path) -> Path:
 
 def _value(quantity: Quantity, by: float, unit: str) -> str:
     unit = f" {unit}" if unit else ""
-    known = _with_interval(by * quantity.value, by * quantity.uncertainty)
+    known = with_error(by * quantity.value, by * quantity.uncertainty)
     return f"{known}{unit} (± {_percent(quantity.relative, 0)})"
-
-
-def _with_interval(value: float, half: float) -> str:
-    """Digits down to the first one of the interval."""
-    digits = 0
-    while digits < 6 and half * 10**digits < 9.5:
-        digits += 1
-    digits = max(digits - 1, 0)
-    return f"{value:.{digits}f} ± {half:.{digits}f}"
 
 
 def _percent(share: float, digits: int = 1, sign: str = "") -> str:
@@ -118,11 +123,13 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         images.get("spectrum"),
         "## The loop",
         images.get("loop"),
+        f"Scope: {_scope(answer)}.",
         f"Range: {_range(answer)} (least of the loop and its variants).",
         "## How far it can be trusted",
         "Each doubt is measured by running the loop with the decision made otherwise. "
         "Standard uncertainty: the root mean square of the changes; the interval is "
-        f"{COVERAGE:g} times the root of the sum of their squares. It is about this trace, "
+        f"{COVERAGE:g} times the root of the sum of their squares, at least {100 * LEAST:g} %. "
+        "It is about this trace, "
         "closed to one period; other places of the same surface have other losses.",
         _table(_doubt_rows(answer)),
         _table(_variant_rows(answer)),
@@ -140,8 +147,8 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         parts += [heading, _table(sweep), images.get("tables")]
     parts += [
         "## What it took",
-        f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {plan.processes} cores (planned: "
-        f"{plan.wall:.0f} s). Every number: `trace.json`. adhesis {__version__}.",
+        f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {counted(plan.processes, 'core')} "
+        f"(planned: {plan.wall:.0f} s). Every number: `trace.json`. adhesis {__version__}.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
 
@@ -206,8 +213,8 @@ def _sweep_rows(answer: Answer) -> list[list[str]]:
             [
                 f"{g:g}",
                 f"{d:g}",
-                _with_interval(1e3 * r["loss"], 1e3 * abs(r["loss"]) * answer.loss.relative),
-                _with_interval(
+                with_error(1e3 * r["loss"], 1e3 * abs(r["loss"]) * answer.loss.relative),
+                with_error(
                     1e-3 * r["pull_off_stress"],
                     1e-3 * r["pull_off_stress"] * answer.pull_off_stress.relative,
                 ),

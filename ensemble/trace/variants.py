@@ -14,6 +14,7 @@ from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.worker import Job
+from adhesis.solver.checks import counted
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import strength_of
@@ -109,7 +110,7 @@ class Plan(ByValue):
             f"plan        {self.waves} waves, about {self.patches} "
             f"patch{'es' if self.patches != 1 else ''} at a time: "
             f"{len(self.runs)} loops, about {clock(sum(self.seconds.values()))} of CPU time, "
-            f"{clock(self.wall)} on {self.processes} core{'s' if self.processes > 1 else ''}"
+            f"{clock(self.wall)} on {counted(self.processes, 'core')}"
         ]
         return "\n".join(lines + [f"hint        {hint}" for hint in self.hints])
 
@@ -229,7 +230,12 @@ def _doubts(prepared: Prepared) -> list[Run]:
     if prepared.spectrum.noise > 0:
         for seed in (1, 2) if factor == 1 else (1,):
             runs.append(
-                Run(f"noise {seed}", "noise", "as much noise once more", {"noise_seed": seed})
+                Run(
+                    f"noise {seed}",
+                    "noise",
+                    "white noise of the instrument's size added",
+                    {"noise_seed": seed},
+                )
             )
     return runs
 

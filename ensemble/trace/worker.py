@@ -31,8 +31,10 @@ FAILURES = (RuntimeError, ValueError, ArithmeticError, MemoryError)
 
 
 def failure(error: Exception) -> str:
-    """Return class and message of an error."""
-    return f"{type(error).__name__}: {error}"
+    """Return the message of an error; where it is not written for users, with its class."""
+    from adhesis.solver.method import PathError
+
+    return str(error) if isinstance(error, PathError) else f"{type(error).__name__}: {error}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,6 +79,7 @@ def main() -> None:
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists."""
     from adhesis.solver.loading.loop import run_loop
+    from adhesis.solver.loading.loop_result import strain_warnings
     from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
     from adhesis.solver.method import Branch, ContactState
     from adhesis.solver.model.control import Control
@@ -106,6 +109,9 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
             problem, loop.valid_range, loop.loss, loop.contact_fraction
         )
         + opening_warnings(loop.jumps, loop.loss),
+        "strain_warnings": strain_warnings(
+            problem, loop.mean_stress, loop.separation, loop.patches
+        ),
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),

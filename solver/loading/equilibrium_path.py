@@ -17,6 +17,7 @@ from adhesis.solver.loading.zero_range import (
     InteriorTension,
     interior_tension,
     narrowest_length,
+    stress_text,
 )
 from adhesis.solver.method import ContactState, Method, MethodReport
 from adhesis.solver.model.jump import Jump
@@ -178,9 +179,10 @@ class EquilibriumPath(ByValue, ResultViews):
         if interior is None:
             return "no tension inside patches"
         return (
-            f"adhesion of a range below {self.valid_range:.3g} m is of zero range here: largest "
-            f"tension inside patches {interior.tension:.3g} Pa, on {interior.branch} at Δ/h_max = "
-            f"{interior.penetration:.4g}; at edges {self.edge_range:.3g} m"
+            "the zero-range model is valid if the real adhesion reaches less than "
+            f"{1e9 * self.valid_range:.3g} nm (tension inside patches of "
+            f"{stress_text(interior.tension)} on {interior.branch} at Δ/h_max = "
+            f"{interior.penetration:.4g}; at edges: {1e9 * self.edge_range:.3g} nm)"
         )
 
     # ------------------------------------------------------------------ for tables and files

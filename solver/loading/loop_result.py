@@ -26,6 +26,10 @@ from adhesis.solver.model.profile import Array
 STEEP = 0.3
 """Root mean square slope above which linear elasticity is doubtful (docs/theory.md)."""
 
+LARGE_STRAIN = 0.3
+"""Largest tension over Young's modulus, and longest neck over the period, above which small strain
+is doubtful."""
+
 # Share of the loss above which an audit residual or an error of the loss is reported, for methods
 # without an accuracy.
 _LARGE = 0.02
@@ -105,6 +109,7 @@ class LoopResult(EquilibriumPath):
             )
         if self.problem.work_of_adhesion == 0:
             return tuple(found)  # there is no loss to doubt
+        found += strain_warnings(self.problem, self.mean_stress, self.separation, self.patches)
         most = getattr(self.method, "accuracy", _LARGE)
         if abs(self.audit_residual) > most:
             found.append(
@@ -274,6 +279,27 @@ def result_of(
         work_spent=loss + gained,
         **fields,
     )
+
+
+def strain_warnings(
+    problem: Problem, mean_stress: Array, separation: Array, patches: NDArray[np.int64]
+) -> list[str]:
+    """Return the sentences of doubt where strains of a path are not small."""
+    out: list[str] = []
+    young, period = problem.half_space.young, problem.profile.period
+    question = "small strain does not hold; is γ in J/m², E in Pa and the profile in m?"
+    tension = float(-mean_stress.min(initial=0.0))
+    if tension > LARGE_STRAIN * young:
+        out.append(
+            f"the largest mean tension, {tension:.3g} Pa, is {tension / young:.3g} of Young's "
+            f"modulus: {question}"
+        )
+    neck = float(separation[patches > 0].max(initial=0.0))
+    if neck > LARGE_STRAIN * period:
+        out.append(
+            f"necks are up to {neck:.3g} m long, {neck / period:.2g} of the period: {question}"
+        )
+    return out
 
 
 def estimated_error(record: Record, audited: float, problem: Problem) -> float:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
 from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
-from adhesis.solver.loading.loop_result import estimated_error
+from adhesis.solver.loading.loop_result import estimated_error, strain_warnings
 from adhesis.solver.loading.path_record import Axis, Record
 from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
 from adhesis.solver.method import ContactState, Method, PathError
@@ -142,6 +142,7 @@ class PathResult(EquilibriumPath):
         """Reasons to doubt the work, one sentence each; none for most paths."""
         lost = self.loss_from_drops
         found = range_warnings(self.problem, self.valid_range, lost, self.contact_fraction)
+        found += strain_warnings(self.problem, self.mean_stress, self.separation, self.patches)
         return (*found, *opening_warnings(self.jumps, lost))
 
     @property

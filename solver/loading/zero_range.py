@@ -170,6 +170,11 @@ def _narrowest_moved(before: Array, after: Array, period: float) -> float:
     return float(np.concatenate(lengths).min(initial=math.inf))
 
 
+def stress_text(pascals: float) -> str:
+    """Return a stress in a unit of its size: "100 kPa"."""
+    return f"{1e-6 * pascals:.3g} MPa" if pascals >= 1e6 else f"{1e-3 * pascals:.3g} kPa"
+
+
 def opening_warnings(jumps: Sequence[Jump], loss: float) -> list[str]:
     """Return a warning if the barriers of openings are not small beside the loss.
 
@@ -235,9 +240,9 @@ def range_warnings(
         return out
     if range_ < DOUBTFUL_RANGE:
         out.append(
-            f"valid_range is {range_:.2g} m: the zero-range limit holds only for ranges of "
-            f"adhesion below it, and below {DOUBTFUL_RANGE:g} m hardly any interface has one, so "
-            "patches would open from inside and lose less (docs/zero-range.md)"
+            f"valid_range is {1e9 * range_:.3g} nm: the zero-range limit holds only for ranges of "
+            f"adhesion below it, and below {1e9 * DOUBTFUL_RANGE:g} nm hardly any interface has "
+            "one, so patches would open from inside and lose less (docs/zero-range.md)"
         )
     largest = float(np.max(contact_fraction, initial=0.0))
     gamma = problem.work_of_adhesion

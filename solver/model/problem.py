@@ -212,10 +212,14 @@ class Problem(ByValue):
         first = self.control.prescribed(self.profile.h_max, 0.0)
         at_touch = prescribed >= first
         where = "at first touch" if at_touch else f"before {self.describe_prescribed(prescribed)}"
-        turn = "" if at_touch else "the turning point or "
+        held, remedy = "under a load", "give a stiffness"
+        if not self.control.is_load:
+            held = f"at a stiffness of {self.control.stiffness:g} Pa/m"
+            remedy = "give a larger stiffness"
         return (
-            f"the contact runs into full contact {where}: there is no state with a gap; prescribe "
-            f"the separation or a larger stiffness, or reduce {turn}work_of_adhesion"
+            f"{held} this surface is drawn into full contact {where} (γ = "
+            f"{self.work_of_adhesion:g} J/m², E = {plain(self.half_space.young)} Pa): {remedy}, or "
+            f"prescribe the separation{'' if at_touch else ', or turn earlier'}"
         )
 
     def describe_prescribed(self, prescribed: float) -> str:

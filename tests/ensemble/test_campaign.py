@@ -168,6 +168,11 @@ def test_a_number_of_any_length_is_refused_in_one_short_sentence():
         (campaign_text().replace("h_rms = 1e-6", ""), "none of h_rms, m2 and c0"),
         (campaign_text().replace("h_rms = 1e-6", "h_rms = 1e-6\nm2 = 0.1"), "h_rms and m2"),
         ("[profile\n", "is not valid TOML"),
+        (
+            campaign_text().replace("n0 =", "n0 = 3\nn0 ="),
+            "is not valid TOML: the key n0 on line 4 is given before, so remove one of the two",
+        ),
+        ("[stop]\nmost = 3\nmost = 3", "the key most on line 3 is given before"),
         ("x = " + "[" * 5000, "is not valid TOML"),
         (campaign_text(ratio="90000", n0="2"), "n0 · ratio is 180000"),
         (campaign_text(realisations="2000000000"), "tasks: it must make at most"),

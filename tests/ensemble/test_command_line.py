@@ -163,6 +163,18 @@ def test_bad_values_are_one_sentence(name, words, sentence, folder, capsys):
     assert [path for path in after if not path.endswith(".lock")] == before
 
 
+@pytest.mark.parametrize(
+    "words", ["--seed 1 --seed=2", "--seed 1 --see 1", "--field-penetrations 0.1 --field-p 0.2 0.3"]
+)
+def test_an_option_that_is_given_twice_is_refused(words, capsys):
+    option = parser_of("loop")._get_option_tuples(words.split()[0])[0][0].option_strings[-1]
+    line = refused(capsys, ["loop", "--hurst", "0.8", *words.split()])
+    assert line.startswith(f"adhesis loop: {option} is given twice: give it once")
+    many = parser_of("run").parse(["c.toml", "--hurst", "0.7", "--hurst", "0.8"])
+    assert many.hurst == ["0.7", "0.8"]  # may be repeated
+    assert not [name for name in vars(many) if name.startswith("_")]
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_refuses_what_it_cannot_read(name, capsys):
     """An unknown option, a missing value, an empty one, and a text in place of a number."""

@@ -161,7 +161,9 @@ def test_animations_are_written_by_their_writers(loop, tmp_path, ending):
     file = tmp_path / f"loop{ending}"
     film = film_of(loop, frames=2)
     film._scenes.scenes[:] = film._scenes.scenes[4:8]  # equal frames are one in a .gif
-    film.save(file)
+    drawn = []
+    film.save(file, progress=lambda number, total: drawn.append((number, total)))
+    assert drawn == [(1, 4), (2, 4), (3, 4), (4, 4)]
     if ending == ".gif":
         with Image.open(file) as picture:
             assert picture.n_frames == 4

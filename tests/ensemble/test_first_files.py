@@ -106,7 +106,7 @@ def test_the_sample_is_what_its_program_makes_and_a_trace(
     following = re.search(r"^next        adhesis (.*)$", shown, re.MULTILINE)
     assert following is not None
     assert main([*following[1].split(), "--plan"]) == 0
-    assert "form        tilt and bow taken off" in capsys.readouterr().out
+    assert "form        tilt and bow subtracted" in capsys.readouterr().out
     assert main(["sample", "t.csv"]) == 2
     assert "FILE is t.csv, which exists" in capsys.readouterr().err
 

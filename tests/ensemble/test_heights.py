@@ -276,6 +276,10 @@ def test_the_warning_goes_to_stderr_json_and_exit_code(
     assert run("--heights", "a.csv", "--strict") == (1, reported)
     assert run("--heights", "b.csv", "--strict") == (0, "")
     assert json.loads(Path("o.json").read_text())["warnings"] == []
+    Path("few.csv").write_text("\n".join(METRES[:7]))
+    code, reported = run("--heights", "few.csv", "--strict")
+    assert code == 1
+    assert "few.csv holds 7 heights only: fewer than 8 make a profile of a few waves" in reported
 
 
 # ---------------------------------------------------------------------- material and bounds

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import re
 from math import inf
+from pathlib import Path
 
 import pytest
 
-from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.adhesions import work_of_adhesion
+from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.lengths import height, length, length_text, length_with_unit
@@ -80,7 +83,7 @@ def test_every_option_that_is_a_length_or_a_stress_takes_a_unit() -> None:
     lengths = {"--period", "--step", "--cut-off", "--tip-radius", "--longest-gap", "--layer"}
     assert options[length] == lengths | {"--adhesion-range"}
     assert options[stress] == {"--young", "--strength"}  # and --max-stress, a list
-    assert options[float] == set(NUMBERS)
+    assert options[float] == set(NUMBERS) - {"--work-of-adhesion"}
 
 
 @pytest.mark.parametrize(
@@ -112,7 +115,7 @@ def test_lengths_of_a_campaign_may_have_units() -> None:
     assert several.lists == (("profile", "h_rms", (1e-6, 2e-6)),)
 
 
-@pytest.mark.parametrize("value", ['"1"', '"1 kPa"', '"-1 mm"', '"wide"', '["1 mm", "x"]'])
+@pytest.mark.parametrize("value", ['"1"', '"-1 mm"', '"wide"', '["1 mm", "x"]'])
 def test_a_campaign_refuses_other_texts(value: str) -> None:
     with pytest.raises(InputError, match=r'period is .*: it must be .* or a length as "2 mm"'):
         parse_campaign(campaign_text(period=value))
@@ -121,8 +124,79 @@ def test_a_campaign_refuses_other_texts(value: str) -> None:
 def test_other_keys_take_no_unit() -> None:
     with pytest.raises(InputError, match="poisson is '1 mm': it must be "):
         parse_campaign(campaign_text(poisson='"1 mm"'))
-    with pytest.raises(InputError, match=r'young is .1 mm.: .* in Pa, or a stress as "20 kPa"'):
-        parse_campaign(campaign_text(young='"1 mm"'))
+    with pytest.raises(InputError, match=r'young is .wide.: .* in Pa, or a stress as "20 kPa"'):
+        parse_campaign(campaign_text(young='"wide"'))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "units"),
+    [
+        ("young", '"1 mPa"', "Pa, kPa, MPa, GPa"),
+        ("period", '"1 kPa"', "m, cm, mm, µm, nm, Å, inch"),
+        ("work_of_adhesion", '["20 kJ/m2"]', "J/m², mJ/m²"),
+    ],
+)
+def test_a_campaign_lists_the_units_where_one_is_wrong(key: str, value: str, units: str) -> None:
+    with pytest.raises(InputError, match=rf"{key} is .*: its unit must be one of {units}$"):
+        parse_campaign(campaign_text(**{key: value}))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        (
+            "period",
+            "1000",
+            "is 1000, which would be 1000 m: give its unit, as in 1000um (1000m, if",
+        ),
+        ("period", "[1e-3, 2.5]", "is 2.5, which would be 2.5 m"),
+        ("h_rms", "1", "is 1, which would be 1 m: give its unit"),
+        ("work_of_adhesion", "[0.04, 40]", "is 40, which would be 40 J/m²: give its unit, as in"),
+    ],
+)
+def test_a_campaign_file_is_asked_for_units_as_the_options_are(
+    key: str, value: str, words: str, tmp_path: Path
+) -> None:
+    """The text in a results file is not: what is computed stays readable."""
+    more = {"period": "1e4"} if key == "h_rms" else {}
+    text = campaign_text(**{key: value} | more)
+    (tmp_path / "c.toml").write_text(text)
+    with pytest.raises(InputError, match=re.escape(f"] {key} {words}") if not more else "which"):
+        load_campaign(tmp_path / "c.toml")
+    assert parse_campaign(text).tasks()
+    (tmp_path / "c.toml").write_text(
+        campaign_text(period='"1000 m"', work_of_adhesion='["40J/m2"]')
+    )
+    assert load_campaign(tmp_path / "c.toml").sweep.work_of_adhesion == (40.0,)
+
+
+# ---------------------------------------------------------------------- works of adhesion
+
+
+def test_a_work_of_adhesion_has_a_unit_or_is_in_joules() -> None:
+    assert [work_of_adhesion(text) for text in ("0.02", "20mJ/m2", "20 mJ/m²", "40J/m^2")] == [
+        *(0.02, 0.02, 0.02, 40.0)
+    ]
+    for text, sentence in (
+        ("20", "is 20, which would be 20 J/m²: give its unit, as in 20mJ/m2 (20J/m2, if J/m² are"),
+        (
+            "20mJ",
+            "is '20mJ': it must be a number in J/m² with a decimal point, as in 0.02, or with",
+        ),
+        ("0,02", "is '0,02': it must be a number in J/m² with a decimal point"),
+        ("20kJ/m2", "its unit must be one of J/m², mJ/m²"),
+    ):
+        with pytest.raises(argparse.ArgumentTypeError) as refusal:
+            work_of_adhesion(text)
+        assert sentence in str(refusal.value)
+
+
+def test_trace_asks_for_the_unit_of_a_work_of_adhesion(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["trace", "t.csv", "--young", "1e6", "--poisson", "0.5", "--plan"]
+    assert main([*words, "--work-of-adhesion", "0.04,40"]) == 2
+    assert "--work-of-adhesion is 40, which would be 40 J/m²" in capsys.readouterr().err
+    assert main([*words, "--work-of-adhesion", "20mJ"]) == 2
+    assert "--work-of-adhesion is '20mJ': it must be a number in J/m²" in capsys.readouterr().err
 
 
 # ---------------------------------------------------------------------- stresses

@@ -149,6 +149,10 @@ def test_foreign_doubled_and_damaged_parts_are_refused_and_nothing_is_written(tm
     two.write_bytes(two.read_bytes()[:5000])
     assert "damaged or truncated" in refused([one, two], out)
     assert "merged into itself" in refused([one, out], out)
+    (tmp_path / "link.h5").symlink_to(one)
+    assert "link.h5 is named twice: give each file once" in refused(
+        [one, tmp_path / "link.h5"], out
+    )
     assert "is part 1/2 of its campaign" in refused([again], one)
 
 

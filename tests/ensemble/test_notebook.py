@@ -32,6 +32,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.ensemble.loop import saved
+from adhesis.ensemble.quantities import with_error
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
@@ -164,6 +165,11 @@ def test_other_files_are_refused(tmp_path, result):
         (lambda: adhesis.load(3), TypeError, "path is 3"),
         (lambda: result.save("loop.h5"), InputError, "the name must end in .nc"),
         (lambda: result.save(3), TypeError, "path is 3"),
+        (
+            lambda: result.save("/nonexistent/x.nc"),
+            InputError,
+            "^path is /nonexistent/x.nc: there is no directory /nonexistent$",
+        ),
     ):
         with pytest.raises(error, match=message):
             call()
@@ -275,7 +281,8 @@ def test_a_trace_shows_a_bar_and_its_answer_is_shown_by_a_notebook(capsys, tmp_p
     for thing in (answer, prepared, prepared.trace):
         assert len(repr(thing)) < 200
         assert "data:image/png;base64," in thing._repr_html_()
-    assert str(answer).startswith(f"loss        {1e3 * answer.loss.value:.0f}"[:15])
+    known = with_error(1e3 * answer.loss.value, 1e3 * answer.loss.uncertainty)
+    assert str(answer).startswith(f"loss        {known} mJ/m²")
     table = answer.to_dataframe()
     assert table.loss[0] == answer.loss.value
     assert len(table) == runs

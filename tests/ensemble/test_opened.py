@@ -113,7 +113,7 @@ def test_fields_have_branch_penetration_and_position(file, results):
 
 def test_every_figure_of_the_report_has_a_method_that_returns_its_axes(results):
     figures = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
-    methods = {name for name, _ in inspect.getmembers(Plots, inspect.isfunction)}
+    methods = {method.__name__ for _, method in inspect.getmembers(Plots, inspect.isfunction)}
     assert {item.draw.__name__ for item in figures} == {
         *(m for m in methods if m[0] != "_" and m != "loss_along")
     }
@@ -121,6 +121,9 @@ def test_every_figure_of_the_report_has_a_method_that_returns_its_axes(results):
         axes = getattr(results.plot, name)()
         assert axes[0].figure.axes == axes
         assert axes[0].lines
+    axes = results.plot.loss_against_hurst()
+    assert axes[-1].get_xlabel() == "Hurst exponent $H$"
+    assert Plots.loss_against_adhesion is Plots.loss_against_hurst  # its earlier name
 
 
 def test_bad_files_are_refused(tmp_path):

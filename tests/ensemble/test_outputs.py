@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import adhesis.ensemble.command.trace as trace_command
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import check_outputs, staged_folder, whole_file, write_json
+from adhesis.ensemble.run.launch import python, python_environment
 from adhesis.solver.references.exact_wave import ExactWave
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.synthetic_results import campaign, rows, write
@@ -272,3 +274,26 @@ def test_a_report_that_cannot_be_written_leaves_the_old_one(
     assert [(path.name, path.read_text()) for path in Path("out").iterdir()] == [
         ("losses.csv", "old")
     ]
+
+
+def test_a_report_on_a_full_disk_ends_in_one_sentence(ask: Ask) -> None:
+    small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
+    write(Path("r.h5"), small, rows(small))
+    # files may not grow beyond this, which HDF5 and matplotlib meet as they meet a full disk
+    code = (
+        "import resource, sys; from adhesis.ensemble.command.main import main; "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY)); "
+        "sys.exit(main(['report', 'r.h5', '--to', 'out']))"
+    )
+    done = subprocess.run(
+        python("-c", code),
+        env=python_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 74, done.stderr
+    assert done.stderr.splitlines() == [
+        "adhesis report: the report in out could not be written (File too large)"
+    ]
+    assert list(Path("out").iterdir()) == []

@@ -17,6 +17,8 @@ from adhesis.ensemble.report.figures.catalogue import along_axes
 from adhesis.ensemble.report.figures.style import style
 from adhesis.ensemble.report.tables.works import works
 from adhesis.ensemble.report.write_report import write_report
+from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.results.status import as_text, read_status
 from tests.support.synthetic_results import campaign, rows, write
 
 TOPS = (0.5, 0.7, 0.9)
@@ -165,6 +167,19 @@ def test_figures_along_an_axis_hold_the_means_there(data):
         np.testing.assert_allclose(line.get_xdata(), TOPS, atol=0.01)
         mean = [c.estimates[name].mean / unit for c in cells]
         np.testing.assert_allclose(line.get_ydata(), mean)
+
+
+def test_the_status_has_the_units_of_the_axes(tmp_path):
+    load = 'control = "load"\nmax_stress = [100, 200]'
+    text = campaign(hurst=(0.7,), gamma=(0.04,), realisations=2).text
+    text = text.replace("young = 1e6", "young = [1e6, 2e6]").replace("max_penetration = 0.9", load)
+    plan = parse_campaign(text.replace("unloading_until = -2.0\n", ""))
+    create(tmp_path / "r.h5", plan)
+    status = read_status(tmp_path / "r.h5")
+    assert status["axis_units"]["max_stress"] == "Pa"
+    heading = as_text(status).splitlines()[-5]
+    assert "young in Pa  max_stress in Pa  " in heading
+    assert "W~ ± standard error of the mean" in heading
 
 
 def test_keys_that_vary_with_h_are_shown_at_every_h(tmp_path):

@@ -90,14 +90,17 @@ def test_a_finished_campaign_computes_nothing_again(tmp_path):
     assert out.read_bytes() == before
 
 
-def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path):
+@pytest.mark.parametrize(
+    ("number", "name"), [(signal.SIGUSR1, "SIGUSR1"), (signal.SIGINT, "Ctrl-C (SIGINT)")]
+)
+def test_a_stopped_run_says_so_and_resumes_with_the_same_bits(tmp_path, number, name):
     path, out = write_campaign(tmp_path), tmp_path / "r.h5"
     process = start("run", path, "--out", out, fake="hold=2")
     wait_until(lambda: done_rows(out) >= 2)
-    process.send_signal(signal.SIGUSR1)
+    process.send_signal(number)
     _, errors = process.communicate(timeout=150)  # the task would go on for ever
     assert process.returncode == 75
-    assert "stopped early: SIGUSR1 received" in errors
+    assert f"stopped early: {name} received" in errors
     kept = done_rows(out)
     log = tmp_path / "log"
     process, _ = run(tmp_path, fake=f"log={log}")
@@ -266,7 +269,8 @@ def refused(folder, *words, **changes):
     """Run with bad input: one sentence, exit code 2, nothing written."""
     path = write_campaign(folder, **changes)
     before = {p: p.read_bytes() for p in folder.iterdir() if p.is_file()}
-    process = adhesis_here("run", path, "--out", folder / "r.h5", *words)
+    out = () if "--out" in words else ("--out", folder / "r.h5")
+    process = adhesis_here("run", path, *out, *words)
     assert process.returncode == 2, process.stderr
     assert process.stdout == ""
     assert len(process.stderr.splitlines()) == 1, process.stderr
@@ -286,7 +290,7 @@ def test_bad_campaigns_leave_nothing_behind(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"work_of_adhesion": "[0.01, 1e25]"}, "work_of_adhesion is 1e+25 J/m²"),
+        ({"work_of_adhesion": '[0.01, "1e25 J/m2"]'}, "work_of_adhesion is 1e+25 J/m²"),
         ({"work_of_adhesion": "[1e-25, 0.01]"}, "work_of_adhesion is 1e-25 J/m²"),
         ({"young": "[1e6, 1e15]"}, "work_of_adhesion is 0.01 J/m²"),
     ],
@@ -314,7 +318,7 @@ def test_a_cell_that_is_new_is_tried_before_the_file_grows(tmp_path):
 
     run_campaign(load_campaign(write_campaign(tmp_path)), out, engine=replace(engine, check=check))
     assert tried == []
-    grown = load_campaign(write_campaign(tmp_path, work_of_adhesion="[0.01, 0.04, 1e25]"))
+    grown = load_campaign(write_campaign(tmp_path, work_of_adhesion='[0.01, 0.04, "1e25 J/m2"]'))
     with pytest.raises(InputError, match=r"cannot be computed: work_of_adhesion is 1e\+25 J/m²"):
         run_campaign(grown, out, engine=replace(engine, check=check))
     assert 1e25 in tried
@@ -328,6 +332,17 @@ def test_bad_options(tmp_path):
     assert "--max-failures is '-1'" in refused(tmp_path, "--max-failures", "-1")
     assert "no folder" in refused(tmp_path, "--out", tmp_path / "none" / "r.h5")
     assert "is a directory" in refused(tmp_path, "--out", tmp_path)
+    sentence = "the name of a new results file must end in .h5"
+    assert sentence in refused(tmp_path, "--out", tmp_path / "new.txt")
+    itself = write_campaign(tmp_path)
+    assert "the campaign file itself" in refused(tmp_path, "--out", itself)
+
+
+def test_an_existing_results_file_keeps_its_name(tmp_path):
+    path, out = write_campaign(tmp_path), tmp_path / "old.dat"
+    run(tmp_path)
+    (tmp_path / "r.h5").rename(out)
+    assert adhesis("run", path, "--out", out, fake="").returncode == 0
 
 
 def test_a_results_file_of_another_campaign(tmp_path):

@@ -36,7 +36,7 @@ from adhesis.ensemble.trace.pool import Pool
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
-from adhesis.ensemble.trace.variants import Plan, make_plan
+from adhesis.ensemble.trace.variants import Plan, Run, make_plan
 from tests.support.scenes import HALF_SPACE
 from tools.interrupted import Interrupt, interrupted
 
@@ -284,6 +284,83 @@ def test_the_page_shows_names_headers_and_warnings_as_texts(
         for shown in ("![x](y.png)`&lt;script&gt;`|.txt", "channel ![z](/etc/hostname) &lt;script"):
             assert shown in text
     assert "\x1b" not in what_was_read(answer.prepared)
+
+
+def with_losses(
+    answer: Answer, losses: dict[str, float], limits: dict[str, float], noise: float = 0.0
+) -> Answer:
+    """The answer of a plan whose loops end with these losses in J/m²."""
+    trace = dataclasses.replace(answer.prepared, cut_off=10e-6, limits=limits)
+    runs = []
+    for name in losses:
+        group = "answer" if name == "answer" else "cut-off" if "cut-off" in name else "noise"
+        runs.append(Run(name, group, ""))
+    results = {
+        name: answer.main | {"loss": loss, "range_warnings": [], "strain_warnings": [], "races": 0}
+        for name, loss in losses.items()
+    }
+    plan = dataclasses.replace(answer.plan, runs=tuple(runs))
+    return dataclasses.replace(answer, prepared=trace, plan=plan, results=results)
+
+
+def test_the_finest_cut_offs_decide_whether_short_waves_matter(spoiled_answer: Answer) -> None:
+    """A change between longer waves is no doubt of the answer's loss where finer ones agree."""
+    limits = {"step": 5e-6, "noise": 10e-6}
+    fine = {"answer": 1.0, "cut-off × 2": 0.8, "cut-off × 1.41": 0.99, "cut-off × 0.707": 1.01}
+    found = with_losses(spoiled_answer, fine, limits)
+    quantity = answers._quantity(found, "loss")
+    assert answers._warnings(found, quantity) == []
+    assert quantity.doubts["cut-off"] == pytest.approx(0.01)
+    coarse = {"answer": 1.0, "cut-off × 1.41": 0.99, "cut-off × 0.707": 1.2}
+    found = with_losses(spoiled_answer, coarse, limits)
+    (text,) = answers._warnings(found, answers._quantity(found, "loss"))
+    assert text == (
+        "the short-wave end is not converged: a shortest wave of 7.07 µm instead of 10 µm changes "
+        "the loss by +20 %; the noise of the instrument hides shorter waves: average several scans"
+    )
+    for limit, words in (("step", "a finer step would"), ("tip", "a sharper tip would")):
+        found = with_losses(spoiled_answer, coarse, {limit: 10e-6})
+        assert words in answers._warnings(found, answers._quantity(found, "loss"))[0]
+    found = with_losses(spoiled_answer, coarse, {"step": 1e-6})
+    assert "the cut-off that was given" in answers._warnings(found, found.loss)[0]
+
+
+def test_a_loss_that_is_hardly_known_names_its_largest_doubt(spoiled_answer: Answer) -> None:
+    losses = {"answer": 9.705, "cut-off × 1.41": 9.7, "noise 1": 19.4, "noise 2": 19.4}
+    found = with_losses(spoiled_answer, losses, {"step": 1e-6})
+    quantity = answers._quantity(found, "loss")
+    (text,) = answers._warnings(found, quantity)
+    assert text == (
+        "the loss is known to 200 % only, mostly for the doubt “noise” (noise of the instrument; "
+        "standard uncertainty 100 %): average several scans"
+    )
+    assert "loss        10000 ± 19000 mJ/m² (± 200 %)" in summary(
+        dataclasses.replace(found, loss=quantity)
+    )
+
+
+def test_the_summary_states_the_scope(document: dict[str, Any], folder: Path) -> None:
+    page = (folder / "trace.md").read_text(encoding="utf-8")
+    (scope,) = re.findall(r"^Scope: (.*)$", page, re.M)
+    largest = max(document["loop"]["states"]["mean_stress"])
+    assert scope.startswith("one period of parallel grooves, 950 µm wide; the mean stress ")
+    assert (f"a compression of {1e-3 * largest:.3g} kPa" in scope) == (largest > 0)
+    assert "at least 2 %" in page
+
+
+def test_unphysical_input_is_doubted_and_zero_range_comes_first() -> None:
+    trace, cycle, plan = small_plan()
+    hard = dataclasses.replace(cycle, works_of_adhesion=(30.0,))
+    plan = make_plan(trace, hard, quick=True, processes=0)
+    kept = {"answer"}
+    plan = dataclasses.replace(
+        plan,
+        runs=tuple(run for run in plan.runs if run.name in kept),
+        jobs=tuple(job for job in plan.jobs if job.name in kept),
+    )
+    found = run_plan(trace, hard, plan)
+    assert found.pull_off_stress.value > 0.3 * 1e6
+    assert any("of Young's modulus: small strain does not hold" in text for text in found.warnings)
 
 
 def test_a_process_that_is_killed_is_said_and_replaced() -> None:

@@ -16,7 +16,9 @@ import pytest
 
 from adhesis.ensemble.command.main import main
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.heights import read_heights
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from tests.support.options import replacing
 
 N, STEP = 200, 0.5e-6
 X = STEP * np.arange(N)
@@ -368,7 +370,10 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
         (["--unit", "um"], "--to is missing: give the directory for the page, or --plan"),
         (["--plan", "--unit", "um", "--columns", "x"], "--columns is 'x': it must be two whole"),
         (["--plan", "--work-of-adhesion", "1,1"], "--work-of-adhesion is '1,1': its values must"),
-        (["--plan", "--work-of-adhesion", "1;2"], "--work-of-adhesion is '1;2': it must be one"),
+        (
+            ["--plan", "--work-of-adhesion", "1;2"],
+            "--work-of-adhesion is '1;2': it must be a",
+        ),
         (["--plan", "--unit", "um", "--processes", "0"], "--processes is 0"),
         (["--plan", "--unit", "um", "--young", "-1"], "--young is -1"),
         (["--plan", "--unit", "um", "--work-of-adhesion", "-1"], "--work-of-adhesion is -1"),
@@ -379,7 +384,7 @@ def test_the_command_refuses_with_one_sentence_and_code_2(
 ) -> None:
     path = tmp_path / "t.txt"
     path.write_text("\n".join(rows(" ", ".")))
-    assert main(["trace", str(path), *CONTACT, *words]) == 2
+    assert main(["trace", str(path), *replacing(CONTACT, words)]) == 2
     error = capsys.readouterr().err
     assert reported in error
     assert len(error.splitlines()) == 1
@@ -396,3 +401,14 @@ def test_a_plan_is_said_and_nothing_is_written(
     for words in ("200 points, step 500 nm", "decimal commas", "positions in µm", "plan ", "waves"):
         assert words in said
     assert sorted(tmp_path.iterdir()) == [path]
+
+
+def test_what_cannot_be_read_names_all_that_can() -> None:
+    with pytest.raises(TypeError, match=r"source is 3: .* a path, an open file .* list .* Series"):
+        read_trace(3)  # type: ignore[arg-type]
+
+
+def test_a_foreign_line_says_what_to_do_with_it(tmp_path: Path) -> None:
+    (tmp_path / "h.csv").write_text("1\n2\n3\n4\npause\n5\n6\n7\n")
+    with pytest.raises(InputError, match="it must hold one number; remove the line or begin it"):
+        read_heights(tmp_path / "h.csv")

@@ -20,6 +20,7 @@ from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.command.campaigns import run
 from adhesis.ensemble.command.main import COMMANDS, INTERRUPTED, TERMINATED, main, parser_of
 from adhesis.ensemble.run import launch
+from tools import commands as commands_page
 from tools import transcripts
 
 ROOT = Path(__file__).parent.parent.parent
@@ -71,8 +72,6 @@ NOT_RUN = {
     ),
     "python benchmarks/trace_coverage.py --cases 20 --json out/coverage.json": "takes minutes; "
     "test_trace_answer.py runs two cases",
-    "adhesis trace trace.csv --work-of-adhesion 0.04 --young 1MPa --poisson 0.5 --stiffness 0 "
-    "--max-stress 0.5kPa --to out/preload": "as before",
     "adhesis trace long.txt --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out/long": (
         "takes minutes on a busy machine; as the trace before"
     ),
@@ -190,7 +189,7 @@ LINES = [(block, line) for block in COMMAND_BLOCKS for line in commands(block)]
 def test_every_block_is_of_a_kind_that_is_tested() -> None:
     # Directives in braces are for the site alone: `make docs` takes each warning for an error.
     kinds = {"python", "toml", "", "bash", "sh", "console", "pycon", "bibtex"}
-    kinds |= {"{include}", "{toctree}", "{raw}", "{command}"}
+    kinds |= {"{include}", "{toctree}", "{raw}", "text"}
     assert [block.name for block in BLOCKS if block.language.split(" ")[0] not in kinds] == []
     for block, line in LINES:
         word = line.split()[0]
@@ -376,10 +375,11 @@ def test_the_readme_lists_every_command() -> None:
     assert sorted(listed) == sorted(COMMANDS)
 
 
-def test_the_reference_of_commands_lists_every_command_and_no_other() -> None:
-    text = (ROOT / "docs" / "commands.md").read_text()
-    assert re.findall(r"^```{command} (\w+)$", text, re.MULTILINE) == list(COMMANDS)
+def test_the_reference_of_commands_is_that_of_the_parsers() -> None:
+    """``python -m tools.commands`` writes it anew."""
+    text = commands_page.PAGE.read_text()
     assert re.findall(r"^## adhesis (\w+)$", text, re.MULTILINE) == list(COMMANDS)
+    assert text == commands_page.page(text)
 
 
 def test_the_entries_to_cite_are_those_of_the_citation_file() -> None:

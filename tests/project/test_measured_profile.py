@@ -30,7 +30,7 @@ def test_the_script_and_the_command_give_the_same_loss(
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    (loss,) = re.findall(r"^loss +(\d+) ± \d+ mJ/m²", done.stdout, re.M)
+    (loss,) = re.findall(r"^loss +([\d.]+) ± [\d.]+ mJ/m²", done.stdout, re.M)
     assert "3 heights" in done.stdout
     assert (tmp_path / "out" / "trace.html").exists()
     trace = str(tmp_path / "out" / "trace.csv")

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent.parent
 PAGE = ROOT / "docs" / "troubleshooting.md"
 ERRORS = {
-    *("InputError", "WriteError", "RankError", "PathError", "OutputError"),
+    *("InputError", "WriteError", "RankError", "UnitError", "PathError", "OutputError"),
     *("ValueError", "TypeError", "NotImplementedError", "argparse.ArgumentTypeError"),
 }
 # Errors that are caught inside, or that a mistake of the code itself would raise.
@@ -29,9 +29,9 @@ PARTS = {"truncated", "head"}
 # Functions that make the sentences of errors and warnings.
 SENTENCES = {
     "solver/model/problem.py": ("full_contact",),
-    "solver/loading/loop_result.py": ("warnings",),
+    "solver/loading/loop_result.py": ("warnings", "strain_warnings"),
     "solver/loading/zero_range.py": ("range_warnings",),
-    "ensemble/loop/heights.py": ("_not_one_column", "closure_warning"),
+    "ensemble/loop/heights.py": ("_not_one_column", "closure_warning", "few_heights_warning"),
 }
 
 

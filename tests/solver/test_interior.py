@@ -22,6 +22,7 @@ from adhesis import (
     self_affine_profile,
     single_wave,
 )
+from adhesis.solver.loading.loop_result import strain_warnings
 from adhesis.solver.loading.zero_range import _narrowest_moved, beyond_limit
 from adhesis.solver.peaks import highest_peaks
 from adhesis.solver.references.exact_wave import ExactWave
@@ -197,8 +198,19 @@ def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
     assert loop_of(1e7).warnings == ()
     stiff = loop_of(1e11, 4)
     range_, loss = stiff.warnings
-    assert range_.startswith(f"valid_range is {stiff.valid_range:.2g} m")
+    assert range_.startswith(f"valid_range is {1e9 * stiff.valid_range:.3g} nm")
     assert "times the work of adhesion of the largest contact" in loss
+
+
+def test_strains_that_are_not_small_are_doubtful():
+    """By a tension of a third of E, or necks of a third of the period."""
+    problem = loop_of(1e7).problem
+    young, period = problem.half_space.young, problem.profile.period
+    patches, stress = np.array([1, 0]), np.array([-0.4 * young, 0.0])
+    (tension,) = strain_warnings(problem, stress, np.array([0.0, period]), patches)
+    assert "is 0.4 of Young's modulus: small strain does not hold" in tension
+    (neck,) = strain_warnings(problem, 0.5 * stress, np.array([0.5, 9.0]) * period, patches)
+    assert ", 0.5 of the period: small strain does not hold" in neck
 
 
 def test_either_reason_makes_a_loss_doubtful():

@@ -27,12 +27,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Merge; returns 0."""
+    from adhesis.ensemble.results.layout import check_new_file
     from adhesis.ensemble.results.merge import merge
     from adhesis.ensemble.run.lock import RunLock
+    from adhesis.solver.checks import counted
 
     out = Path(args.out)
     if not out.parent.is_dir():
         raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
+    if not out.exists():
+        check_new_file("--out", out)
     try:
         with RunLock(out) as lock:
             lock.acquire(1, 10.0)
@@ -44,7 +48,7 @@ def execute(args: argparse.Namespace) -> int:
         print(f"adhesis merge: {doubt}", file=sys.stderr)
     failed = f", {merged.failed} failed" if merged.failed else ""
     print(
-        f"{out}: {merged.taken} rows taken over from {len(args.parts)} files; "
+        f"{out}: {merged.taken} rows taken over from {counted(len(args.parts), 'file')}; "
         f"{merged.done} of {merged.total} tasks done{failed}"
     )
     return 0

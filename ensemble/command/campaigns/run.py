@@ -138,15 +138,14 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
     """Start ranks and wait for them; None if this process is to compute alone."""
     from adhesis.ensemble.run import launch
     from adhesis.ensemble.run.ranks import launched
+    from adhesis.solver.checks import counted
 
-    ranks = int(_number("--ranks", args.ranks, whole=True))
-    if ranks < 1:
-        raise InputError(f"--ranks is {args.ranks!r}: it must be a whole number of at least 1")
+    ranks = int(_number("--ranks", args.ranks, whole=True, least=1))
     most = launch.largest_number_of_ranks()
     if ranks > most:
         raise InputError(
-            f"--ranks is {args.ranks!r}: at most {most} are started here, on {launch.cores()} "
-            "cores; more ranks than cores compute no faster"
+            f"--ranks is {args.ranks!r}: at most {most} are started here, on "
+            f"{counted(launch.cores(), 'core')}; more ranks than cores compute no faster"
         )
     if launched()[0] > 1:
         raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
@@ -193,6 +192,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
     path = Path(args.out or f"{Path(args.campaign).stem}.h5")
+    together(comm, lambda: _check_out(args, path))
     if args.dry_run:
         alone = comm is None or comm.rank == 0
         return _tell_price(campaign, path, args, engine) if alone else DONE
@@ -226,6 +226,16 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     if comm is None or comm.rank == 0:
         _report_end(campaign, path, summary, say)
     return _code(summary, options)
+
+
+def _check_out(args: argparse.Namespace, path: Path) -> None:
+    """Refuse the campaign file itself, and a new results file that does not end in .h5."""
+    from adhesis.ensemble.results.layout import check_new_file
+
+    if not path.exists():
+        check_new_file("--out", path)
+    elif path.samefile(args.campaign):
+        raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
 def _report_end(
@@ -324,13 +334,14 @@ def _selection(args: argparse.Namespace) -> Any:
     return Selection(args.redo, hurst, gamma, realisation)
 
 
-def _number(option: str, text: str, *, whole: bool = False) -> float:
+def _number(option: str, text: str, *, whole: bool = False, least: int = 0) -> float:
     """Return the number that is given for an option."""
     try:
         value = int(text) if whole else float(text)
     except ValueError:
         value = -1
-    if not 0 <= value < 2**31:
+    if not least <= value < 2**31:
         kind = "whole number" if whole else "number"
-        raise InputError(f"{option} is {text!r}: it must be a {kind} that is not negative")
+        rule = f"of at least {least}" if least else "that is not negative"
+        raise InputError(f"{option} is {text!r}: it must be a {kind} {rule}")
     return value

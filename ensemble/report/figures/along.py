@@ -1,4 +1,4 @@
-"""Loss, and for turning points pull-off and contact too, along a further axis of the campaign."""
+"""Loss, and for turning points tension and contact too, along a further axis of the campaign."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ _LOG_FROM = 20  # an axis that spans more is logarithmic
 
 _LOSS = ("loss_dimensionless", r"loss $\tilde W$", 1.0)
 _OF_TURNING_POINT = (
-    ("pull_off_stress", "pull-off stress (kPa)", 1e3),
-    ("pull_off_penetration", r"pull-off at $\Delta/h_\mathrm{max}$", 1.0),
+    ("pull_off_stress", "largest tension (kPa)", 1e3),
+    ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0),
     ("largest_contact_fraction", "contact fraction $A/A_0$", 1.0),
     ("loss_per_contact", "loss per contact (mJ/m²)", 1e-3),
 )
@@ -79,7 +79,8 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
                 aside = (order - (len(gammas) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
                 found = [cell.estimates[name] for cell in line]
-                errorbar(axes, x, found, k, gamma_label(gamma), unit=unit)
+                above = name != "pull_off_penetration"
+                errorbar(axes, x, found, k, gamma_label(gamma), unit=unit, from_zero=above)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
@@ -101,7 +102,7 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
 def _lines(
     data: Aggregate, axis: Axis
 ) -> tuple[list[tuple[str, float]], dict[tuple[float, float], list[Cell]]]:
-    """What is the same on the other further axes as in all other figures, and the cells there."""
+    """Return the values on the other further axes that all figures share, and the cells there."""
     moving = together(data, axis)
 
     def at(cell: Cell) -> list[tuple[str, float]]:

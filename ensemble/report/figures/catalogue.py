@@ -71,19 +71,20 @@ LOOPS = (
         "Fig. 7",
     ),
 )
+_BELOW = "A caret at 0 marks an interval that goes on below."
 LOSSES = (
     Illustration(
         "table1_losses",
         "Loss of each H and work of adhesion",
-        "Means with 95 % intervals, a panel for each γ.",
-        loss_figures.loss_against_adhesion,
+        f"Means with 95 % intervals, a panel for each γ. {_BELOW}",
+        loss_figures.loss_against_hurst,
         "Table 1",
         lambda data: "Stars: the paper's values, which have no error.",
     ),
     Illustration(
         "loss_against_m2",
         "Loss against mean square slope",
-        "Means with 95 % intervals, a panel for each γ, a point for each H.",
+        f"Means with 95 % intervals, a panel for each γ, a point for each H. {_BELOW}",
         loss_figures.loss_against_slope,
         beside_paper=lambda data: "Stars: the paper's values, at the m2 that it quotes.",
     ),
@@ -160,7 +161,7 @@ MECHANISMS = (
         "Loss by mechanism",
         "Sum of the energy drops of one loop. Small scale: edges run inside existing patches; "
         "large scale: patches appear, merge, split, vanish or pull off. Figures above the bars: "
-        "share of the small scale. Error bars: 95 % interval of the mean of either part.",
+        f"share of the small scale. Error bars: 95 % interval of the mean of either part. {_BELOW}",
         loss_figures.loss_by_mechanism,
     ),
     Illustration(

@@ -30,6 +30,7 @@ from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
 _MARKERS_PER_CURVE = 8
+_INTERVALS, _FINE = 60, 50  # of a band, and places between two points that are sorted into them
 _STRETCHED = "0.955"  # ground where an axis is stretched
 
 
@@ -44,14 +45,8 @@ def contact_against_stress(data: Aggregate) -> Figure:
                 stress = cell.curves[f"{branch}_mean_stress_over_slope"].mean
                 area = cell.curves[f"{branch}_contact_fraction"]
                 if cell.done > 1:
-                    axes.fill_between(
-                        stress,
-                        np.maximum(area.mean - area.std, 0),
-                        area.mean + area.std,
-                        color=look(k).colour,
-                        alpha=0.13,
-                        linewidth=0,
-                    )
+                    for band in _bands(stress, area.mean - area.std, area.mean + area.std):
+                        axes.fill_between(*band, color=look(k).colour, alpha=0.13, linewidth=0)
                 axes.plot(
                     stress,
                     area.mean,
@@ -67,6 +62,34 @@ def contact_against_stress(data: Aggregate) -> Figure:
     column[-1].set_xlabel(r"mean stress $\tilde\sigma/\sqrt{m_2}$")
     _legend(data, figure, 3)
     return figure
+
+
+def _bands(x: Array, low: Array, high: Array) -> list[tuple[Array, Array, Array]]:
+    """Return x, lower and upper end of the shading of a curve, before and after its least x.
+
+    The mean stress runs back and forth by small steps, where a band from point to point would cross
+    itself: it is the envelope in narrow intervals of x.
+    """
+    turn = int(np.argmin(x))
+    return [
+        _envelope(x[part], low[part], high[part])
+        for part in (slice(0, turn + 1), slice(turn, x.size))
+        if np.ptp(x[part]) > 0
+    ]
+
+
+def _envelope(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
+    places = np.arange(x.size)
+    fine = np.linspace(0, x.size - 1, _FINE * x.size)
+    x, low, high = (np.interp(fine, places, values) for values in (x, low, high))
+    edges = np.linspace(x.min(), x.max(), _INTERVALS + 1)
+    inside = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _INTERVALS - 1)
+    lower, upper = np.full(_INTERVALS, np.inf), np.full(_INTERVALS, -np.inf)
+    np.minimum.at(lower, inside, low)
+    np.maximum.at(upper, inside, high)
+    crossed = np.isfinite(lower)
+    middle = (edges[1:] + edges[:-1]) / 2
+    return middle[crossed], np.maximum(lower[crossed], 0), upper[crossed]
 
 
 def loop_against_penetration(data: Aggregate) -> Figure:

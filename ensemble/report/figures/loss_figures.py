@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.markers import CARETDOWN
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
@@ -49,7 +50,7 @@ _STAR: Any = {
 }
 
 
-def loss_against_adhesion(data: Aggregate) -> Figure:
+def loss_against_hurst(data: Aggregate) -> Figure:
     """Table 1 as a figure: W~ of each H with intervals, a panel for each γ, the paper's beside."""
     shown = shown_gammas(data)
     columns = min(len(shown), _MOST_BESIDE)
@@ -240,6 +241,7 @@ def loss_by_mechanism(data: Aggregate) -> Figure:
             elinewidth=0.8,
             label="_",
         )
+        mark_below_zero(axes, (place + aside)[bottom + low < 0], "black")
         bottom = bottom + mean
     above = 1e3 * np.nan_to_num([found.high - found.mean for found in small])
     reach = np.fmax(bottom + above, 1e3 * np.array([found.high for found in large]))
@@ -336,7 +338,7 @@ def pull_off(data: Aggregate) -> Figure:
             unit=1e3,
         )
     axes.set_xlabel(r"work of adhesion $\gamma$ (J/m²)")
-    axes.set_ylabel("pull-off stress (kPa)")
+    axes.set_ylabel("largest tension (kPa)")
     axes.set_ylim(bottom=0)
     legend_above(figure, axes.get_legend_handles_labels()[0], 3)
     _second_scale(axes, data)
@@ -360,7 +362,7 @@ def _second_scale(axes: Axes, data: Aggregate) -> None:
 
 
 def _apart(data: Aggregate, k: int, count: int) -> float:
-    """How far the k-th curve over γ is moved aside, so that intervals can be distinguished."""
+    """Return the offset of the k-th curve over γ, so that intervals can be distinguished."""
     return (k - (count - 1) / 2) * 0.01 * max(data.works_of_adhesion)
 
 
@@ -387,8 +389,13 @@ def errorbar(
     label: str,
     offset: float = 0.0,
     unit: float = 1.0,
+    *,
+    from_zero: bool = True,
 ) -> None:
-    """Draw means with their intervals, in multiples of a unit; joined if they are many."""
+    """Draw means with their intervals, in multiples of a unit; joined if they are many.
+
+    Where the panel begins at 0, a mark there shows which intervals go on below.
+    """
     mean = np.array([estimate.mean for estimate in found]) / unit
     low = np.array([estimate.low for estimate in found]) / unit
     high = np.array([estimate.high for estimate in found]) / unit
@@ -401,3 +408,12 @@ def errorbar(
         linestyle=LINES[k] if x.size >= _FEWEST_FOR_A_LINE else "none",
         label=label,
     )
+    if from_zero:
+        mark_below_zero(axes, (x + offset)[low < 0], look(k).colour)
+
+
+def mark_below_zero(axes: Axes, x: np.ndarray, colour: str) -> None:
+    """Mark at 0, where a panel begins, that intervals at these places go on below."""
+    if x.size:
+        options: dict[str, Any] = {"clip_on": False, "zorder": 6, "label": "_", "markersize": 5}
+        axes.plot(x, 0 * x, color=colour, marker=CARETDOWN, linestyle="none", **options)

@@ -5,6 +5,7 @@ Each shows the (H, γ) and the Δ/h_max of the paper's figure where the campaign
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
@@ -40,6 +42,8 @@ from adhesis.solver.method import BRANCHES
 from adhesis.solver.model.profile import Array
 
 _LEAST_DENSITY = 1e-6
+# Shapes on fewer nodes are interpolated, with so many nodes beyond the ends of a part.
+_FEWEST_NODES, _BEYOND = 1000, 4
 # Colour of a branch where both are drawn over the rigid profile.
 _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 
@@ -288,24 +292,42 @@ def _draw_shape(
     part: NDArray[np.intp],
 ) -> None:
     """Draw the nodes ``part``, counted on beyond the period where they exceed it."""
-    nodes = position.size
-    x = 1e3 * part * (position[1] - position[0])
-    part = part % nodes
-    rigid = 1e6 * (shape.height[part] - separation)
+    factor = -(-_FEWEST_NODES // position.size)
+    x = 1e3 * _between(part, factor) * (position[1] - position[0])
+    rigid = 1e6 * (_refined(CubicSpline, shape.height, part, factor) - separation)
     axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
     axes.plot(x, rigid, color="0.4", linewidth=0.5, label="rigid")
     for b, branch in enumerate(BRANCHES):
-        surface = 1e6 * shape.displacement[b, k][part]
-        if np.all(np.isfinite(surface)):
+        gap = shape.displacement[b, k] - (shape.height - separation)
+        if np.all(np.isfinite(gap)):
+            # monotone between nodes: contact stays contact, and nothing overlaps
             axes.plot(
                 x,
-                surface,
+                rigid + 1e6 * _refined(PchipInterpolator, gap, part, factor),
                 color=_COLOUR_OF_BRANCH[branch],
                 linestyle=LINE_OF_BRANCH[branch],
                 linewidth=0.9,
                 label=branch,
             )
     axes.set_xlim(x[0], x[-1])
+
+
+def _between(part: NDArray[np.intp], factor: int) -> Array:
+    """Return ``factor`` places for each node of a part, in units of the spacing."""
+    return np.linspace(part[0], part[-1], factor * (part.size - 1) + 1)
+
+
+def _refined(
+    interpolator: Callable[[Array, Array], Callable[[Array], Array]],
+    values: Array,
+    part: NDArray[np.intp],
+    factor: int,
+) -> Array:
+    """Interpolate periodic values to :func:`_between`, where few nodes would show as a polygon."""
+    if factor == 1:
+        return np.asarray(values[part % values.size])
+    wide = np.arange(part[0] - _BEYOND, part[-1] + _BEYOND + 1)
+    return interpolator(wide.astype(float), values[wide % values.size])(_between(part, factor))
 
 
 def _window(cell: Cell, shape: DeformedShape) -> NDArray[np.intp]:

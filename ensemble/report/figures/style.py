@@ -1,4 +1,4 @@
-"""What all figures share: sizes, the look of each γ and branch, how a figure is saved.
+"""Set what all figures share: sizes, the look of each γ and branch, and saving.
 
 Figures are built on ``matplotlib.figure.Figure`` itself: no pyplot, no global backend, no window.
 Every γ differs by colour (Okabe & Ito), marker and darkness, every branch by line style, so that a

@@ -7,14 +7,14 @@ from collections.abc import Iterable
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.quantities import AXIS_UNITS
 from adhesis.ensemble.report.tables.table import KEY, TableColumn, Value
 
-_UNITS = {"1": "", "m": "m", "m2": "m²", "Pa": "Pa", "Pa m-1": "Pa/m"}
 _CSV_UNITS = {"1": "", "m": " [m]", "m2": " [m^2]", "Pa": " [Pa]", "Pa m-1": " [Pa/m]"}
 
 
 def key_columns(data: Aggregate) -> tuple[TableColumn, ...]:
-    """What a row is about: H, γ, and every further axis."""
+    """Return the columns of what a row is about: H, γ, and every further axis."""
     return (*KEY, *axis_columns(data.further))
 
 
@@ -23,12 +23,12 @@ def axis_columns(axes: Iterable[Axis]) -> tuple[TableColumn, ...]:
     return tuple(
         TableColumn(
             f"{axis.name}{_CSV_UNITS[axis.unit]}",
-            f"{axis.name} ({_UNITS[axis.unit]})" if _UNITS[axis.unit] else axis.name,
+            axis.name if axis.unit == "1" else f"{axis.name} ({AXIS_UNITS[axis.unit]})",
         )
         for axis in axes
     )
 
 
 def key(cell: Cell) -> list[Value]:
-    """Where a cell stands on the axes, under :func:`key_columns`."""
+    """Return the place of a cell on the axes, under :func:`key_columns`."""
     return [cell.hurst, cell.work_of_adhesion, *(value for _, value in cell.others)]

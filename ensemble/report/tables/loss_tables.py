@@ -83,11 +83,11 @@ def losses(data: Aggregate) -> Table:
         TableColumn("wall_time_mean [s]"),
     )
     rows = [_loss_row(data, cell) for cell in data.cells]
-    return make_table("Loss of one loop (Table 1)", columns, rows)
+    return make_table("Loss of one loop", columns, rows)
 
 
 def precision(data: Aggregate) -> Table:
-    """How well the quantity of ``[stop]`` is known in each cell; no rows without ``[stop]``."""
+    """Tabulate the precision of the quantity of ``[stop]``; no rows without ``[stop]``."""
     columns = (
         *key_columns(data),
         TableColumn("n", "n"),
@@ -264,7 +264,7 @@ def _five(estimate: Estimate) -> list[float]:
 
 
 def paired(data: Aggregate) -> Table:
-    """How the loss grows from one γ to the next on the same profiles."""
+    """Tabulate the growth of the loss from one γ to the next on the same profiles."""
     columns = (
         TableColumn("hurst", "H"),
         *axis_columns(data.further),

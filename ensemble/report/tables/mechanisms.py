@@ -67,16 +67,20 @@ def shares_by_kind(data: Aggregate) -> Table:
 
 
 def mechanisms(data: Aggregate) -> Table:
-    """Loss by mechanism and pull-off, one row for each cell."""
+    """Loss by mechanism, largest tension and loss of contact, one row for each cell.
+
+    The largest tension of a loop is reached before the last contact is lost, at another
+    penetration.
+    """
     columns = (
         *key_columns(data),
         TableColumn("small_scale_share", "small-scale share", percent),
         TableColumn("small_scale_share_ci_low", "95 % from", percent),
         TableColumn("small_scale_share_ci_high", "to", percent),
         TableColumn("jumps_per_loop", "jumps a loop", number(3)),
-        TableColumn("pull_off_stress [Pa]", "pull-off (kPa)", number(3, unit=1e3)),
+        TableColumn("pull_off_stress [Pa]", "largest tension (kPa)", number(3, unit=1e3)),
         TableColumn("pull_off_stress_sem [Pa]", "s.e. (kPa)", number(2, unit=1e3)),
-        TableColumn("pull_off_penetration", "at Δ/h_max", number(3)),
+        TableColumn("pull_off_penetration", "last contact lost at Δ/h_max", number(3)),
         TableColumn("wall_time [s]", "s a loop", plain),
     )
     rows: list[list[Value]] = []

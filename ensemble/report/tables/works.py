@@ -16,7 +16,7 @@ def works(data: Aggregate) -> Table:
         *key_columns(data),
         TableColumn("n", "n"),
         TableColumn("work_gained_mean [J/m^2]", "gained on approach (mJ/m²)", number(unit=1e-3)),
-        TableColumn("work_spent_mean [J/m^2]", "spent on separation", number(unit=1e-3)),
+        TableColumn("work_spent_mean [J/m^2]", "spent on separation (mJ/m²)", number(unit=1e-3)),
         TableColumn("largest_contact_fraction_mean", "largest A/A0", number()),
         TableColumn("largest_contact_fraction_ci_low"),
         TableColumn("largest_contact_fraction_ci_high"),
@@ -24,7 +24,7 @@ def works(data: Aggregate) -> Table:
             column
             for name, title in zip(
                 _PER_CONTACT,
-                ("per contact: approach (mJ/m²)", "separation", "loss"),
+                ("per contact: approach (mJ/m²)", "separation (mJ/m²)", "loss (mJ/m²)"),
                 strict=True,
             )
             for column in (
@@ -33,7 +33,7 @@ def works(data: Aggregate) -> Table:
                 TableColumn(f"{name}_ci_high [J/m^2]"),
             )
         ),
-        TableColumn("full_contact_energy_mean [J/m^2]", "full contact", number(unit=1e-3)),
+        TableColumn("full_contact_energy_mean [J/m^2]", "full contact (mJ/m²)", number(unit=1e-3)),
     )
     return make_table("Work of approach and separation", columns, [_row(c) for c in data.cells])
 

@@ -1,4 +1,4 @@
-"""What measurements are read from: a file, or the content of a stream.
+"""Open sources of measurements: a file, or the content of a stream.
 
 Files that have to be unpacked or exported first are refused: archives, workbooks, pictures.
 """
@@ -139,8 +139,14 @@ def source_of(given: Any) -> Source:
     TypeError
         If it is neither.
     """
-    if not hasattr(given, "read"):
+    if isinstance(given, str | os.PathLike):
         return Source(str(checks.path("source", given)))
+    if not hasattr(given, "read"):
+        raise TypeError(
+            f"source is {checks.shown(given)}: it must be a path, an open file or other stream, an "
+            "array or list of heights (or of positions and heights), or a pandas DataFrame or "
+            "Series"
+        )
     content = given.read()
     name = getattr(given, "name", None)
     return Source(

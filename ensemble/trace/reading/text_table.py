@@ -62,7 +62,7 @@ class Table:
 
     @property
     def form(self) -> str:
-        """How the numbers are written, in words."""
+        """Description of how the numbers are written."""
         count = len(self.columns)
         form = "one column" if count == 1 else f"{count} columns, {DELIMITERS[self.delimiter]}"
         return form + (", decimal commas" if self.decimal == "," else "")
@@ -330,9 +330,10 @@ def _rows(
             foreign = place if foreign is None else foreign
             continue
         if foreign is not None:
+            held = "one number" if count == 1 else f"{count} numbers"
             raise InputError(
-                f"line {foreign + 1} of {source} is {_quoted(lines[foreign])}: within the "
-                f"numbers every line must hold {count} of them"
+                f"line {foreign + 1} of {source} is {_quoted(lines[foreign])}: it must hold "
+                f"{held}; remove the line or begin it with #"
             )
         rows.append([float("nan") if v is None else v for v in values])
         places.append(place + 1)

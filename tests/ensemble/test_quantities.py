@@ -1,0 +1,32 @@
+"""Numbers with units and errors, as commands print them."""
+
+from __future__ import annotations
+
+from math import inf, nan
+
+import pytest
+
+from adhesis.ensemble.quantities import bytes_text, with_error
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (9705.0, 19317.0, "10000 ± 19000"),
+        (9705.0, 612.0, "9700 ± 600"),
+        (35.12, 4.2, "35 ± 4"),
+        (0.03512, 0.00123, "0.0351 ± 0.0012"),
+        (0.5144, 0.112, "0.51 ± 0.11"),
+        (-3.0, 0.96, "-3.0 ± 1.0"),
+        (4.0, 1e-12, "4 ± 1e-12"),
+        (4.0, 0.0, "4 ± 0"),
+        (4.0, inf, "4 ± inf"),
+        (4.0, nan, "4 ± nan"),
+    ],
+)
+def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: str) -> None:
+    assert with_error(value, error) == text
+
+
+def test_a_small_size_is_not_zero() -> None:
+    assert [bytes_text(size) for size in (0, 345_678, 12_345_678)] == ["0 kB", "346 kB", "12 MB"]
