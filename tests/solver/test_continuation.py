@@ -6,6 +6,7 @@ a = a0 + slope·d without a fold; no elastic field is solved.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, cast
@@ -163,6 +164,26 @@ def test_edges_that_a_jump_hardly_moves_go_on_as_before_it():
     )
     motion = np.array([1.0, -1.0]) * after.rate.reshape(-1, 2) * 0.2
     assert after.gaps - previous.gaps == pytest.approx(motion, abs=1e-12)
+
+
+def test_a_second_fold_is_that_of_other_gaps():
+    """Gaps 0 and 3 go as sqrt(d - d_fold), each with its own; gap 1, beside the first, with it."""
+    folds = np.array([0.200, 0.200, -np.inf, 0.195, -np.inf])
+
+    def gaps(at: float) -> Any:
+        half = 0.2 + 0.01 * np.sqrt(np.where(folds > 0, at - folds, at + 1))
+        return np.arange(0.6, 6.0, 1.2)[:, None] + half[:, None] * np.array([-1.0, 1.0])
+
+    def rate(at: float) -> Any:
+        slope = 0.005 / np.sqrt(np.where(folds > 0, at - folds, at + 1))
+        return np.repeat(-slope, 2)
+
+    here, before = 0.21, 0.22
+    point = _point_of(gaps(here), here, rate(here))
+    ahead = Predictor(point.with_previous(PreviousPoint(before, rate(before), gaps(before))))
+    assert ahead.fold_distance == pytest.approx(0.01, rel=0.05)
+    assert ahead.other_fold_distance() == pytest.approx(0.015, rel=0.05)
+    assert math.isinf(Predictor(point).other_fold_distance())
 
 
 def test_nothing_is_carried_across_a_jump_that_moved_the_fastest_edge():

@@ -276,3 +276,23 @@ def test_a_coarse_grid_tells_what_it_misses_on_equal_crests():
         reported = grid.loss_error / grid.loss
         assert abs(grid.loss_dimensionless / exact - 1) < reported < 0.5
         assert any("numerical error of the loss" in text for text in grid.warnings)
+
+
+def test_two_folds_within_one_step_are_taken_one_after_the_other():
+    """They are 4e-6 h_max apart, and the second does not come once the other was taken first."""
+    profile = self_affine_profile(
+        0.833, period=2e-3, n0=10, ratio=79, seed=136711, amplitudes="rayleigh", h_rms=1e-6
+    )
+    half_space = HalfSpace(young=1e6, poisson=0.5)
+    gamma = 0.4953283928122993 * half_space.modulus * 1e-12 * profile.q0 * 10
+    problem = Problem(profile, half_space, gamma)
+    kinds = []
+    for accuracy in (1e-3, 3e-4):
+        method = SharpMethod(problem, accuracy=accuracy)
+        state, jumps = method.detached(profile.h_max), []
+        for penetration in np.linspace(0.0, 0.884879261502729, 18):
+            path = method.follow(state, profile.h_max * (1 - penetration))
+            state = path.states[-1]
+            jumps += [jump.kind for jump in path.jumps]
+        kinds.append(jumps)
+    assert kinds[0] == kinds[1]

@@ -120,6 +120,16 @@ class Branch:
         fold, beyond = (predictor.point.at + math.copysign(x, way) for x in distances)
         return fold, beyond
 
+    def resolve_folds(self, fold: Fold) -> bool:
+        """Locate a fold more finely if its step crosses a second one; return whether it does."""
+        first, second = self._predictor.fold_distance, self._predictor.other_fold_distance()
+        finest = self._resolution.finest
+        if not first < second < abs(fold.at - fold.point.at) or self.steps.finest <= finest:
+            return False
+        between = min(0.5 * (second - first), 0.5 * self.steps.finest)
+        self.steps.refine(max(between, finest))
+        return True
+
     def after_jump(self, jump: ComputedJump) -> Point | None:
         """Return the point after a jump with one before it, from edges that hardly moved in it.
 

@@ -154,6 +154,8 @@ class Follower:
         jump = self._nucleation_jump(branch, target)
         if jump is not None:
             return jump
+        if branch.resolve_folds(fold):
+            return None
         touched = self._touch_before_fold(fold)
         if touched is not None:
             ahead, _ = branch.fold_ahead

@@ -58,6 +58,17 @@ class Predictor:
         )
         self.fastest, self.fold_distance = leading.fastest, leading.fold_distance
 
+    def other_fold_distance(self) -> float:
+        """Distance in d of the nearest fold in which other gaps lead; inf if none is seen."""
+        if math.isinf(self.fold_distance):
+            return math.inf
+        point, earlier = self.point, self._earlier
+        return float(
+            other_fold(
+                point.gaps, point.rate, earlier.gaps, earlier.rate, self.way, self._leading.edge
+            )
+        )
+
     def gaps(self, at: float) -> Array:
         """Gaps that are expected at d = ``at``."""
         point = self.point
@@ -138,6 +149,20 @@ def leading_edge(
             if other.fold_distance < leading.fold_distance:
                 leading = other
     return leading
+
+
+@compiled
+def other_fold(
+    gaps: Array, rate: Array, gaps_before: Array, rate_before: Array, way: float, leading: int
+) -> float:
+    """Find the nearest fold ahead that other gaps lead than the leading edge's and those beside."""
+    fastest, count, nearest = np.abs(rate).max(), gaps.shape[0], np.inf
+    for edge in range(rate.shape[0]):
+        apart = abs(edge // 2 - leading // 2)
+        if min(apart, count - apart) > 1 and abs(rate[edge]) > LEADING_SHARE * fastest:
+            other = _follow_edge(edge, gaps, rate, gaps_before, rate_before, way)
+            nearest = min(nearest, other.fold_distance)
+    return nearest
 
 
 @compiled
