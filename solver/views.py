@@ -99,7 +99,7 @@ class ResultViews(NotebookDisplay):
         >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
         >>> loop = run_loop(make_method("sharp", problem), max_penetration=0.5, load_steps=4)
         >>> loop.film(frames=6)
-        <Film: 9 frames, 2 jumps>
+        <Film: 10 frames, 2 jumps>
         """
         return maker().film(self, path, frames=frames, progress=progress)
 
