@@ -21,19 +21,18 @@ def carry_previous(earlier: PreviousPoint, before: Point, after: Point, near: fl
     branch from ``earlier`` to ``before`` the jump; the others move straight. If the fastest edge is
     one that the jump moved, the point is returned as it is: nothing is known of the branch then.
     """
+    k, side = divmod(int(np.argmax(np.abs(after.rate))), 2)
+    if np.abs(before.gaps[:, side] - after.gaps[k, side]).min() >= near:
+        return after
     way = before.at - earlier.at
     rate = after.rate.reshape(-1, 2).copy()
     motion = outward(after.gaps).reshape(-1, 2) * rate * way
-    unmoved = np.zeros(rate.shape, dtype=bool)
     known_motion, known_rate = before.gaps - earlier.gaps, earlier.rate.reshape(-1, 2)
     for side in range(2):
         nearest = _nearest(before.gaps[:, side], after.gaps[:, side])
         kept = np.abs(before.gaps[nearest, side] - after.gaps[:, side]) < near
         motion[kept, side] = known_motion[nearest[kept], side]
         rate[kept, side] = known_rate[nearest[kept], side]
-        unmoved[:, side] = kept
-    if not unmoved.ravel()[np.argmax(np.abs(after.rate))]:
-        return after
     return after.with_previous(PreviousPoint(after.at - way, rate.ravel(), after.gaps - motion))
 
 
