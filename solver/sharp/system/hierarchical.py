@@ -156,9 +156,9 @@ class HierarchicalSystem(EdgeSystem):
         equal_speeds: bool,
         start: KnownState | None = None,
     ) -> Descent:
-        """Descend in windows, one after the other; the track is not known.
+        """Descend in windows, one after the other; of the track only the first rest is known.
 
-        The first one is opened on a ``start``, and tells whether the track is met.
+        The first window is opened on the ``start``, if there is one.
         """
         problem, count = self._problem, self._problem.count
         track.is_complete = False
