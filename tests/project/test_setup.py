@@ -132,7 +132,7 @@ def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
     stamp = Path(sys.prefix, "adhesis-setup")
     # Through a link to the .venv of another checkout it would be set up for this one.
     if not stamp.exists() or Path(sys.prefix).resolve().parent != ROOT:
-        pytest.skip("these tests do not run in the .venv that tools/setup.sh made")
+        pytest.skip("these tests do not run in a .venv that tools/setup.sh made for this checkout")
     before = stamp.stat().st_mtime_ns
     env = {k: v for k, v in os.environ.items() if k not in ("VIRTUAL_ENV", "PYTHONHOME")}
     done = subprocess.run(
