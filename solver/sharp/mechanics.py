@@ -69,11 +69,6 @@ class EdgeMechanics(EdgeProblem):
             return self._systems[1].field_on_demand(gaps, prescribed, pressure, separation)
         return self.field(gaps, prescribed)
 
-    def finer_openings(self, field: GapField) -> Array:
-        """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
-        self.count.fields += 1
-        return self.system(field.gaps).finer_openings(field)
-
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂n_f between some edges, n outward, the others held, shape (edges, edges).
 

@@ -70,12 +70,12 @@ def test_the_error_covers_a_loop_whose_loss_one_fold_makes(seed, number, max_str
 def test_a_fold_moves_with_the_openings_of_its_edges(control, turning_point, monkeypatch):
     """A work of adhesion that is 0.02 % larger acts as openings that are 0.01 % smaller."""
     share = 1e-4
-    folds: list[Point] = []
+    folds = []
     displacement = Point.fold_displacement
 
-    def noted(point, change):
-        folds.append(point)
-        return displacement(point, change)
+    def noted(point, change, by_prescribed):
+        folds.append((point, by_prescribed))
+        return displacement(point, change, by_prescribed)
 
     monkeypatch.setattr(Point, "fold_displacement", noted)
     for larger in (1.0, (1 + share) ** 2):
@@ -84,8 +84,8 @@ def test_a_fold_moves_with_the_openings_of_its_edges(control, turning_point, mon
         run_loop(method, **turning_point, load_steps=2)
     count = len(folds) // 2
     assert count == (1 if control.is_load else 2)
-    for before, after in zip(folds[:count], folds[count:], strict=True):
-        expected = displacement(before, -share * before.field.opening)
+    for (before, by_prescribed), (after, _) in zip(folds[:count], folds[count:], strict=True):
+        expected = displacement(before, -share * before.field.opening.ravel(), by_prescribed)
         assert after.at - before.at == pytest.approx(expected, rel=0.02)
 
 

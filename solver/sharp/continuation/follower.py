@@ -276,7 +276,8 @@ class Follower:
         low = self.nucleation.minimum(point.field)[0]
         way = abs(fold.at - point.at)
         if not self.edges.is_fixed:
-            way *= max(1.0, abs(point.field.separation_by_prescribed))
+            response = self.edges.system(point.gaps).response_before_fold(point)
+            way *= max(1.0, abs(response.separation))
         if low > self.closing.rate_at_fixed_edges(point) * way:
             return None
         return self.nucleation.locate_touch_at_fixed_edges(point, low, fold.at)
@@ -295,7 +296,9 @@ class Follower:
         if last is None or last.internal.gaps is not point.field.gaps:
             last = self.states.of_point(point)
             states = (last,)
-        before = self.states.at_fixed_edges(last, point.field, fold.at)
+        system = self.edges.system(point.gaps)
+        response = system.response_before_fold(point)
+        before = self.states.at_fixed_edges(last, point.field, response, fold.at)
         jump = self.jumps.compute(before, point.field.gaps, fold.at, target.branch, known=point)
         after = jump.states[-1]
         late = self.states.work(before, after, way)
@@ -304,7 +307,7 @@ class Follower:
         if late > allowed and finest > self.resolution.finest:
             share = max(LATE_REFINEMENT * allowed / late, LEAST_REFINEMENT)
             return None, max(share * min(way, finest), self.resolution.finest)
-        displaced = self.states.work(before, after, self._fold_error(point))
+        displaced = self.states.work(before, after, abs(system.fold_displacement(point)))
         misplaced = late + max(0.0, displaced - self.resolution.field_share * abs(drop))
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
@@ -318,14 +321,6 @@ class Follower:
         therefore lies 2 ds/dd times that distance further on.
         """
         return abs(before.mean_stress) * 2 * abs(point.slope) * way / self.states.q0
-
-    def _fold_error(self, point: Point) -> float:
-        """Estimate by how much (in d) the error of the field displaces the fold next to ``point``.
-
-        The error of the openings is their difference from those of a more accurate field.
-        """
-        finer = self.edges.finer_openings(point.field)
-        return abs(point.fold_displacement(finer - point.field.opening))
 
     def _is_near(self, point: Point, after: Point | None, share: float) -> bool:
         """Whether no edge moved by as much as this ``share`` of λ_min in a descent."""

@@ -8,6 +8,9 @@ from typing import NamedTuple, Self
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.gap.ends import outward
+from adhesis.solver.sharp.gap.quadrature import Integers
+
+ALL_EDGES = slice(None)
 
 
 class PreviousPoint(NamedTuple):
@@ -73,7 +76,9 @@ class Point:
         point.__dict__[name] = value
         return point
 
-    def fold_displacement(self, change: Array) -> float:
+    def fold_displacement(
+        self, change: Array, by_prescribed: Array, edges: Integers | slice = ALL_EDGES
+    ) -> float:
         """Estimate how far in d the next fold moves when the openings C of given edges change.
 
         At a fold ∂(C_e - C_c)/∂n_f is singular. The rates of the edges diverge along its right null
@@ -82,12 +87,14 @@ class Point:
 
         Parameters
         ----------
-        change : array, shape (L, 2)
-            δC.
+        change, by_prescribed : array, shape (2L,)
+            δC, and ∂C/∂d at fixed edges.
+        edges : int array, optional
+            Those that both are of. The others then follow: a Schur complement has the same null
+            vectors.
         """
-        left = self.field.opening.ravel() * self.rate
-        by_prescribed = self.field.opening_by_prescribed.ravel()
-        return -float(left @ change.ravel() / (left @ by_prescribed))
+        left = (self.field.opening.ravel() * self.rate)[edges]
+        return -float(left @ change / (left @ by_prescribed))
 
     def interpolate(self, other: Point, at: float) -> Array:
         """Interpolate the gaps at d = ``at`` between two points of one branch, by a cubic."""

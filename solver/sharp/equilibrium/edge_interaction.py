@@ -1,4 +1,4 @@
-"""Change of the openings of many gaps by the motion of some edges, all others held; compiled."""
+"""Change of the openings of some edges by the motion of others, all further ones held; compiled."""
 
 from __future__ import annotations
 
@@ -39,10 +39,16 @@ def end_charges(
 
 @compiled_for_both
 def openings_between_edges(
-    gaps: Array, prescribed: float, orders: Integers, wanted: Integers, model: FieldModel
+    gaps: Array, orders: Integers, wanted: Integers, opening: Array, model: FieldModel
 ) -> Array:
-    """Compute ∂C_e/∂θ_f between the edges ``wanted`` of many gaps; 0 for e = f."""
-    state, system = solve_many(gaps, prescribed, orders, 1, model)
+    """Compute ∂C_e/∂θ_f at fixed p between the edges ``wanted``; 0 for e = f.
+
+    ``opening`` is C at each of these. It may be that of more gaps than are given: the derivatives
+    depend on the field by these openings alone.
+    """
+    state, system = solve_many(gaps, 0.0, orders, 1, model)
+    for c in range(wanted.shape[0]):
+        state.opening[wanted[c]] = opening[c]
     offset, matrix = state.nodes.offset, state.equations.matrix
     n, count = state.nodes.theta.shape[0], wanted.shape[0]
     work = np.empty(n)

@@ -34,6 +34,8 @@ class Window:
     ----------
     gaps : array, shape (width + 1, 2)
         Angles rise beyond the period where the window goes on at its beginning.
+    inside : int array, shape (width,)
+        Its gaps among all.
     orders : int array, shape (width + 1,)
     exterior : Exterior
         Response of the others.
@@ -57,8 +59,8 @@ class Window:
         self.gaps, self.exterior, self._outside = open_window(
             response, gaps, first, width, following, law, model
         )
-        inside = (first + np.arange(width)) % len(gaps)
-        self.orders: Integers = np.append(response.nodes.orders[inside], 0)
+        self.inside: Integers = (first + np.arange(width)) % len(gaps)
+        self.orders: Integers = np.append(response.nodes.orders[self.inside], 0)
         self.exterior_is_stable = bool(self._outside.factor.negative[-1] == 0)
         # beyond the middle of the patch in which the period ends
         self._end = 0.5 * (gaps[-1, 1] + gaps[0, 0] + 2 * np.pi)

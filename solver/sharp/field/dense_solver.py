@@ -33,6 +33,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -72,6 +73,33 @@ def check_definite(solution: Solution) -> None:
     """Raise FloatingPointError if there is no solution."""
     if math.isnan(solution.pressure):
         raise FloatingPointError("the matrix of the gaps is not positive definite")
+
+
+class FixedEdgeResponse(NamedTuple):
+    """Derivatives by the prescribed quantity d at fixed edges.
+
+    Attributes
+    ----------
+    pressure : float
+        ∂p/∂d; negative.
+    separation : float
+        ∂(q0 s)/∂d.
+    opening : array, shape (2L,)
+        ∂C/∂d.
+    """
+
+    pressure: float
+    separation: float
+    opening: Array
+
+
+def respond_at_fixed_edges(solution: Solution) -> FixedEdgeResponse:
+    """Differentiate a solution by d, at fixed edges."""
+    pressure = -2 * np.pi / float(solution.mean.resistance)
+    separation = -float(solution.mean.unit_mean) * pressure / (2 * np.pi)
+    unit = np.ascontiguousarray(-pressure * solution.solved[:, 1:2])
+    opening = edge_openings(unit, solution.nodes, GAUSS_RULES)[:, 0]
+    return FixedEdgeResponse(pressure, separation, opening)
 
 
 class GapField:
@@ -133,33 +161,9 @@ class GapField:
         return self.solution.separation
 
     @property
-    def fixed_edge_solution(self) -> Solution:
-        """Solution that also holds the responses at fixed edges."""
-        return self.solution
-
-    @property
     def opening(self) -> Array:
         """C at each gap end, shape (L, 2)."""
         return self.solution.opening.reshape(-1, 2)
-
-    @property
-    def pressure_by_prescribed(self) -> float:
-        """∂p/∂d at fixed edges; negative."""
-        return -2 * np.pi / float(self.fixed_edge_solution.mean.resistance)
-
-    @property
-    def separation_by_prescribed(self) -> float:
-        """∂(q0 s)/∂d at fixed edges."""
-        unit_mean = float(self.fixed_edge_solution.mean.unit_mean)
-        return -unit_mean * self.pressure_by_prescribed / (2 * np.pi)
-
-    @cached_property
-    def opening_by_prescribed(self) -> Array:
-        """∂C/∂d at fixed edges, shape (L, 2)."""
-        solution = self.fixed_edge_solution
-        unit = np.ascontiguousarray(-self.pressure_by_prescribed * solution.solved[:, 1:2])
-        out: Array = edge_openings(unit, solution.nodes, GAUSS_RULES)
-        return out[:, 0].reshape(-1, 2)
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array]:

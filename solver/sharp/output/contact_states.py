@@ -13,7 +13,7 @@ from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.counters import Counters
 from adhesis.solver.sharp.equilibrium.branch_point import Point, PreviousPoint
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.dense_solver import FixedEdgeResponse, GapField
 from adhesis.solver.sharp.field.opening_series import work_of_gaps
 from adhesis.solver.sharp.field.solution import LoadingDevice
 from adhesis.solver.sharp.gap.full_contact_stress import StressSource
@@ -159,13 +159,15 @@ class States:
             internal=ContinuationData(gaps, clearance),
         )
 
-    def at_fixed_edges(self, state: ContactState, gap_field: GapField, at: float) -> ContactState:
+    def at_fixed_edges(
+        self, state: ContactState, gap_field: GapField, response: FixedEdgeResponse, at: float
+    ) -> ContactState:
         """Move a state to d = ``at`` at fixed edges: p is linear in s, U quadratic."""
         way = at - gap_field.prescribed
-        pressure = gap_field.pressure + gap_field.pressure_by_prescribed * way
+        pressure = gap_field.pressure + response.pressure * way
         q0_s = at
         if not self.problem.control.is_fixed:
-            q0_s = gap_field.separation + gap_field.separation_by_prescribed * way
+            q0_s = gap_field.separation + response.separation * way
         work = -np.pi * (q0_s - gap_field.separation) * (gap_field.pressure + pressure)
         separation, mean_stress = q0_s / self.q0, pressure * self._half
         return with_values(

@@ -14,7 +14,11 @@ from adhesis.solver.sharp.descent.trajectory import Comparison
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, total_motion
 from adhesis.solver.sharp.equilibrium.newton import equilibrium
-from adhesis.solver.sharp.field.dense_solver import GapField, solve
+from adhesis.solver.sharp.field.dense_solver import (
+    FixedEdgeResponse,
+    respond_at_fixed_edges,
+    solve,
+)
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
@@ -39,10 +43,16 @@ class DenseSystem(EdgeSystem):
         solution: Solution = solve(gaps, prescribed, orders, fields, model, NO_EXTERIOR)
         return solution
 
-    def finer_openings(self, field: GapField) -> Array:
-        """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
-        opening = self.solution(field.gaps, field.prescribed, FINER_FIELD, 1).opening
-        return opening.reshape(-1, 2)
+    def response_before_fold(self, point: Point) -> FixedEdgeResponse:
+        """Return the response at a point next to a fold, all edges held."""
+        return respond_at_fixed_edges(point.field.solution)
+
+    def fold_displacement(self, point: Point) -> float:
+        """Estimate how far in d the error of the field displaces the fold next to a point."""
+        self._problem.count.fields += 1
+        finer = self.solution(point.gaps, point.at, FINER_FIELD, 1)
+        change = finer.opening - point.field.solution.opening
+        return point.fold_displacement(change, self.response_before_fold(point).opening)
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂C_e/∂θ_f between some edges, the others held, shape (edges, edges)."""

@@ -13,7 +13,7 @@ from adhesis.solver.sharp.descent.gradient_flow import Descent
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
-from adhesis.solver.sharp.field.dense_solver import GapField
+from adhesis.solver.sharp.field.dense_solver import FixedEdgeResponse
 from adhesis.solver.sharp.field.solution import Solution
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.window_descent import KnownState
@@ -48,8 +48,15 @@ class EdgeSystem(ABC):
         """Solve these gaps to a ``share`` of the tolerance, with S or (two fields) S and S'."""
 
     @abstractmethod
-    def finer_openings(self, field: GapField) -> Array:
-        """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
+    def response_before_fold(self, point: Point) -> FixedEdgeResponse:
+        """Return the response at a point next to a fold, the edges that lead to it held."""
+
+    @abstractmethod
+    def fold_displacement(self, point: Point) -> float:
+        """Estimate how far in d the error of the field displaces the fold next to a point.
+
+        The error of the openings is their difference from those of a more accurate field.
+        """
 
     @abstractmethod
     def stiffness(self, point: Point, edges: Integers) -> Array:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -29,10 +28,16 @@ from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
     equilibrium_many,
 )
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
-from adhesis.solver.sharp.field.dense_solver import GapField, check_definite
+from adhesis.solver.sharp.field.dense_solver import (
+    FixedEdgeResponse,
+    GapField,
+    check_definite,
+    respond_at_fixed_edges,
+    solve,
+)
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.separate_gaps import solve_separately
-from adhesis.solver.sharp.field.solution import FieldModel, Solution
+from adhesis.solver.sharp.field.solution import FieldModel, LoadingDevice, Solution
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
@@ -44,6 +49,7 @@ from adhesis.solver.sharp.tolerances import (
     CLOSING_OF_MANY,
     FINER_FIELD,
     RACE_FIELD,
+    RACE_MARGIN,
     RESPONSE_TRIALS,
 )
 
@@ -60,6 +66,8 @@ class HierarchicalSystem(EdgeSystem):
     def __init__(self, problem: EdgeProblem) -> None:
         super().__init__(problem)
         self.responses = KeptResponses(problem)
+        self._started: tuple[Point, KnownState] | None = None
+        self._next_to_fold: SolutionNextToFold | None = None
 
     def solution(self, gaps: Array, prescribed: float, share: float, fields: int) -> Solution:
         """Solve these gaps to a ``share`` of the tolerance, with S or (two fields) S and S'."""
@@ -73,18 +81,53 @@ class HierarchicalSystem(EdgeSystem):
         model = model._replace(digits=model.digits - math.log(share))
         return model, choose_orders(map_gaps(gaps), model.digits, GAUSS_RULES.counts)
 
-    def finer_openings(self, field: GapField) -> Array:
-        """Return C at the edges of a field, shape (L, 2), by a more accurate one."""
-        if isinstance(field, FieldOfMany):
-            opening = field.fixed_edge_solution.opening  # a fold needs its responses, too
-        else:
-            opening = self.solution(field.gaps, field.prescribed, FINER_FIELD, 1).opening
-        return opening.reshape(-1, 2)
+    def response_before_fold(self, point: Point) -> FixedEdgeResponse:
+        """Return the response at a point next to a fold, the edges around the fastest held."""
+        return respond_at_fixed_edges(self._solve_next_to_fold(point).solution)
+
+    def fold_displacement(self, point: Point) -> float:
+        """Estimate how far in d the error of the field displaces the fold next to a point."""
+        near = self._solve_next_to_fold(point)
+        known, count = point.field.solution.opening[near.edges], len(near.edges)
+        response = respond_at_fixed_edges(near.solution)
+        change = near.solution.opening[:count] - known
+        return point.fold_displacement(change, response.opening[:count], near.edges)
+
+    def _solve_next_to_fold(self, point: Point) -> SolutionNextToFold:
+        """Solve the gaps around the fastest edge, more accurately; all gaps if others may fold."""
+        if self._next_to_fold is None or self._next_to_fold.point is not point:
+            self._problem.count.fields += 1
+            window = self.start(point).window(point.gaps)
+            edges: Integers
+            if window is None or not window.exterior_is_stable:
+                solution = self.solution(point.gaps, point.at, FINER_FIELD, 1)
+                edges = np.arange(point.gaps.size)
+            else:
+                model, orders = self._accuracy(window.gaps, FINER_FIELD)
+                orders[-1] = 0
+                solution = solve(
+                    window.gaps, point.at, np.maximum(orders, window.orders), 1, model,
+                    window.exterior,
+                )  # fmt: skip
+                edges = np.add.outer(2 * window.inside, np.arange(2)).ravel()
+            self._next_to_fold = SolutionNextToFold(point, solution, edges)
+        return self._next_to_fold
 
     def stiffness(self, point: Point, edges: Integers) -> Array:
-        """Return ∂C_e/∂θ_f between some edges, the others held; the diagonal is not given."""
-        model, orders = self._accuracy(point.gaps, RACE_FIELD)
-        by_edge: Array = openings_between_edges(point.gaps, point.at, orders, edges, model)
+        """Return ∂C_e/∂θ_f between some edges, the others held; the diagonal is not given.
+
+        At fixed p, and as if gaps further from these edges than ``RACE_MARGIN`` were closed.
+        """
+        gap, count = edges // 2, len(point.gaps)
+        beside = np.arange(-RACE_MARGIN, RACE_MARGIN + 1)
+        inside = np.unique((gap[:, None] + beside) % count)
+        gaps = np.ascontiguousarray(point.gaps[inside])
+        model, orders = self._accuracy(gaps, RACE_FIELD)
+        by_edge: Array = openings_between_edges(
+            gaps, orders, 2 * np.searchsorted(inside, gap) + edges % 2,
+            point.field.solution.opening[edges],
+            model._replace(device=LoadingDevice(0.0, 1.0)),
+        )  # fmt: skip
         return by_edge
 
     def equilibrium(
@@ -141,8 +184,11 @@ class HierarchicalSystem(EdgeSystem):
 
     def start(self, point: Point) -> KnownState:
         """Return a point as the start of a descent."""
-        leading = int(np.argmax(np.abs(point.rate))) // 2
-        return KnownState(self._problem, self.responses, point.gaps, point.at, leading)
+        if self._started is None or self._started[0] is not point:
+            leading = int(np.argmax(np.abs(point.rate))) // 2
+            state = KnownState(self._problem, self.responses, point.gaps, point.at, leading)
+            self._started = point, state
+        return self._started[1]
 
     def descend(
         self,
@@ -205,6 +251,24 @@ class HierarchicalSystem(EdgeSystem):
         return float(CLOSING_BY_MOTION * np.abs(after - before).sum(axis=1).max())
 
 
+class SolutionNextToFold(NamedTuple):
+    """Solution of the gaps around the edge that leads to a fold, the others following linearly.
+
+    Attributes
+    ----------
+    point : Point
+        The last one before the fold.
+    solution : Solution
+        Of these gaps and perhaps their exterior, more accurate than that of the path.
+    edges : int array
+        Their edges among all.
+    """
+
+    point: Point
+    solution: Solution
+    edges: Integers
+
+
 class FieldOfMany(GapField):
     """Field of many gaps in equilibrium, solved when it is asked for.
 
@@ -241,12 +305,3 @@ class FieldOfMany(GapField):
             self._solution, self._solve = self._solve(), None  # it holds a response
             check_definite(self._solution)
         return self._solution
-
-    @cached_property
-    def fixed_edge_solution(self) -> Solution:
-        """Solution of all gaps together, for the responses at held edges, and more accurate."""
-        digits = -math.log(FINER_FIELD * self.tolerance)
-        model = FieldModel(self.device, digits, GAUSS_RULES, self.source.panels)
-        orders = choose_orders(map_gaps(self.gaps), digits, GAUSS_RULES.counts)
-        solution: Solution = solve_many(self.gaps, self.prescribed, orders, 1, model)[0]
-        return solution
