@@ -131,6 +131,12 @@ def update_response(
     return out, True
 
 
+@compiled_for_both
+def count_unknown(known: LinearResponse, gaps: Array, law: EdgeLaw, model: FieldModel) -> int:
+    """Count the gaps that :func:`update_response` would not take over from a response."""
+    return int((_known_gaps(known, map_gaps(gaps), law, model) < 0).sum())
+
+
 @compiled
 def _known_gaps(known: LinearResponse, table: Array, law: EdgeLaw, model: FieldModel) -> Integers:
     """Find the gaps of a response that serve for these of a table, one for each; -1 for none."""

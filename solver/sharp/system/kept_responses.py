@@ -7,7 +7,11 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.equilibrium.renewal import settle_response
-from adhesis.solver.sharp.equilibrium.response_setup import set_up_response, update_response
+from adhesis.solver.sharp.equilibrium.response_setup import (
+    count_unknown,
+    set_up_response,
+    update_response,
+)
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, Integers, choose_orders
 from adhesis.solver.sharp.system.edge_problem import EdgeProblem
@@ -61,10 +65,9 @@ class KeptResponses:
         ``least`` are the least orders of the gaps, or empty. None if these have no field.
         """
         kept = self._kept
-        for known in reversed(kept):
-            if len(known.response.nodes.orders) == len(gaps) and not known.is_outgrown:
-                kept.remove(known)
-                break
+        known = self._of_as_many(gaps)
+        if known is not None:
+            kept.remove(known)
         else:
             response = self._new(gaps, prescribed, least)
             kept[:] = [old for old in kept if len(old.response.nodes.orders) != len(gaps)]
@@ -77,6 +80,21 @@ class KeptResponses:
         self._changes += 1
         known.version = self._changes
         return known
+
+    def _of_as_many(self, gaps: Array) -> KeptResponse | None:
+        """Return a response of as many gaps, unless the last one has more of these; else None."""
+        for known in reversed(self._kept):
+            if len(known.response.nodes.orders) == len(gaps) and not known.is_outgrown:
+                last = self._kept[-1]
+                if known is last or self._unknown(known, gaps) <= self._unknown(last, gaps):
+                    return known
+                break
+        return None
+
+    def _unknown(self, known: KeptResponse, gaps: Array) -> int:
+        """Count the gaps that would be new to a response."""
+        problem = self._problem
+        return int(count_unknown(known.response, gaps, problem.law, problem.model))
 
     def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
         """Set up a response of these gaps, from the last one if there is one."""
