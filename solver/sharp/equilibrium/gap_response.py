@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.runtime.jit import compiled, compiled_sums
 from adhesis.solver.sharp.equilibrium.edge_interaction import end_charges
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening
 from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
@@ -27,12 +27,7 @@ def linearise_gap(out: LinearResponse, k: int, law: EdgeLaw, model: FieldModel) 
     _load_gap(out, k, loads, singular, space[14:], model)
     square = slice(out.tree.response_start[k], out.tree.response_start[k + 1])
     inverse = out.inverse[square].reshape(m, m)
-    for c in range(5):
-        for i in range(m):
-            total = 0.0
-            for j in range(m):
-                total += inverse[i, j] * loads[c, j]
-            solved[c, i] = total
+    _apply(inverse, loads, solved)
     out.scaled_opening[out.nodes.offset[k] : out.nodes.offset[k + 1]] = solved[0]
     ends = np.empty((2, 10))
     opening, strength = ends[:, :5], ends[:, 5]
@@ -41,7 +36,19 @@ def linearise_gap(out: LinearResponse, k: int, law: EdgeLaw, model: FieldModel) 
     _charge_gap(out, k, solved, singular, strength, space[14:16], model.rules)
 
 
-@compiled
+@compiled_sums
+def _apply(inverse: Array, loads: Array, solved: Array) -> None:
+    """Multiply every row of ``loads`` by a symmetric matrix."""
+    for c in range(loads.shape[0]):
+        out = solved[c]
+        out[:] = 0.0
+        for i in range(loads.shape[1]):
+            value, row = loads[c, i], inverse[i]
+            for j in range(loads.shape[1]):
+                out[j] += value * row[j]
+
+
+@compiled_sums
 def _load_gap(
     out: LinearResponse, k: int, loads: Array, singular: Array, space: Array, model: FieldModel
 ) -> None:
@@ -69,7 +76,7 @@ def _load_gap(
         end_charges(nodes, block, 2 * k + side, rules, space[3], loads[3 + side], singular[side])
 
 
-@compiled
+@compiled_sums
 def _near_potential(out: LinearResponse, k: int, own: Array, slope: Array) -> None:
     """Compute the potential g of both neighbours at the nodes of a gap, and its derivative by θ.
 
@@ -87,13 +94,13 @@ def _near_potential(out: LinearResponse, k: int, own: Array, slope: Array) -> No
             charge = nodes.weight[j] * opening[j] / (4 * np.pi)
             for i in range(own.shape[0]):
                 node = offset[k] + i
-                half = sine[node] * cosine[j] - cosine[node] * sine[j]
-                value = charge / (half * half)
+                pole = 1 / (sine[node] * cosine[j] - cosine[node] * sine[j])
+                value = charge * pole * pole
                 own[i] -= value
-                slope[i] += value * (cosine[node] * cosine[j] + sine[node] * sine[j]) / half
+                slope[i] += value * (cosine[node] * cosine[j] + sine[node] * sine[j]) * pole
 
 
-@compiled
+@compiled_sums
 def _by_eta(eta: Array, w: Array, potential: Array, i: int) -> float:
     """Compute the derivative by η of a potential g at node i of a gap."""
     total = 0.0
@@ -105,7 +112,7 @@ def _by_eta(eta: Array, w: Array, potential: Array, i: int) -> float:
     return total
 
 
-@compiled
+@compiled_sums
 def _open_edges(
     out: LinearResponse,
     k: int,
@@ -131,11 +138,14 @@ def _open_edges(
         opening[side, 0] -= scale * end_terms[k, side, 0]
         opening[side, 2] -= scale * end_terms[k, side, 1]
         strength[side] = -opening[side, 0] * np.sqrt(nodes.slope[k, side] / 8)
+        follows = by_potential[side]
+        follows[:] = 0.0
+        for i in range(m):
+            value, row = scale * rules.end_values[side, start + i], inverse[i]
+            for j in range(m):
+                follows[j] += value * row[j]
         for j in range(m):
-            total = 0.0
-            for i in range(m):
-                total += rules.end_values[side, start + i] * inverse[i, j]
-            by_potential[side, j] = scale * total * rules.weights[start + j]
+            follows[j] *= rules.weights[start + j]
 
 
 @compiled
@@ -193,7 +203,7 @@ def _invert_tangent(tangent: Array, inverse: Array) -> int:
     return 2 if tangent[0, 0] + tangent[1, 1] < 0 else 0
 
 
-@compiled
+@compiled_sums
 def _charge_gap(
     out: LinearResponse,
     k: int,
@@ -221,16 +231,18 @@ def _charge_gap(
             charge[1, first + i] += part * motion[2 * k + side, 1]
             charge[0, first + i] += part * out.isolated_correction[2 * k + side]
         charge[0, first + i] -= pressure * charge[1, first + i]
+    left, right = moving[0], moving[1]
+    stretch = out.tree.stretch[own]
     for i in range(m):
-        for j in range(m):
-            value = w[i] * inverse[i * m + j] * w[j]
-            for side in range(2):
-                value -= 0.5 * moving[side, i] * follows[j, side]
-                value -= 0.5 * moving[side, j] * follows[i, side]
-            response[i * m + j] = value
-            charge[0, first + i] += value * potential[j]
-    for i in range(m):
+        row, solved_row = response[i * m : (i + 1) * m], inverse[i * m : (i + 1) * m]
         total = 0.0
+        mean = 0.0
         for j in range(m):
-            total += response[i * m + j] * out.tree.stretch[first + j]
-        out.mean_by_potential[first + i] = total
+            value = w[i] * solved_row[j] * w[j]
+            value -= 0.5 * (left[i] * follows[j, 0] + left[j] * follows[i, 0])
+            value -= 0.5 * (right[i] * follows[j, 1] + right[j] * follows[i, 1])
+            row[j] = value
+            total += value * potential[j]
+            mean += value * stretch[j]
+        charge[0, first + i] += total
+        out.mean_by_potential[first + i] = mean

@@ -233,14 +233,16 @@ def _fill_block(k: int, nodes: Nodes, block: Array, rules: GaussRules) -> None:
     power = np.empty(m)
     middle = 0.5 * (gap[LEFT] + gap[RIGHT])
     alpha = gap[ALPHA]
+    is_short = gap[RIGHT] - gap[LEFT] < _PERIODIC_SERIES
     for i in range(m):
-        sine[i] = np.sin(0.5 * (theta[i] - middle))
-        cosine[i] = np.cos(0.5 * (theta[i] - middle))
         power[i] = np.exp(alpha * eta[i])
+        if not is_short:
+            sine[i] = np.sin(0.5 * (theta[i] - middle))
+            cosine[i] = np.cos(0.5 * (theta[i] - middle))
     for i in range(m):
         for j in range(i + 1):
             x = theta[i] - theta[j]
-            if abs(x) < _PERIODIC_SERIES:
+            if is_short or abs(x) < _PERIODIC_SERIES:
                 far = periodic_images(x)
             else:
                 half = sine[i] * cosine[j] - cosine[i] * sine[j]
@@ -275,7 +277,9 @@ def mapped_kernel(alpha: float, x: float) -> float:
         y *= y
         series = -1 / 3 + y * (1 / 15 + y * (-2 / 189 + y * (1 / 675 - y * 2 / 10395)))
         return 4 * alpha * alpha * series
-    images: float = 4 * ((alpha / np.sinh(y)) ** 2 - 1 / (x * x))
+    grown = np.exp(y)
+    twice = grown - 1 / grown  # twice the hyperbolic sine
+    images: float = 4 * (4 * alpha * alpha / (twice * twice) - 1 / (x * x))
     return images
 
 

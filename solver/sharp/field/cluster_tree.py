@@ -241,15 +241,18 @@ def place_charges(tree: Tree, run: int) -> None:
     """Place the charges of a run, and compute its interpolation and kernel."""
     at, r, row = tree.node_start, tree.rank[run], tree.rows[run]
     theta, stretch = tree.theta, tree.stretch
+    node, share = np.empty(r), np.empty(r)  # Chebyshev nodes, and their barycentric weights
     for i in range(r):
         t = np.pi * (r - i - 0.5) / r
-        theta[at[run] + i], stretch[at[run] + i] = theta_at(row, np.cos(t))
+        node[i] = np.cos(t)
+        share[i] = np.sin(t) if i % 2 == 0 else -np.sin(t)
+        theta[at[run] + i], stretch[at[run] + i] = theta_at(row, node[i])
     begin = tree.interpolation_start[run]
     for half in range(2):
         child = tree.children[run, half]
         own = slice(at[child], at[child + 1])
         end = begin + tree.rank[child] * r
-        _interpolate(row, theta[own], stretch[own], r, tree.interpolation[begin:end])
+        _interpolate(row, node, share, theta[own], stretch[own], tree.interpolation[begin:end])
         begin = end
     own = slice(at[tree.children[run, 0]], at[tree.children[run, 0] + 1])
     other = slice(at[tree.children[run, 1]], at[tree.children[run, 1] + 1])
@@ -287,29 +290,23 @@ def _kernel(theta: Array, stretch: Array, other: Array, other_stretch: Array, ou
             row[j] = scale * other_stretch[j] / (half * half)
 
 
-@compiled
-def _interpolate(row: Array, theta: Array, stretch: Array, rank: int, out: Array) -> None:
+@compiled_sums
+def _interpolate(
+    row: Array, node: Array, share: Array, theta: Array, stretch: Array, out: Array
+) -> None:
     """Compute the interpolation of potentials from the nodes of an interval to points inside."""
-    node = np.empty(rank)
-    share = np.empty(rank)
-    for a in range(rank):
-        t = np.pi * (rank - a - 0.5) / rank
-        node[a] = np.cos(t)
-        share[a] = np.sin(t) if a % 2 == 0 else -np.sin(t)
+    rank = node.shape[0]
     for b in range(theta.shape[0]):
         x, _, slope = eta_at(row, theta[b])
         scale = stretch[b] * slope
         total = 0.0
-        hit = -1
         line = out[b * rank : (b + 1) * rank]
         for a in range(rank):
-            if x == node[a]:
-                hit = a
             line[a] = share[a] / (x - node[a])
             total += line[a]
-        if hit >= 0:
-            line[:] = 0.0
-            line[hit] = scale
-        else:
+        if np.isfinite(total):
             for a in range(rank):
                 line[a] *= scale / total
+        else:  # the point is a node
+            for a in range(rank):
+                line[a] = scale if x == node[a] else 0.0

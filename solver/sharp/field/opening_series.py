@@ -16,14 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled, compiled_for_both, compiled_sums
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.field.dense_solver import GapField
 from adhesis.solver.sharp.field.solution import Nodes
 from adhesis.solver.sharp.gap.conformal_map import (
-    ALPHA,
-    LEFT,
     eta_at,
-    pole_distances,
+    place_nodes,
     theta_at,
 )
 from adhesis.solver.sharp.gap.full_contact_stress import Panels, interpolate
@@ -32,10 +30,6 @@ from adhesis.solver.sharp.gap.sine_transform import Circle, sine_sums, tabulate_
 from adhesis.solver.sharp.tolerances import ENERGY_NODES, FEWEST_SINE_NODES, SHAPE_NODES
 
 _MANY_NODES = 500  # from so many on, sizes of the transform lie closer to each other
-
-_PER_UNIT = 32  # entries of the table of exp(y) - 1 for a unit of y
-# y is at most the α of a gap, twice: below 40, as patches are wider than rounding
-_EXPM1 = np.expm1(np.arange(40 * _PER_UNIT) / _PER_UNIT)
 
 
 @dataclass(frozen=True)
@@ -82,37 +76,14 @@ def fast_size(fewest: int) -> int:
     return 32 * eighth - 1
 
 
-@compiled_sums
-def _fine_nodes(gap: Array, circle: Circle, theta: Array, theta_by_t: Array) -> None:
-    """Place the sine nodes of a gap, as many as ``theta`` holds: θ, falling, and dθ/dt.
-
-    As :func:`theta_at`, many at a time, with exp(y) - 1 from a table.
-    """
-    alpha = 2 * gap[ALPHA]
-    middle = (theta.shape[0] + 1) // 2  # nodes up to it are measured from the right end
-    for side in range(2):
-        near, far = pole_distances(gap, side)
-        inwards = 1.0 - 2 * side
-        for i in range(0 if side == 1 else middle, middle if side == 1 else theta.shape[0]):
-            y = alpha * (1 + inwards * circle.cosine[i + 1])
-            entry = int(y * _PER_UNIT)
-            x = y - entry / _PER_UNIT
-            grown = 1 / 24 + x * (1 / 120 + x * (1 / 720 + x / 5040))
-            grown = x * (1 + x * (0.5 + x * (1 / 6 + x * grown)))
-            grown = _EXPM1[entry] + grown * (1 + _EXPM1[entry])
-            r = grown * near * far / (far + (1 + grown) * near)
-            theta_by_t[i] = alpha * (near + r) * (far - r) / (near + far) * circle.sine[i + 1]
-            theta[i] = gap[LEFT + side] + inwards * r
-
-
 @compiled
 def _fine_moments(
     gap: Array, panels: Panels, circle: Circle, theta: Array, theta_by_t: Array, modes: Array
 ) -> None:
-    """Place the fine nodes of a gap (:func:`_fine_nodes`), and compute s_n of all their modes."""
-    _fine_nodes(gap, circle, theta, theta_by_t)
-    load = interpolate(theta, panels.width, panels.stress)
+    """Place the fine nodes of a gap, and compute s_n of all their modes."""
     count = theta.shape[0]
+    place_nodes(gap, circle.cosine[1:], circle.sine[1:], theta, theta_by_t)
+    load = interpolate(theta, panels.width, panels.stress)
     for i in range(count):
         load[i] *= theta_by_t[i]
     sine_sums(load, circle, modes)
@@ -202,7 +173,7 @@ def refine_opening(gap: Array, modes: Array, factor: int) -> tuple[Array, Array]
         np.empty(count),
     )
     more[: len(modes)] = modes
-    _fine_nodes(gap, circle, theta, theta_by_t)
+    place_nodes(gap, circle.cosine[1:], circle.sine[1:], theta, theta_by_t)
     sine_sums(more, circle, opening)
     return theta[::-1], opening[::-1]
 

@@ -26,10 +26,10 @@ from adhesis.solver.sharp.gap.conformal_map import (
     eta_from,
     log_ratio,
     one_minus_plus,
+    place_nodes,
     pole_distances,
-    theta_at,
 )
-from adhesis.solver.sharp.gap.full_contact_stress import Panels, value_at
+from adhesis.solver.sharp.gap.full_contact_stress import Panels, interpolate, short_gap_rule
 from adhesis.solver.sharp.tolerances import PANEL_PHASE, SHORT_GAP_PANELS
 
 _LARGEST = 0.36  # z up to which artanh z is a short series
@@ -220,15 +220,18 @@ def _panel_nodes(
 def _fill_short_gap(gap: Array, panels: Panels, nodes: Array) -> None:
     """Place Gauss-Chebyshev nodes of the first kind in η, which serve s_n and s^± alike."""
     count = nodes.shape[1]
+    rule = panels.short if panels.short.shape[1] == count else short_gap_rule(count)
+    theta, theta_by_t = np.empty(count), np.empty(count)
+    place_nodes(gap, rule[2], rule[3], theta, theta_by_t)
+    stress = interpolate(theta, panels.width, panels.stress)
     for i in range(count):
-        t = (i + 0.5) * np.pi / count
-        theta, stretch = theta_at(gap, np.cos(t))
-        weight = np.pi / count * np.sin(t) * stretch
-        nodes[_MINUS, i] = 2 * np.sin(t / 2) ** 2
-        nodes[_PLUS, i] = 2 * np.cos(t / 2) ** 2
-        nodes[_STRESS, i] = weight * value_at(panels.stress, theta / panels.width)
-        if nodes.shape[0] > _SLOPE:
-            nodes[_SLOPE, i] = weight * value_at(panels.slope, theta / panels.width)
+        nodes[_MINUS, i], nodes[_PLUS, i] = rule[0, i], rule[1, i]
+        theta_by_t[i] *= np.pi / count
+        nodes[_STRESS, i] = theta_by_t[i] * stress[i]
+    if nodes.shape[0] > _SLOPE:
+        slope = interpolate(theta, panels.width, panels.slope)
+        for i in range(count):
+            nodes[_SLOPE, i] = theta_by_t[i] * slope[i]
 
 
 @compiled
@@ -238,7 +241,7 @@ def _moment_nodes(gap: Array, modes: int, panels: Panels, fields: int) -> tuple[
     right = gap[RIGHT]
     width = panels.width
     if right - left <= SHORT_GAP_PANELS * width:
-        nodes = np.empty((2 + fields, max(3 * panels.x.shape[0] + 6, 2 * modes)))
+        nodes = np.empty((2 + fields, max(panels.short.shape[1], 2 * modes)))
         _fill_short_gap(gap, panels, nodes)
         return nodes, nodes.shape[1]
     first = int(np.floor(left / width)) + 2  # an end piece is one to two finest panels long

@@ -15,11 +15,15 @@ from __future__ import annotations
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.runtime.jit import compiled, compiled_for_both, compiled_sums
 
 # Columns of the table of gaps.
 LEFT, RIGHT, LEFT_PATCH, RIGHT_PATCH, ALPHA = 0, 1, 2, 3, 4
 _COLUMNS = 5
+
+_PER_UNIT = 32  # entries of the table of exp(y) - 1 for a unit of y
+# y is at most the α of a gap, twice: below 40, as patches are wider than rounding
+_EXPM1 = np.expm1(np.arange(40 * _PER_UNIT) / _PER_UNIT)
 
 
 @compiled_for_both
@@ -106,6 +110,29 @@ def theta_at(gap: Array, eta: float) -> tuple[float, float]:
     r = grown / (1 / near + (1 + grown) / far)  # distance from the nearer end
     stretch = 2 * gap[ALPHA] / (1 / (near + r) + 1 / (far - r))
     return (gap[LEFT] + r if side == 0 else gap[RIGHT] - r), stretch
+
+
+@compiled_sums
+def place_nodes(gap: Array, cosine: Array, sine: Array, theta: Array, theta_by_t: Array) -> None:
+    """Compute θ and dθ/dt at nodes η = cos t, t rising, as many as ``theta`` holds.
+
+    As :func:`theta_at`, many at a time, with exp(y) - 1 from a table.
+    """
+    alpha = 2 * gap[ALPHA]
+    middle = (theta.shape[0] + 1) // 2  # nodes up to it are measured from the right end
+    for side in range(2):
+        near, far = pole_distances(gap, side)
+        inwards = 1.0 - 2 * side
+        for i in range(0 if side == 1 else middle, middle if side == 1 else theta.shape[0]):
+            y = alpha * (1 + inwards * cosine[i])
+            entry = int(y * _PER_UNIT)
+            x = y - entry / _PER_UNIT
+            grown = 1 / 24 + x * (1 / 120 + x * (1 / 720 + x / 5040))
+            grown = x * (1 + x * (0.5 + x * (1 / 6 + x * grown)))
+            grown = _EXPM1[entry] + grown * (1 + _EXPM1[entry])
+            r = grown * near * far / (far + (1 + grown) * near)
+            theta_by_t[i] = alpha * (near + r) * (far - r) / (near + far) * sine[i]
+            theta[i] = gap[LEFT + side] + inwards * r
 
 
 @compiled

@@ -56,6 +56,8 @@ class Panels(NamedTuple):
         Row of ``weights`` at which each level starts.
     end_x, end_w : array
         Gauss-Legendre rule on (0, 1) of an end piece (at most one shortest wave, in sqrt scale).
+    short : array, shape (4, 3 p + 6)
+        Rule of a short gap, see :func:`short_gap_rule`.
     """
 
     width: float
@@ -70,6 +72,18 @@ class Panels(NamedTuple):
     level_start: NDArray[np.int64]
     end_x: Array
     end_w: Array
+    short: Array
+
+
+@compiled_for_both
+def short_gap_rule(count: int) -> Array:
+    """Make Gauss-Chebyshev nodes η = cos t: rows 1 - η and 1 + η, to rounding, η, and sin t."""
+    rule = np.empty((4, count))
+    for i in range(count):
+        t = (i + 0.5) * np.pi / count
+        rule[0, i], rule[1, i] = 2 * np.sin(t / 2) ** 2, 2 * np.cos(t / 2) ** 2
+        rule[2, i], rule[3, i] = np.cos(t), np.sin(t)
+    return rule
 
 
 class StressSource:
@@ -145,6 +159,7 @@ class StressSource:
             level_start=np.cumsum([0, *sizes[:-1]]),
             end_x=(t + 1) / 2,
             end_w=end / 2,
+            short=short_gap_rule(3 * p + 6),
         )
 
     def sample(self, theta: Array) -> Array:
