@@ -20,7 +20,7 @@ import numpy as np
 from adhesis.solver.model.profile import Array, self_affine_profile
 from adhesis.solver.runtime.malloc import keep_freed
 from adhesis.solver.sharp.equilibrium.linear_response import solve_response
-from adhesis.solver.sharp.equilibrium.renewal import set_up_response
+from adhesis.solver.sharp.equilibrium.response_setup import set_up_response
 from adhesis.solver.sharp.field.dense_solver import solve
 from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR

@@ -114,9 +114,6 @@ REFERENCE_MOST_FAR = 0.25
 """Share of all gaps that may move so far before all are solved anew."""
 REFERENCE_PATCH = 0.2
 """Share of a patch by which it may change before the nodes beside it are placed anew."""
-NODES_SUFFICE = 0.9
-"""Share of the nodes that a gap needs with which its response goes on: its part of the field is
-then accurate to the tolerance to this power. Most gaps that outgrow their nodes lack hardly one."""
 FURTHER_ORDERS = 2
 """Orders by which the rule of a gap that has changed is raised beyond what it needs."""
 RESPONSES_KEPT = 3

@@ -6,6 +6,7 @@ A folder is a unit; in a folder that has folders inside, each module is a unit o
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 import subprocess
 import sys
@@ -301,6 +302,16 @@ def test_the_design_page_names_every_folder_and_every_file_that_it_names_is_ther
             assert f'"{folder.name}": (' in picture, folder
     known = {path.name for path in PATHS.values()}
     assert set(re.findall(r"`(\w+\.py)`", page)) - known == set()
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda p: p.stem)
+def test_what_a_benchmark_imports_is_there(path: Path) -> None:
+    """No test runs most of them."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module != "__future__":
+            module = importlib.import_module(str(node.module))
+            for name in node.names:
+                assert hasattr(module, name.name), f"{node.module} has no {name.name}"
 
 
 def test_nothing_imports_the_folders_by_their_bare_names() -> None:

@@ -34,7 +34,6 @@ from adhesis.solver.sharp.gap.conformal_map import (
     map_gaps,
 )
 from adhesis.solver.sharp.tolerances import (
-    NODES_SUFFICE,
     REFERENCE_BALANCE,
     REFERENCE_FAR,
     REFERENCE_MOST_FAR,
@@ -146,7 +145,7 @@ def move_references(
         return False
     for gap in indices:
         order = nodes.orders[gap]
-        wanted = NODES_SUFFICE * model.digits / convergence_rate(table[gap])
+        wanted = model.digits / convergence_rate(table[gap])
         if counts[order] < wanted and order < counts.shape[0] - 1:
             return False
     before = nodes.table.copy()
