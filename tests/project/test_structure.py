@@ -6,7 +6,6 @@ A folder is a unit; in a folder that has folders inside, each module is a unit o
 from __future__ import annotations
 
 import ast
-import importlib
 import re
 import subprocess
 import sys
@@ -309,9 +308,7 @@ def test_what_a_benchmark_imports_is_there(path: Path) -> None:
     """No test runs most of them."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module != "__future__":
-            module = importlib.import_module(str(node.module))
-            for name in node.names:
-                assert hasattr(module, name.name), f"{node.module} has no {name.name}"
+            exec(ast.unparse(node), {})  # raises ImportError
 
 
 def test_nothing_imports_the_folders_by_their_bare_names() -> None:
