@@ -19,7 +19,7 @@ MOST_PARAMETERS = 8
 # Numbers of a formula or a table, which are no tolerance; all others stand in tolerances.py.
 MATHEMATICAL = {
     "gap/chebyshev_moments.py": {"_LARGEST", "_SAFE"},  # range of a series; its bound
-    "gap/conformal_map.py": {"_COLUMNS"},
+    "gap/conformal_map.py": {"_COLUMNS", "_PER_UNIT"},  # sizes of tables
     # sizes of Gauss rules
     "gap/full_contact_stress.py": {"_TILT_NODES", "_PIECES_BY_SLOPE", "_HALF_PLANE_NODES"},
     "gap/sine_transform.py": {"_ROTATIONS"},
@@ -37,7 +37,7 @@ MATHEMATICAL = {
     "output/interior_tension.py": {"_CANDIDATES"},
     "field/assembly.py": {"_PERIODIC_SERIES", "_MAPPED_SERIES"},  # ranges of series
     "field/cholesky.py": {"BLOCK"},
-    "field/opening_series.py": {"_MANY_NODES", "_PER_UNIT"},  # sizes of tables
+    "field/opening_series.py": {"_MANY_NODES"},  # size of a table
 }
 
 
