@@ -9,11 +9,12 @@ from __future__ import annotations
 
 # ---------------------------------------------------------------- field of given edges
 
-HIERARCHICAL_FROM = 24
+HIERARCHICAL_FROM = 18
 """Number of gaps from which on the tree of clusters and windows replace dense matrices.
 
-Measured at the paper's scale: with 14, 18, 24 and 30, loops take 1.94, 1.98, 1.85 and 1.97 s
-of CPU at γ = 0.01 (25 patches) and 5.0, 4.9, 5.4 and 5.5 s at 0.0025 (65).
+Measured at the paper's scale: with 12, 16, 18, 20 and 24, loops take 1.80, 1.76, 1.67, 1.75 and
+1.87 s of CPU at γ = 0.01 (25 patches), and with 12, 16, 20 and 24 4.2, 4.1, 4.2 and 4.4 s at 0.0025
+(65).
 """
 
 SHORT_GAP_PANELS = 4
