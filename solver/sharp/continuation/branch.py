@@ -11,7 +11,7 @@ import numpy as np
 from adhesis.solver.model.jump import Branch as BranchName
 from adhesis.solver.sharp.continuation.across_jump import carry_previous
 from adhesis.solver.sharp.continuation.corrector import correct
-from adhesis.solver.sharp.continuation.events import Accepted, Fold
+from adhesis.solver.sharp.continuation.events import Accepted, Fold, TwoFolds
 from adhesis.solver.sharp.continuation.history import ComputedJump
 from adhesis.solver.sharp.continuation.predictor import Predictor
 from adhesis.solver.sharp.continuation.resolution import Resolution
@@ -27,6 +27,7 @@ from adhesis.solver.sharp.tolerances import (
     PREDICTED_MOTION,
     QUIET_STRESS,
     TRAPEZOID_FAR,
+    TWO_FOLDS_SEEN,
     UNMOVED_BY_JUMP,
     WORK_RESOLVED,
     WORK_STALLED,
@@ -91,6 +92,7 @@ class Branch:
         # straight after a jump or turn: short steps there keep the integral exact
         self._predictor = Predictor(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
+        self._two_folds: TwoFolds | None = None
 
     def advance(self) -> Accepted | Fold:
         """Take steps until one is accepted, or the smallest one finds no equilibrium."""
@@ -98,11 +100,11 @@ class Branch:
             step = self._next_step()
             left = self._target.at - self.point.at
             at = self._target.at if step == left else self.point.at + step
-            reached = self._correct(step, at)
+            reached = correct(self._edges, self._predictor, at)
             if reached is None:
                 if self.steps.reject(step, self._predictor):
                     continue
-                return Fold(self.point, at)
+                return Fold(self.point, at, self._two_folds)
             examined = self._examine(reached, step)
             if examined is None:
                 self.steps.halve(step)
@@ -122,7 +124,7 @@ class Branch:
 
     def resolve_folds(self, fold: Fold) -> bool:
         """Locate a fold more finely if its step crosses a second one; return whether it does."""
-        first, second = self._predictor.fold_distance, self._predictor.other_fold_distance()
+        first, second = self._predictor.fold_distance, self._predictor.other_fold().distance
         finest = self._resolution.finest
         if not first < second < abs(fold.at - fold.point.at) or self.steps.finest <= finest:
             return False
@@ -161,14 +163,6 @@ class Branch:
         motion = FIRST_MOTION if predictor.way == 0 else PREDICTED_MOTION
         return self.steps.next(predictor, self._target.at, motion * self._edges.wave)
 
-    def _correct(self, step: float, at: float) -> Point | None:
-        """Return the equilibrium at d = ``at``, if it is within reach."""
-        predictor = self._predictor
-        no_fold = math.isinf(predictor.fold_distance)
-        if no_fold and predictor.fastest * abs(step) > 2 * PREDICTED_MOTION * self._edges.wave:
-            return None
-        return correct(self._edges, predictor, at)
-
     def _examine(self, reached: Point, step: float) -> tuple[Accepted, float] | None:
         """Return a point as an accepted one, and how far a gap may have closed on the way.
 
@@ -199,7 +193,24 @@ class Branch:
         if event.point.at == self._target.at:
             return  # no further step is taken
         self._predictor = Predictor(event.point)
+        self._look_for_two_folds()
         self.steps.accept(step, self._predictor)
+
+    def _look_for_two_folds(self) -> None:
+        """Note whether two folds ahead are nearer to each other than jumps are located.
+
+        Next to a fold they are no longer seen apart: both edges are fast there.
+        """
+        predictor, resolution = self._predictor, self._resolution.jump
+        first = predictor.fold_distance
+        if not resolution < first < TWO_FOLDS_SEEN * resolution:
+            return
+        other = predictor.other_fold()
+        self._two_folds = None
+        if other.distance - first < resolution:
+            way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
+            edges = predictor.leading_edge, other.edge
+            self._two_folds = TwoFolds(edges, predictor.point.at + way)
 
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed."""

@@ -31,6 +31,22 @@ class Accepted:
 
 
 @dataclass(frozen=True, eq=False)
+class TwoFolds:
+    """Two folds of a branch so near to each other that either may come first.
+
+    Attributes
+    ----------
+    edges : tuple of int
+        The edge that leads to each of them.
+    beyond : float
+        d beyond both.
+    """
+
+    edges: tuple[int, int]
+    beyond: float
+
+
+@dataclass(frozen=True, eq=False)
 class Fold:
     """No stable equilibrium is found a smallest step beyond ``point``.
 
@@ -40,7 +56,10 @@ class Fold:
         The last point of the branch.
     at : float
         d a smallest step beyond it, or the target.
+    with_another : TwoFolds, optional
+        Whether a second fold is so near that it may come first.
     """
 
     point: Point
     at: float
+    with_another: TwoFolds | None = None

@@ -12,10 +12,13 @@ from adhesis.solver.model.contact_state import ContactState
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
-from adhesis.solver.sharp.continuation.jump import Jumps
+from adhesis.solver.sharp.continuation.jump import Jumps, Orders
 from adhesis.solver.sharp.continuation.resolution import Resolution
 from adhesis.solver.sharp.equilibrium.branch_point import Point
+from adhesis.solver.sharp.equilibrium.griffith import step_limits
 from adhesis.solver.sharp.errors import NoState
+from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.ends import outward
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.clearance import NONE_SEARCHED
 from adhesis.solver.sharp.nucleation.closing_bound import ClosingBound
@@ -262,7 +265,7 @@ class Follower:
         before = self.states.of_point(point)
         jump = self.jumps.compute(
             before, point.field.gaps, point.at, target.branch, touched.seeds, point,
-            fold=beyond,
+            orders=None if beyond is None else Orders(beyond, (point.field.gaps,)),
         )  # fmt: skip
         late = self.states.work(before, jump.states[-1], touched.late)
         return replace(jump, states=(before, *jump.states), misplaced=late)
@@ -299,7 +302,10 @@ class Follower:
         system = self.edges.system(point.gaps)
         response = system.response_before_fold(point)
         before = self.states.at_fixed_edges(last, point.field, response, fold.at)
-        jump = self.jumps.compute(before, point.field.gaps, fold.at, target.branch, known=point)
+        jump = self.jumps.compute(
+            before, point.field.gaps, fold.at, target.branch, known=point,
+            orders=self._orders_of_folds(fold),
+        )  # fmt: skip
         after = jump.states[-1]
         late = self.states.work(before, after, way)
         drop = jump.jump.energy_drop
@@ -312,6 +318,21 @@ class Follower:
         if jump.point is None and self.edges.is_load:
             misplaced += self._early_closure_error(before, point, way)
         return replace(jump, states=(*states, before, after), misplaced=misplaced), finest
+
+    def _orders_of_folds(self, fold: Fold) -> Orders | None:
+        """Return starts from which either of two folds comes first, if there are two."""
+        two, point = fold.with_another, fold.point
+        if two is None:
+            return None
+        way = fold.at - point.at
+        furthest = max(fold.at, two.beyond) if way > 0 else min(fold.at, two.beyond)
+        longest = step_limits(map_gaps(point.gaps), self.edges.longest_step)
+        starts = []
+        for edge in two.edges:
+            motion = np.zeros(point.gaps.size)
+            motion[edge] = math.copysign(longest[edge], point.rate[edge] * way)
+            starts.append(point.gaps + (outward(point.gaps) * motion).reshape(-1, 2))
+        return Orders(furthest, tuple(starts))
 
     def _early_closure_error(self, before: ContactState, point: Point, way: float) -> float:
         """Bound the work in J/m² that a loop under a load misses, as it is closed before the fold.

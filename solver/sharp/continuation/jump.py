@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +24,23 @@ from adhesis.solver.sharp.tolerances import (
     MOST_NUCLEATIONS,
     OTHER_MINIMUM,
 )
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Two events so near to each other that either may come first.
+
+    Attributes
+    ----------
+    beyond : float
+        d beyond both.
+    starts : tuple of array, shape (L, 2)
+        Gaps from which what the one or the other begins goes first.
+    """
+
+    beyond: float
+    starts: tuple[Array, ...]
+
 
 Rival = Point | None | FullContact
 """End of a descent with equal speeds: a minimum, no contact, or full contact (under a load)."""
@@ -51,14 +69,14 @@ class Jumps:
         touches: list[Touch] | None = None,
         known: Point | None = None,
         barrier: float = 0.0,
-        fold: float | None = None,
+        orders: Orders | None = None,
     ) -> ComputedJump:
         """Descend at d = ``at`` from the gaps ``start`` to the next state in which nothing touches.
 
         The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
-        to a fold it may not be found again from its own edges. The jump raced, too, if a fold that
-        may come before the touches, and surely before d = ``fold``, leads elsewhere in the end.
+        to a fold it may not be found again from its own edges. The jump raced, too, if another of
+        two events that may come in either of ``orders`` leads elsewhere in the end.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals, known)
@@ -73,16 +91,24 @@ class Jumps:
             if rivals:
                 rival = self._end_of_rival(rivals[0], at)
                 at_stake = self._at_stake(before, point, rival, at)
-            elif fold is not None:
-                rival = self._end_beyond(fold, start, known)
-                both = None if point is None else self._end_beyond(fold, point.gaps, point)
-                at_stake = self._at_stake(before, both, rival, fold)
+            elif orders is not None:
+                at_stake = self._at_stake_beyond(before, point, orders, known)
         except FullContact:  # elsewhere, but with no energy that could be compared
             at_stake = 0.0
         except NoState:  # a comparison that does not come to rest is no failure of the path
             pass
         jump = self.states.jump(before, after, branch, at_stake, barrier)
         return ComputedJump(at, (after,), jump, point, known)
+
+    def _at_stake_beyond(
+        self, before: ContactState, point: Point | None, orders: Orders, known: Point | None
+    ) -> float | None:
+        """Difference in J/m² of the energies to which two events lead in either order, or None."""
+        at = orders.beyond
+        both = None if point is None else self._end_beyond(at, point.gaps, point)
+        ends = (self._end_beyond(at, start, known) for start in orders.starts)
+        differences = [self._at_stake(before, both, end, at) for end in ends]
+        return max((one for one in differences if one is not None), default=None)
 
     def _at_stake(
         self, before: ContactState, point: Point | None, rival: Point | None, at: float

@@ -58,16 +58,20 @@ class Predictor:
         )
         self.fastest, self.fold_distance = leading.fastest, leading.fold_distance
 
-    def other_fold_distance(self) -> float:
-        """Distance in d of the nearest fold in which other gaps lead; inf if none is seen."""
+    @property
+    def leading_edge(self) -> int:
+        """Edge that leads to the fold that is seen."""
+        return int(self._leading.edge)
+
+    def other_fold(self) -> OtherFold:
+        """Predict the nearest fold in which other gaps lead; at infinity if none is seen."""
         if math.isinf(self.fold_distance):
-            return math.inf
+            return OtherFold(-1, math.inf)
         point, earlier = self.point, self._earlier
-        return float(
-            other_fold(
-                point.gaps, point.rate, earlier.gaps, earlier.rate, self.way, self._leading.edge
-            )
+        other: OtherFold = other_fold(
+            point.gaps, point.rate, earlier.gaps, earlier.rate, self.way, self._leading.edge
         )
+        return other
 
     def gaps(self, at: float) -> Array:
         """Gaps that are expected at d = ``at``."""
@@ -103,7 +107,25 @@ class Predictor:
 
     def across(self, finest: float) -> float:
         """Step across the fold that is seen."""
-        return (1 + LEFT_BEFORE_FOLD) * self.fold_distance + BEYOND_FOLD * finest
+        return self.across_fold(self.fold_distance, finest)
+
+    def across_fold(self, distance: float, finest: float) -> float:
+        """Step across a fold at this distance."""
+        return (1 + LEFT_BEFORE_FOLD) * distance + BEYOND_FOLD * finest
+
+
+class OtherFold(NamedTuple):
+    """Fold ahead that others lead to than the leading edge: their edge, -1 for none, and distance.
+
+    Attributes
+    ----------
+    edge : int
+    distance : float
+        In d.
+    """
+
+    edge: int
+    distance: float
 
 
 class LeadingEdge(NamedTuple):
@@ -154,15 +176,16 @@ def leading_edge(
 @compiled
 def other_fold(
     gaps: Array, rate: Array, gaps_before: Array, rate_before: Array, way: float, leading: int
-) -> float:
+) -> OtherFold:
     """Find the nearest fold ahead that other gaps lead than the leading edge's and those beside."""
-    fastest, count, nearest = np.abs(rate).max(), gaps.shape[0], np.inf
+    fastest, count, found, nearest = np.abs(rate).max(), gaps.shape[0], -1, np.inf
     for edge in range(rate.shape[0]):
         apart = abs(edge // 2 - leading // 2)
         if min(apart, count - apart) > 1 and abs(rate[edge]) > LEADING_SHARE * fastest:
             other = _follow_edge(edge, gaps, rate, gaps_before, rate_before, way)
-            nearest = min(nearest, other.fold_distance)
-    return nearest
+            if other.fold_distance < nearest:
+                found, nearest = edge, other.fold_distance
+    return OtherFold(found, nearest)
 
 
 @compiled
