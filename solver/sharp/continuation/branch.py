@@ -93,6 +93,7 @@ class Branch:
         self._predictor = Predictor(point)
         self._work_before = (0.0, math.inf)  # span and error of the step that was last judged
         self._two_folds: TwoFolds | None = None
+        self._folds_apart = math.inf  # by the last prediction that saw two
 
     def advance(self) -> Accepted | Fold:
         """Take steps until one is accepted, or the smallest one finds no equilibrium."""
@@ -199,18 +200,23 @@ class Branch:
     def _look_for_two_folds(self) -> None:
         """Note whether two folds ahead are nearer to each other than jumps are located.
 
-        Next to a fold they are no longer seen apart: both edges are fast there.
+        By the last two predictions: next to a fold, where both edges are fast, the second one may
+        be seen too far away.
         """
         predictor, resolution = self._predictor, self._resolution.jump
         first = predictor.fold_distance
-        if not resolution < first < TWO_FOLDS_SEEN * resolution:
+        if not first < TWO_FOLDS_SEEN * resolution:
             return
         other = predictor.other_fold()
+        if math.isinf(other.distance):
+            return
+        now = other.distance - first
+        apart, self._folds_apart = min(now, self._folds_apart), now
         self._two_folds = None
-        if other.distance - first < resolution:
+        if apart < resolution:
             way = math.copysign(predictor.across_fold(other.distance, resolution), predictor.way)
             edges = predictor.leading_edge, other.edge
-            self._two_folds = TwoFolds(edges, predictor.point.at + way)
+            self._two_folds = TwoFolds(edges, predictor.point.at + way, apart)
 
     def _trapezoid_error(self, output: Point, point: Point) -> float:
         """Error of the trapezoidal rule since the last output, in units of what is allowed."""

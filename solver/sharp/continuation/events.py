@@ -32,7 +32,7 @@ class Accepted:
 
 @dataclass(frozen=True, eq=False)
 class TwoFolds:
-    """Two folds of a branch so near to each other that either may come first.
+    """Two folds of a branch that are predicted nearer to each other than jumps are located.
 
     Attributes
     ----------
@@ -40,10 +40,13 @@ class TwoFolds:
         The edge that leads to each of them.
     beyond : float
         d beyond both.
+    apart : float
+        Their distance in d.
     """
 
     edges: tuple[int, int]
     beyond: float
+    apart: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +60,7 @@ class Fold:
     at : float
         d a smallest step beyond it, or the target.
     with_another : TwoFolds, optional
-        Whether a second fold is so near that it may come first.
+        If a second one is near.
     """
 
     point: Point

@@ -30,6 +30,7 @@ from adhesis.solver.sharp.tolerances import (
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
     SAME_BRANCH,
+    SECOND_FOLD_DISPLACED,
 )
 from adhesis.solver.values import with_values
 
@@ -320,9 +321,12 @@ class Follower:
         return replace(jump, states=(*states, before, after), misplaced=misplaced), finest
 
     def _orders_of_folds(self, fold: Fold) -> Orders | None:
-        """Return starts from which either of two folds comes first, if there are two."""
+        """Return starts from which either of two folds comes first, if both may."""
         two, point = fold.with_another, fold.point
         if two is None:
+            return None
+        displaced = abs(self.edges.system(point.gaps).fold_displacement(point))
+        if two.apart > max(self.resolution.order, SECOND_FOLD_DISPLACED * displaced):
             return None
         way = fold.at - point.at
         furthest = max(fold.at, two.beyond) if way > 0 else min(fold.at, two.beyond)
