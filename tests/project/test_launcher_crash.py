@@ -52,11 +52,13 @@ def test_a_test_runs_once_more_if_mpirun_crashes_in_it(tmp_path: Path) -> None:
 
 
 HANGING = """
+import os
 import shutil
 import subprocess
-import sys
 
 import pytest
+
+from tests.support import campaign_support
 
 runs = []
 
@@ -71,11 +73,22 @@ def test_hang(ranks, tmp_path):
         process = subprocess.Popen(words, **pipes)
         process.stdout.readline()
         process.wait(timeout=0.1)
+
+def test_hang_of_a_command(tmp_path, monkeypatch):
+    launcher = tmp_path / "mpirun"
+    os.mkfifo(tmp_path / "unwritten")
+    launcher.write_text(f"#!/bin/bash\\nread < {tmp_path}/unwritten\\n")
+    launcher.chmod(0o700)
+    monkeypatch.setattr(campaign_support, "MPIRUN", str(launcher))
+    runs.append("command")
+    if runs.count("command") == 1:
+        campaign_support.adhesis("status", ranks=1, timeout=0.1)
 """
 
 
 def test_a_test_runs_once_more_if_mpirun_hangs_in_it_without_ranks(tmp_path: Path) -> None:
     lines = lines_of(HANGING, tmp_path)
-    assert [line.split("::")[1] for line in lines if line.startswith("PASSED")] == ["test_hang[0]"]
+    passed = [line.split("::")[1] for line in lines if line.startswith("PASSED")]
+    assert passed == ["test_hang[0]", "test_hang_of_a_command"]
     failed = [line.split("::")[1].split()[0] for line in lines if line.startswith("FAILED")]
     assert failed == ["test_hang[1]"]

@@ -100,17 +100,21 @@ def command(words: Iterable[object], ranks: int = 0, fake: str | None = None) ->
 
 
 def adhesis(
-    *words: object, ranks: int = 0, fake: str | None = None, cwd: Path | None = None
+    *words: object,
+    ranks: int = 0,
+    fake: str | None = None,
+    cwd: Path | None = None,
+    timeout: float = 150.0,
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end."""
-    return subprocess.run(
-        command(words, ranks, fake),
-        env=environment(),
-        cwd=cwd,
-        capture_output=True,
-        text=True,
-        timeout=150,
-    )
+    """Run a command to its end; TimeoutExpired if that does not come."""
+    process = start(*words, ranks=ranks, fake=fake, cwd=cwd)
+    try:
+        out, errors = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        if process.pid not in hung_launchers():  # which are left to whoever looks for them
+            kill_all(process)
+        raise
+    return subprocess.CompletedProcess(process.args, process.returncode, out, errors)
 
 
 def adhesis_here(*words: object, fake: str | None = None) -> subprocess.CompletedProcess[str]:
@@ -126,11 +130,14 @@ def adhesis_here(*words: object, fake: str | None = None) -> subprocess.Complete
     return subprocess.CompletedProcess(list(words), code, out.getvalue(), errors.getvalue())
 
 
-def start(*words: object, ranks: int = 0, fake: str | None = None) -> subprocess.Popen[str]:
+def start(
+    *words: object, ranks: int = 0, fake: str | None = None, cwd: Path | None = None
+) -> subprocess.Popen[str]:
     """Start a command in a process group of its own."""
     return subprocess.Popen(
         command(words, ranks, fake),
         env=environment(),
+        cwd=cwd,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -158,6 +165,17 @@ def has_ended(pid: int) -> bool:
     except OSError:
         return True
     return stat.rpartition(")")[2].split()[0] == "Z"
+
+
+def hung_launchers() -> list[int]:
+    """Return the launchers among this process's children that have no ranks any more."""
+    return [
+        pid
+        for pid in ranks_of(os.getpid())
+        if not has_ended(pid)
+        and Path(f"/proc/{pid}/comm").read_text().strip() in ("mpirun", "orterun")
+        and all(has_ended(rank) for rank in ranks_of(pid))
+    ]
 
 
 def wait_until(condition: Callable[[], bool], seconds: float = 150.0) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import signal
-from pathlib import Path
 
 import pytest
 from _pytest.runner import runtestprotocol
@@ -19,23 +18,12 @@ _OF_MPIRUN = "PMIx_server_finalize"  # in the stack of its crash
 _TIMEOUT = "TimeoutExpired"  # of whoever waits for it
 
 
-def hung_launchers() -> list[int]:
-    """Return the launchers among this process's children that have no ranks any more."""
-    from tests.support.campaign_support import has_ended, ranks_of  # loads h5py
-
-    return [
-        pid
-        for pid in ranks_of(os.getpid())
-        if not has_ended(pid)
-        and Path(f"/proc/{pid}/comm").read_text().strip() in ("mpirun", "orterun")
-        and all(has_ended(rank) for rank in ranks_of(pid))
-    ]
-
-
 def is_mpiruns(report: pytest.TestReport) -> bool:
     """Whether a test failed by mpirun itself; launchers that hang are ended."""
     if not report.failed:
         return False
+    from tests.support.campaign_support import hung_launchers  # loads h5py
+
     if _OF_MPIRUN in report.longreprtext:
         return True
     hung = hung_launchers() if _TIMEOUT in report.longreprtext else []
