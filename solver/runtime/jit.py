@@ -78,7 +78,12 @@ def compiled_for_both(function: F) -> F:
 
 
 def compiled_sums(function: F) -> F:
-    """Compile ``function`` likewise, with sums taken in any order (vectorised)."""
+    """Compile ``function`` likewise, with sums taken in any order (vectorised).
+
+    A loop that sums must not write to an array, too: where that array lies near another one in
+    memory, LLVM's code goes through the loop without vectors, and the last bit of the sum would
+    depend on addresses.
+    """
     return _compile(function, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 

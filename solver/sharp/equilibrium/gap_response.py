@@ -242,7 +242,8 @@ def _charge_gap(
             value -= 0.5 * (left[i] * follows[j, 0] + left[j] * follows[i, 0])
             value -= 0.5 * (right[i] * follows[j, 1] + right[j] * follows[i, 1])
             row[j] = value
-            total += value * potential[j]
-            mean += value * stretch[j]
+        for j in range(m):
+            total += row[j] * potential[j]
+            mean += row[j] * stretch[j]
         charge[0, first + i] += total
         out.mean_by_potential[first + i] = mean

@@ -303,6 +303,7 @@ def _interpolate(
         line = out[b * rank : (b + 1) * rank]
         for a in range(rank):
             line[a] = share[a] / (x - node[a])
+        for a in range(rank):
             total += line[a]
         if np.isfinite(total):
             for a in range(rank):

@@ -297,12 +297,12 @@ def _sum_moments(nodes: Array, count: int, s: Array, ends: Array) -> None:
     for i in range(count):
         minus = nodes[_MINUS, i]
         plus = nodes[_PLUS, i]
-        root = np.sqrt(minus * plus)
-        current[i] = root
+        current[i] = np.sqrt(minus * plus)
         twice[i] = 2 * eta_from(minus, plus)
-        share = nodes[_STRESS, i] / (root * np.pi)
-        low0 += share * minus
-        high0 += share * plus
+    for i in range(count):
+        share = nodes[_STRESS, i] / (current[i] * np.pi)
+        low0 += share * nodes[_MINUS, i]
+        high0 += share * nodes[_PLUS, i]
     ends[0, 0] = low0
     ends[1, 0] = high0
     if fields > 1:
