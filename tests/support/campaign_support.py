@@ -110,7 +110,7 @@ def adhesis(
     process = start(*words, ranks=ranks, fake=fake, cwd=cwd)
     try:
         out, errors = process.communicate(timeout=timeout)
-    except subprocess.TimeoutExpired:
+    except BaseException:  # Ctrl-C does not reach a process group of its own
         if process.pid not in hung_launchers():  # which are left to whoever looks for them
             kill_all(process)
         raise
