@@ -179,7 +179,7 @@ def print_study(campaigns: int, batch: int, most: int) -> None:
 
 def main() -> None:
     """Print one of the three tables."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0], allow_abbrev=False)
     parser.add_argument("--campaigns", type=int, default=1000)
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--most", type=int, default=1000)

@@ -171,7 +171,7 @@ def stamps() -> dict[str, str | None]:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Make or check; returns 1 if a check finds one without a stamp."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0], allow_abbrev=False)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="default: all")
     parser.add_argument("--ranks", type=int, default=1, help="ranks of the campaigns' runs")
     parser.add_argument("--check", action="store_true", help="only say of which commit each is")

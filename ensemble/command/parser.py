@@ -31,6 +31,8 @@ class Parser(argparse.ArgumentParser):
             epilog="\n  ".join(["examples:", *examples]),
             formatter_class=argparse.RawDescriptionHelpFormatter,
             exit_on_error=False,
+            # what passes options on, as the scripts of jobs/ do, knows them by their names
+            allow_abbrev=False,
         )
         for action in (None, "store"):
             self.register("action", action, _StoreOnce)

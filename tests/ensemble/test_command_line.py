@@ -417,3 +417,36 @@ def test_ranks_are_bounded_by_cores_and_nodes():
     most = launch.largest_number_of_ranks({})
     assert most == 16 * launch.cores()
     assert launch.largest_number_of_ranks({"SLURM_JOB_NUM_NODES": "100"}) == 100 * most
+
+
+# ---------------------------------------------------------------------- abbreviations
+
+
+def filled(parser: argparse.ArgumentParser) -> list[str]:
+    """Return words with all that a command requires."""
+    words = []
+    for action in parser._actions:
+        value = str(next(iter(action.choices))) if action.choices else "1"
+        if action.option_strings and action.required:
+            words += [action.option_strings[0], value]
+        elif not action.option_strings and action.nargs not in ("?", "*"):
+            words.append(value)
+    return words
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_option_can_be_abbreviated(name, capsys):
+    """What passes options on, as the batch scripts do, knows them by their whole names."""
+    parser = parser_of(name)
+    words, options = filled(parser), set(parser._option_string_actions)
+    parser.parse(words)
+    short = {o[:end] for o in options if o.startswith("--") for end in range(3, len(o))} - options
+    assert short
+    for option in sorted(short):
+        for given in ([option, "1"], [f"{option}=1"]):
+            assert given[0] in refused(capsys, [name, *words, *given])
+
+
+def test_the_overview_takes_no_abbreviation_either(capsys):
+    for word in ("--vers", "--he", "stat"):
+        assert f"COMMAND is '{word}'" in refused(capsys, [word])

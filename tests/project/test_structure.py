@@ -320,3 +320,19 @@ def test_nothing_imports_the_folders_by_their_bare_names() -> None:
     ]
     for path in (*PATHS.values(), *places):
         assert {n.split(".")[0] for n in imported(path)} & {"solver", "ensemble"} == set(), path
+
+
+def test_no_program_takes_abbreviated_options() -> None:
+    """A new option may make an abbreviation ambiguous that scripts use."""
+    programs = [
+        path
+        for top in ("benchmarks", "docs", "examples", "tools")
+        for path in (ROOT / top).rglob("*.py")
+    ]
+    for path in (*PATHS.values(), *programs):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and (
+                ast.unparse(node.func).endswith(("ArgumentParser", ".add_parser"))
+            ):
+                given = {word.arg: ast.unparse(word.value) for word in node.keywords}
+                assert given.get("allow_abbrev") == "False", f"{path}:{node.lineno}"

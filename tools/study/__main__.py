@@ -15,12 +15,18 @@ STUDY = Path(__file__).resolve().parent.parent.parent / "docs" / "study"
 
 def main() -> None:
     """Read the command line and do it."""
-    parser = argparse.ArgumentParser(prog="python -m tools.study", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.study", description=__doc__, allow_abbrev=False
+    )
     commands = parser.add_subparsers(dest="command", required=True)
-    collect = commands.add_parser("collect", help="results files to small tables")
+    collect = commands.add_parser(
+        "collect", help="results files to small tables", allow_abbrev=False
+    )
     collect.add_argument("folder", type=Path)
-    page = commands.add_parser("page", help="small tables to the page and its figures")
-    figures = commands.add_parser("figures", help="small tables to figures")
+    page = commands.add_parser(
+        "page", help="small tables to the page and its figures", allow_abbrev=False
+    )
+    figures = commands.add_parser("figures", help="small tables to figures", allow_abbrev=False)
     figures.add_argument("--to", type=Path, required=True, help="an existing folder")
     for command in (collect, page, figures):
         command.add_argument("--study", type=Path, default=STUDY, help="folder of page and tables")
