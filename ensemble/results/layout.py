@@ -26,6 +26,7 @@ from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
+from adhesis.ensemble.results.disk_file import opened, refusal
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results, stretches
 from adhesis.ensemble.results.schema import (
@@ -81,6 +82,8 @@ def create(
     ------
     InputError
         If the file cannot be written or the disk is too small.
+    WriteError
+        If the disk does not take it.
     """
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
@@ -94,7 +97,7 @@ def create(
                 )
             # Made anew, so that a link of that name is removed and not followed.
             unfinished.unlink(missing_ok=True)
-            with h5py.File(unfinished, "x", locking=False) as file:
+            with opened(unfinished, "x+b") as (file, _):
                 reserve_head(file)
                 _lay_out(file, campaign, part)
                 _describe(file, campaign, part, versions or {}, grown_from)
@@ -105,7 +108,7 @@ def create(
                 os.fsync(handle.fileno())
             unfinished.replace(path)
         except OSError as error:
-            raise InputError(f"{path} cannot be written: {reason(error)}") from error
+            raise refusal(error)(f"{path} cannot be written: {reason(error)}") from error
         finally:
             unfinished.unlink(missing_ok=True)
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
+from adhesis.ensemble.results.disk_file import DiskFile
 from adhesis.ensemble.results.schema import (
     CHECKSUM,
     DATASETS,
@@ -62,14 +63,17 @@ class Writer:
         origin: Callable[[int], str] = lambda rank: "",
     ) -> None:
         self.path = Path(path)
-        self._serial = comm is None
         # HDF5's own lock would refuse readers; two writers are refused by
         # adhesis.ensemble.run.lock.
-        options = {"locking": False} if comm is None else {"driver": "mpio", "comm": comm}
-        self._file = h5py.File(self.path, "r+", **options)
+        self._disk = DiskFile(self.path, "r+b") if comm is None else None
+        with signals_held():
+            if self._disk is not None:
+                self._file = h5py.File(self._disk, "r+")
+            else:
+                self._file = h5py.File(self.path, "r+", driver="mpio", comm=comm)
+            self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
+            self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
         self._origin = origin
-        self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
-        self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
 
     def __enter__(self) -> Self:
         return self
@@ -81,13 +85,16 @@ class Writer:
         trace: TracebackType | None,
     ) -> None:
         # Closing is collective: a rank that failed alone must not wait here for the others. And
-        # HDF5 1.10 crashes when it closes a file that it cannot write to.
-        if error is None or (self._serial and not isinstance(error, WriteError)):
+        # HDF5 1.10 crashes when all ranks close a file that it cannot write to.
+        if error is None or self._disk is not None:
             self.close()
 
     def close(self) -> None:
         """Close the file (collectively, if it was opened so)."""
-        self._file.close()
+        with signals_held():
+            self._file.close()
+            if self._disk is not None:
+                self._disk.close()
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
         """Write the row of a task that was computed; its status last.
@@ -183,8 +190,9 @@ class Writer:
     def flush(self) -> None:
         """Hand what was written to the operating system."""
         # Parallel HDF5 keeps no data back; the serial driver does, in any order.
-        if self._serial:
+        if self._disk is not None:
             self._file.flush()
+            self._disk.check()
 
 
 class DatasetRows:

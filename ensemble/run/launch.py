@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -25,6 +26,7 @@ from pathlib import Path
 from types import FrameType
 
 from adhesis import _version
+from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.run.interrupt import stop_signals
 
 # Variables that a launcher sets for its ranks. A second launcher that inherits them passes for one
@@ -53,6 +55,9 @@ _LOOK_EVERY = 0.5  # s
 
 # Open MPI reports each signal that it passes on, in a line of its own.
 _QUIET = {"OMPI_MCA_orte_execute_quiet": "1"}
+
+# Open MPI 4.1 makes files of a little more than 4 MB in /tmp and /dev/shm.
+_SHARED_BYTES = 8 * 2**20
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
 _LIBC = ctypes.CDLL(None)
@@ -137,6 +142,24 @@ def largest_number_of_ranks(environ: Mapping[str, str] = os.environ) -> int:
     return _RANKS_PER_CORE * cores() * (int(nodes) if nodes.isdecimal() else 1)
 
 
+def check_file_size_limit() -> None:
+    """Refuse a limit of file sizes under which ranks cannot share memory.
+
+    Open MPI 4.1 hangs there, or its ranks crash, before any of them has begun.
+
+    Raises
+    ------
+    WriteError
+    """
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    if limit != resource.RLIM_INFINITY and limit < _SHARED_BYTES:
+        raise WriteError(
+            f"ranks could not be started: they share memory in files of some MB, and the limit of "
+            f"file sizes (ulimit -f) is {limit / 1e6:g} MB; raise it to {_SHARED_BYTES / 1e6:.0f} "
+            "MB, or leave --ranks out"
+        )
+
+
 def hand_over(code: int, sentence: str = "") -> bool:
     """Pass exit code and last message to the process that started the ranks.
 
@@ -187,6 +210,7 @@ def run_ranks(
     output : callable, optional
         Takes each line that the ranks print; without it they print where this process does.
     """
+    check_file_size_limit()
     # With -m mpi4py, an error that a rank does not handle ends the others, too.
     program = program or python("-m", "mpi4py", "-m", "adhesis")
     handle, handed_over = tempfile.mkstemp(prefix="adhesis-")

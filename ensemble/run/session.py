@@ -15,6 +15,7 @@ import h5py
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
@@ -232,17 +233,21 @@ def run_campaign(
     lock = RunLock(path)
     with ExitStack() as stack, StopSignals() as signals:
         stack.push(lock)
-        plan = together(
-            comm,
-            lambda: prepare(
-                *(campaign, path, lock, size),
-                part=options.part,
-                redo=options.redo,
-                patience=options.patience,
-                say=say,
-                check=engine.check,
-            ),
-        )
+        try:
+            plan = together(
+                comm,
+                lambda: prepare(
+                    *(campaign, path, lock, size),
+                    part=options.part,
+                    redo=options.redo,
+                    patience=options.patience,
+                    say=say,
+                    check=engine.check,
+                ),
+            )
+        except WriteError:
+            lock.release()  # no other rank writes yet
+            raise
         origins = [""] * size
         if plan.rows:
             origins = _origins(comm)

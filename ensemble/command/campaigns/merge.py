@@ -40,7 +40,11 @@ def execute(args: argparse.Namespace) -> int:
     try:
         with RunLock(out) as lock:
             lock.acquire(1, 10.0)
-            merged = merge(args.parts, out)
+            try:
+                merged = merge(args.parts, out)
+            except WriteError:
+                lock.release()  # nobody else writes
+                raise
     except WriteError as error:
         print(f"adhesis merge: {error}; the same command resumes", file=sys.stderr)
         return _WRITE_FAILED

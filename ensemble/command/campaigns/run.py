@@ -2,8 +2,9 @@
 
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
-itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime): run the
-same command again to resume. 137: a rank that --ranks started was killed; the same holds.
+itself, 71 too little memory or too few processes, 74 the results file could not be written, 75
+stopped early (a signal, the walltime): run the same command again to resume. 137: a rank that
+--ranks started was killed; the same holds.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble.command.streams import OutputError, write_line
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, lack
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
@@ -26,11 +27,15 @@ if TYPE_CHECKING:
     from adhesis.ensemble.run.session import Engine, Options, Summary
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
-OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
+OUR_ERROR, TOO_FEW_RESOURCES = 70, 71  # EX_SOFTWARE, EX_OSERR
+WRITE_FAILED, RESUME = 74, 75  # EX_IOERR, EX_TEMPFAIL
 INTERRUPTED = 130  # by a second Ctrl-C: the first one stops the run in order
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
-_CODES = (DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, WRITE_FAILED, RESUME, INTERRUPTED)
+_CODES = (
+    *(DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, TOO_FEW_RESOURCES),
+    *(WRITE_FAILED, RESUME, INTERRUPTED),
+)
 EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
@@ -129,6 +134,9 @@ def execute(
     except BaseException as error:
         if args.dry_run and isinstance(error, (BrokenPipeError, OutputError)):
             raise
+        if sentence := lack(error):
+            _end_job(comm, TOO_FEW_RESOURCES, f"adhesis run: {sentence}; what was done is kept")
+            return TOO_FEW_RESOURCES
         traceback.print_exc()
         _end_job(comm, OUR_ERROR)
         return OUR_ERROR
