@@ -2,8 +2,8 @@
 
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
-itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime): run the
-same command again to resume. 137: a rank that --ranks started was killed; the same holds.
+itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime, a rank that
+does not answer): run the same command again to resume. 137: a rank that --ranks started was killed; the same holds.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ranks",
         metavar="N",
-        help="start N ranks here (one more than cores is right: rank 0 only waits)",
+        help="start N ranks here, without MPI as processes (one more than cores is right: rank 0 "
+        "only waits)",
     )
     parser.add_argument(
         "--dry-run",
