@@ -163,7 +163,10 @@ def number_with_unit(
 
 def length_text(metres: float, digits: int = 3) -> str:
     """Format a length in a unit of its size: "5 µm"."""
-    for unit in ("m", "mm", "µm"):
-        if abs(metres) >= METRES[unit]:
-            return f"{metres / METRES[unit]:.{digits}g} {unit}"
-    return f"{metres / METRES['nm']:.{digits}g} nm"
+    unit = length_unit(metres)
+    return f"{metres / METRES[unit]:.{digits}g} {unit}"
+
+
+def length_unit(metres: float) -> str:
+    """Return the largest of m, mm, µm and nm that is not larger than a length; nm for less."""
+    return next((unit for unit in ("m", "mm", "µm") if abs(metres) >= METRES[unit]), "nm")

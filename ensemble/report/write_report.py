@@ -91,6 +91,10 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
         ("fields", with_shapes),
         ("companions", PENETRATIONS if of_penetration(data) else ()),
     )
+    sections = tuple(
+        (name, [i for i in items if i.is_worth(data if i.whole else data.shown)])
+        for name, items in sections
+    )
     items = [item for _, illustrations in sections for item in illustrations]
     for number, item in enumerate(items, 1):
         progress(f"figure {number} of {len(items)}, {item.name}")
