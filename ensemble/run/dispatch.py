@@ -138,7 +138,7 @@ class Master:
     Attributes
     ----------
     notes : dict of int to object
-        Last note of each task in progress.
+        Last note of each task that is handed out and not answered; None before the first.
     """
 
     def __init__(
@@ -290,6 +290,7 @@ class Master:
             tasks = self._units.tasks(first)
             for task in tasks:
                 sent[task] = math.inf if seconds is None else seconds / len(tasks)
+                self.notes[task] = None
                 self._channel.send(rank, ("task", task))
             heapq.heapreplace(self._room, (len(sent), rank))
 

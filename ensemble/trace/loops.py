@@ -68,11 +68,11 @@ class Loops:
         if self._master is None:
             return {}
         notes = self._master.notes
-        return {self._jobs[task].name: note for task, note in notes.items() if note is not None}
+        return {self._jobs[k].name: note or (0.0, "loading", 0.0) for k, note in notes.items()}
 
     @property
     def waiting(self) -> list[str]:
-        """Names of the jobs of which nothing has been heard."""
+        """Names of the jobs that are not begun."""
         running = self.running
         return [j.name for j in self._jobs if j.name not in self.done and j.name not in running]
 
