@@ -8,6 +8,7 @@ import json
 import os
 import re
 import tempfile
+import warnings
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
@@ -147,7 +148,8 @@ class Campaign:
         Returns
         -------
         CampaignResults
-            As :func:`adhesis.open` returns it. Failed tasks are counted in its ``repr``.
+            As :func:`adhesis.open` returns it. Failed tasks are counted in its ``repr``, and in a
+            warning with the first reason.
 
         Raises
         ------
@@ -185,7 +187,9 @@ class Campaign:
             self._run_ranks(mpirun, path, ranks, progress)
         from adhesis._open import open as open_results
 
-        return open_results(path)
+        results = open_results(path)
+        _warn_of_failures(path)
+        return results
 
     def _run_here(self, path: Path, processes: int, progress: bool) -> None:
         from adhesis.ensemble.reporter import log
@@ -222,6 +226,19 @@ class Campaign:
                 sentence
                 or f"the ranks ended with exit code {code}; what was done is kept in {path}"
             )
+
+
+def _warn_of_failures(path: Path) -> None:
+    """Warn with the number of failed tasks and the first reason."""
+    from adhesis.ensemble.results.status import read_status
+
+    status = read_status(path)
+    if status["failed"]:
+        warnings.warn(
+            f"{status['failed']} of {status['tasks']} tasks failed, and the averages leave them "
+            f"out; first reason: {status['failures'][0]['error']}",
+            stacklevel=3,
+        )
 
 
 def _toml(source: Mapping[str, Any]) -> str:

@@ -11,13 +11,15 @@ from adhesis.ensemble.stresses import PASCALS, stress_unit
 
 _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range position step length "
-    "height_range adhesion_range tip_radius cut_off noise longest highest rise form_height rms_level noise_rms "
+    "height_range adhesion_range tip_radius cut_off noise longest highest rise form_height "
+    "rms_level noise_rms "
     "limit_step limit_noise limit_tip coefficient_real coefficient_imag narrowest_length",
     "m²": "m0",
     "1/m²": "m4",
     "m³": "power floor",
     "rad/m": "wave_number",
-    "Pa": "young strength preload modulus mean_stress pull_off_stress stress_change max_stress tension "
+    "Pa": "young strength preload modulus mean_stress pull_off_stress stress_change max_stress "
+    "tension "
     "largest_interior_tension",
     "Pa/m": "stiffness",
     "J/m": "energy elastic_energy adhesion_energy potential hold_energy",

@@ -254,7 +254,7 @@ def _report_end(
         f"{summary.computed} computed in {duration(summary.seconds)}"
     )
     if summary.failed:
-        say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
+        say(f"why they failed, and what to do: adhesis status {path}")
     for line in precision_lines(summary.precisions):
         say(line)
     if summary.doubtful:

@@ -105,7 +105,7 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
             axes.set_xscale("log")
     handles, texts = grid[0][0].get_legend_handles_labels()
     if any(texts):
-        legend_above(figure, handles, 3)
+        legend_above(figure, handles, 3 if second is None else 2)
     say_below(figure, place(fixed))
     return figure
 

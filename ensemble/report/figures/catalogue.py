@@ -109,8 +109,8 @@ SHAPES = (
     Illustration(
         "fig3_shapes",
         "Deformed shapes",
-        "The first realisation that kept its fields: rigid profile h, and the elastic surface above "
-        "it on both branches, at the same prescribed value. In contact the two coincide. "
+        "The first realisation that kept its fields: rigid profile h, and the elastic surface "
+        "above it on both branches, at the same prescribed value. In contact the two coincide. "
         "Right: one and a half of the longest waves around the highest point, carried on across "
         "the end of the period where it lies near one.",
         shapes_and_spectra.shapes,
@@ -209,6 +209,8 @@ PENETRATIONS = (
     ),
 )
 
+ALL = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
+
 
 def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
     """One figure for each further axis of the campaign, unless it goes with H or γ."""
@@ -230,7 +232,7 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
                 else ""
             )
             + (
-                " A line for each value of the other axis; any more are as written below the panels."
+                " A line for each value of the other axis; more axes: as written below the panels."
                 if set(data.further) - {a for a in data.further if a.name in together(data, axis)}
                 else ""
             ),

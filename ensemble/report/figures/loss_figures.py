@@ -58,7 +58,7 @@ def loss_quantity(data: Aggregate) -> tuple[str, str, float]:
 
 
 def loss_against_hurst(data: Aggregate) -> Figure:
-    """Table 1 as a figure: loss of each H with intervals, a panel for each γ, the paper's beside."""
+    """Table 1 as a figure: loss of each H with intervals and the paper's, a panel for each γ."""
     shown, (name, label, unit) = shown_gammas(data), loss_quantity(data)
     columns = min(len(shown), _MOST_BESIDE)
     rows = -(-len(shown) // columns)
