@@ -31,6 +31,8 @@ SENTENCES = {
     "solver/model/problem.py": ("full_contact",),
     "solver/loading/loop_result.py": ("warnings", "strain_warnings"),
     "solver/loading/zero_range.py": ("range_warnings",),
+    "ensemble/trace/reading/measured_trace.py": ("_no_map",),
+    "ensemble/trace/reading/instrument.py": ("_unknown", "_neither"),
     "ensemble/loop/heights.py": ("_not_one_column", "closure_warning", "few_heights_warning"),
 }
 

@@ -1,0 +1,78 @@
+"""Find missing heights: numbers that instruments write for them, and rows that a column marks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from adhesis.solver.checks import counted
+from adhesis.solver.model.profile import Array
+
+# A height that lies this many ranges of all usual heights outside them, and is repeated, stands for
+# a missing one. For numbers that instruments are known to write the second value holds, and once is
+# enough.
+_BEYOND, _BEYOND_KNOWN = 5.0, 0.2
+_REPEATED = 3
+_CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
+_ENORMOUS = 1e20
+_NINES = re.compile(r"-?9{2,}\.?9+")
+_VALID = re.compile(r"\W*(valid|validity|is[ _]?valid|gültig)\b", re.IGNORECASE)
+
+
+def is_known_code(value: float) -> bool:
+    """Return whether instruments write this number for a missing height."""
+    return abs(value) >= _ENORMOUS or any(abs(abs(value) - code) <= 1.0 for code in _CODES)
+
+
+def without_codes(heights: Array) -> tuple[Array, str]:
+    """Replace numbers that stand for missing heights by NaN; return heights and a description."""
+    heights = np.where(np.isfinite(heights), heights, np.nan)
+    values, times = np.unique(heights[np.isfinite(heights)], return_counts=True)
+    known = np.array([is_known_code(value) for value in values], dtype=bool)
+    if (~known).sum() < 2:
+        return heights, ""
+    low, high = _usual(values[~known])
+    away = np.maximum(low - values, values - high)
+    nines = np.array([bool(_NINES.fullmatch(f"{value:g}")) for value in values], dtype=bool)
+    on_both_sides = np.isin(-values, values)
+    repeated = times >= _REPEATED
+    far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
+    out = (away > _BEYOND_KNOWN * (high - low)) & (known | (nines & repeated))
+    codes = far | out
+    if not codes.any():
+        return heights, ""
+    shown = ", ".join(f"{value:.10g}" for value in values[codes][:4])
+    return (
+        np.where(np.isin(heights, values[codes]), np.nan, heights),
+        f"{counted(int(times[codes].sum()), 'height')} of {shown} taken as drop-outs: far out of "
+        "the range",
+    )
+
+
+def _usual(values: Array) -> tuple[float, float]:
+    """Return the range of the usual ones of different heights, in ascending order.
+
+    It grows from the middle half of them, as long as more lie within _BEYOND times its width.
+    """
+    low, high = (float(values[int(part * (values.size - 1))]) for part in (0.25, 0.75))
+    if low == high:
+        return float(values[0]), float(values[-1])
+    while True:
+        reach = _BEYOND * (high - low)
+        inside = values[(values >= low - reach) & (values <= high + reach)]
+        if inside[0] == low and inside[-1] == high:
+            return low, high
+        low, high = float(inside[0]), float(inside[-1])
+
+
+def invalid_rows(columns: Array, fields: Sequence[Sequence[str]]) -> tuple[Array, str]:
+    """Return which rows a column named "valid" marks with nought, and a description."""
+    for names in fields:
+        for k, name in enumerate(names):
+            if _VALID.match(name):
+                marked = columns[k] == 0
+                told = f"{counted(int(marked.sum()), 'height')} marked 0 in column {k + 1} ({name})"
+                return marked, f"{told} taken as drop-outs"
+    return np.zeros(columns.shape[1], dtype=bool), ""
