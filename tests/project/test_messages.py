@@ -12,7 +12,8 @@ import pytest
 ROOT = Path(__file__).parent.parent.parent
 PAGE = ROOT / "docs" / "troubleshooting.md"
 ERRORS = {
-    *("InputError", "WriteError", "RankError", "UnitError", "PathError", "OutputError"),
+    *("InputError", "WriteError", "RankError", "UnitError", "UnknownFormatError", "PathError"),
+    "OutputError",
     *("ValueError", "TypeError", "NotImplementedError", "argparse.ArgumentTypeError"),
 }
 # Errors that are caught inside, or that a mistake of the code itself would raise.

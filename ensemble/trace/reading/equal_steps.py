@@ -127,7 +127,8 @@ def _step_of_rounded(x: Array) -> tuple[float, float] | None:
     steps = np.diff(x)
     if digit is None or np.any(steps < 0):
         return None
-    if np.sum(np.abs(steps - np.median(steps)) > digit / 2) < _IRREGULAR:
+    middle = float(np.median(steps))
+    if np.sum(np.abs(steps - middle) > max(digit / 2, _UNEVEN * middle)) < _IRREGULAR:
         return None
     k = np.arange(x.size)
     allowed = digit * (1 + 1e-6)

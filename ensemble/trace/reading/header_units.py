@@ -38,7 +38,7 @@ _NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?(?![^\W_e
 # A field with a value names no column: "0.5 µm", "Cut-off (mm): 0.8". "Channel 1 (µm)" names one.
 _VALUE = re.compile(
     rf"(?<![^\W_])(?:\d+|\d*[.,]\d+\s*[(\[]?)\s*({_WORD})(?![^\W_])"
-    rf"|[:=]\s*[+\-]?[.,]?\d|(?:^|\s){_NUMBER}\s*$",
+    rf"|[:=]\s*[+\-]?[.,]?\d|(?:^|[\s;,]){_NUMBER}\s*$",
     re.IGNORECASE,
 )
 _HAS_NUMBER = re.compile(r"(?<![^\W_])\d|[:=]")

@@ -35,6 +35,8 @@ MAX_POINTS = 5_000_000
 _LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES = 0.02, 2e-5
 # Beyond these limits (m, m, median slope) the unit is wrong.
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
+# Numbers that differ by less than this share of them are one, but for the last bits.
+_SAME = 1e-9
 # Names of a column that counts the points.
 _COUNTS = re.compile(r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*", re.I)
 
@@ -384,7 +386,7 @@ def _from_table(
             columns = columns[1:]
             notes.append("the first column counts the points")
     (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
-    heights = heights * METRES[z_unit]
+    column, heights = heights, heights * METRES[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
     if gaps:
@@ -405,7 +407,7 @@ def _from_table(
                     f"unit: give {parameter('step')}, as in 0.5um"
                 )
             notes.append(f"step {length_text(step, 6)} (header)")
-        _refuse_length_on_top(name, heights, step, lines)
+        _refuse_length_on_top(name, column, step, lines)
     return _in_metres(Trace(heights, float(step), name, tuple(notes)))
 
 
@@ -505,7 +507,7 @@ def _step_beside_count(
         )
     if stated is not None and unit is not None and not is_named:
         counted_as = METRES[parse_units(unit)[0]]
-        if abs(stated / counted_as - 1) > 1e-9:
+        if abs(stated / counted_as - 1) > _SAME:
             raise InputError(
                 f"the positions of {name} would have steps of {length_text(counted_as)}, and its "
                 f"header states {length_text(stated)}: give {parameter('step')}"
@@ -513,16 +515,17 @@ def _step_beside_count(
     return stated
 
 
-def _refuse_length_on_top(name: str, heights: Array, step: float, lines: Array | None) -> None:
-    """Refuse a step or a length that stands among the first heights."""
-    length = heights.size * step
-    for k, height in enumerate(heights[:3]):
-        if any(abs(height / known - 1) < 1e-9 for known in (step, length - (k + 2) * step)):
-            where = f"point {k + 1}" if lines is None else f"line {lines[k]}"
-            raise InputError(
-                f"{where} of {name} is {length_text(float(height), 6)}, which is the step or the "
-                "length of the trace: remove it from the heights"
-            )
+def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | None) -> None:
+    """Refuse a step or a length that stands among the first heights, in whatever unit."""
+    for k, number in enumerate(column[:3]):
+        below = column.size - k - 1
+        for length in (step, below * step, (below - 1) * step):
+            if any(abs(number * size / length - 1) < _SAME for size in METRES.values()):
+                where = f"point {k + 1}" if lines is None else f"line {lines[k]}"
+                raise InputError(
+                    f"{where} of {name} is {number:g}, and the step or the length of the trace is "
+                    f"{length_text(length, 6)}: remove it from the heights"
+                )
 
 
 # ---------------------------------------------------------------------- units

@@ -21,6 +21,11 @@ _NINES = re.compile(r"-?9{2,}\.?9+")
 _VALID = re.compile(r"\W*(valid|validity|is[ _]?valid|gültig)\b", re.IGNORECASE)
 
 
+def may_be_code(value: float) -> bool:
+    """Return whether a number may stand for a missing height: a known code, or nines alone."""
+    return is_known_code(value) or bool(_NINES.fullmatch(f"{value:g}"))
+
+
 def is_known_code(value: float) -> bool:
     """Return whether instruments write this number for a missing height."""
     return abs(value) >= _ENORMOUS or any(abs(abs(value) - code) <= 1.0 for code in _CODES)
@@ -31,23 +36,25 @@ def without_codes(heights: Array) -> tuple[Array, str]:
     heights = np.where(np.isfinite(heights), heights, np.nan)
     values, times = np.unique(heights[np.isfinite(heights)], return_counts=True)
     known = np.array([is_known_code(value) for value in values], dtype=bool)
-    if (~known).sum() < 2:
-        return heights, ""
-    low, high = _usual(values[~known])
-    away = np.maximum(low - values, values - high)
     nines = np.array([bool(_NINES.fullmatch(f"{value:g}")) for value in values], dtype=bool)
-    on_both_sides = np.isin(-values, values)
     repeated = times >= _REPEATED
-    far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
-    out = (away > _BEYOND_KNOWN * (high - low)) & (known | (nines & repeated))
-    codes = far | out
+    likely = known | (nines & repeated)
+    if (~likely).sum() < 2:
+        return heights, ""
+    low, high = _usual(values[~likely])
+    away = np.maximum(low - values, values - high)
+    far = (away > _BEYOND * (high - low)) & (repeated | nines | np.isin(-values, values))
+    # Where hardly a height occurs twice, nines that do stand for no height even within the range.
+    are_single = float(np.median(times)) == 1.0
+    codes = far | (likely & (away > _BEYOND_KNOWN * (high - low)))
+    codes |= nines & repeated & are_single
+    codes |= nines & np.isin(-values, values[codes])
     if not codes.any():
         return heights, ""
     shown = ", ".join(f"{value:.10g}" for value in values[codes][:4])
     return (
         np.where(np.isin(heights, values[codes]), np.nan, heights),
-        f"{counted(int(times[codes].sum()), 'height')} of {shown} taken as drop-outs: far out of "
-        "the range",
+        f"{counted(int(times[codes].sum()), 'height')} of {shown} taken as drop-outs",
     )
 
 

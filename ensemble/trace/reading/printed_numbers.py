@@ -20,7 +20,7 @@ _MISSING = frozenset(
      "missing", "nd", "overflow", "underflow", "x", "?")
 )  # fmt: skip
 _STARS = re.compile(r"[-*]+|#{2,}")  # as wide as the number that is missing
-_FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-]*")  # of a line: perhaps several, with commas
+_FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-'’]*")  # of a line: perhaps several, with commas
 _NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
 _QUOTED = re.compile(r'"[^"]*"')
 _GROUPED = re.compile(r"[+\-]?\d{1,3}([ '’_]\d{3})+([.,]\d*)?")

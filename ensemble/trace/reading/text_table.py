@@ -17,7 +17,7 @@ from typing import NoReturn
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.trace.reading.missing_heights import is_known_code
+from adhesis.ensemble.trace.reading.missing_heights import may_be_code
 from adhesis.ensemble.trace.reading.printed_numbers import (
     COMMENT,
     DELIMITERS,
@@ -41,10 +41,13 @@ _ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with, or one that i
 _LONG_ROW = 32
 _SAMPLE = 400  # lines that the form of a file is judged by
 _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searching more takes long
-_ENDS, _TO_JUDGE = 3, 8  # numbers at each end that are held to all others; others that it needs
+# Numbers at each end that are held to all others; others that it needs; share of one printed form.
+_ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
 # What people and programs write for the minus sign.
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2212", "-"))
+# Blanks that do not break a line mark thousands between digits.
+_THOUSANDS = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
 # Bytes that are no UTF-8. One between ASCII is a sign of Western Europe (µ, Å, ö); several in a row
 # may be a sign of any other code, and are none that is known.
 _FOREIGN = re.compile(rb"[\x80-\xff]{2,}")
@@ -137,6 +140,7 @@ def _lines(source: Source) -> list[str]:
             text = known.decode("cp1252", errors="replace")
     if not text.isascii():
         # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
+        text = _THOUSANDS.sub("’", text)
         text = unicodedata.normalize("NFKC", text).translate(_MINUS)
     return text.replace("\r\r\n", "\n").splitlines()
 
@@ -355,18 +359,19 @@ def _refuse_odd_ends(
     """
 
     def judged(k: int) -> bool:  # noughts and codes of missing heights are written as they please
-        return isfinite(numbers[k]) and numbers[k] != 0 and not is_known_code(numbers[k])
+        return isfinite(numbers[k]) and numbers[k] != 0 and not may_be_code(numbers[k])
 
     n = len(column)
     forms = [printed_form(column[k]) for k in range(_ENDS, n - _ENDS) if judged(k)]
-    one_form = len(set(forms)) == 1
+    usual, times = Counter(forms).most_common(1)[0] if forms else ((0, False), 0)
+    has_one_form = times >= _ONE_FORM * len(forms)
     fewest = min((decimals for decimals, _ in forms), default=0)
     for k in (*range(min(_ENDS, n)), *range(max(_ENDS, n - _ENDS), n)):
         if len(forms) < _TO_JUDGE or not judged(k):
             continue
         form = printed_form(column[k])
         # Of numbers whose trailing noughts are left out one has two decimals less by chance.
-        is_odd = form != forms[0] if one_form else form[0] <= fewest - 2 and not form[1]
+        is_odd = form != usual if has_one_form else form[0] <= fewest - 2 and not form[1]
         if is_odd or (k < _ENDS and numbers[k] == n - k - 1):
             raise InputError(
                 f"line {places[k] + 1} of {source} is {column[k]!r}, at the end of a column of "
