@@ -56,7 +56,7 @@ class Text:
     told: list[str] = field(default_factory=list)
 
 
-def draw_text(seed: int) -> Text:  # noqa: PLR0912, PLR0914, PLR0915 - one text, part by part
+def draw_text(seed: int) -> Text:
     draw = random.Random(seed)
     told: list[str] = []
 

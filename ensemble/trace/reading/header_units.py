@@ -77,10 +77,10 @@ def parse_units(text: str) -> tuple[str, str]:
 
 def _units_in(text: str) -> list[str]:
     plain = unicodedata.normalize("NFKC", text).replace("_", " ")
-    if plain.strip().lower() in _ANY:
+    if plain.strip() != "a" and plain.strip().lower() in _ANY:
         return [unit_named(plain)]
     names = [match[1] for match in _IN_TEXT.finditer(plain)]
-    names += [match[1] for match in _IN_BRACKETS.finditer(plain)]
+    names += [match[1] for match in _IN_BRACKETS.finditer(plain) if match[1] != "a"]
     return [unit_named(name) for name in names]
 
 
