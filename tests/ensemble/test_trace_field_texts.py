@@ -15,6 +15,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.loop.heights import read_heights
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import instrument
+from adhesis.ensemble.trace.reading.header_units import step_of_header
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.solver import checks
 from adhesis.solver.model.problem import Problem
@@ -159,6 +160,9 @@ def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: 
 
     trace = read_trace(put(tmp_path / "t.csv", rows(range(40, 43))), columns=[1, 2])
     assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
+    other = [row.replace("valid", "flag") for row in rows(range(40, 43))]
+    trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
+    assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
     long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
     with pytest.raises(
         InputError, match=r"gap of 30\.5 µm .*; 60 heights marked 0 in column 3 \(va"
@@ -209,8 +213,9 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
     "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402, .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
+    "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends the r"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
-    "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* it ends the rows"),
+    "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* must hold 2 numbers, with"),
     "a damaged first row": ([UM, "0.000,-0.5l", *TWO[1:]], {}, "line 2 of .* above the numbers"),
     "SMD": ("\r\n".join(SMD), {}, r"ISO 5436-2 \(SMD\).* export the trace as text"),
     "SMD, marked": ("\n".join(SMD).replace("\x03", "#\x03"), Z_UM, r"ISO 5436-2 \(SMD\)"),
@@ -247,6 +252,11 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a map": (["\t".join(ZS)] * 3, {}, "has 400 columns: give columns X,Z, .* or row K, a row"),
     "a count for positions": (
         ["No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
+        {"unit": "um"},
+        "the first column of .* counts the points: give step",
+    ),
+    "pixels for positions": (
+        ["x (px),z (um)", *(f"{k},{z}" for k, z in enumerate(ZS))],
         {"unit": "um"},
         "the first column of .* counts the points: give step",
     ),
@@ -293,6 +303,28 @@ def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(
     ):
         read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
     assert read_heights(put(tmp_path / "h.csv", ["0", *ZS]), unit="um").size == N + 1
+
+
+NAMED = [
+    "Scan step: 0.5 um", "X-Pitch (um)\t0.5", "Spacing,0.5,um", "Data spacing 0.5 um", "dx=0.5um",
+    "Sampling interval=0.5um", "Delta X: 0.5 um", "X Step: 500 nm", "Step size: 0.5 µm/pt",
+    "StepSize=0.5um", "Pitch X;0.5;[um]", "dx_um = 0.5", "Step in um: 0.5", "Sample spacing: 5e-7 m",
+    "points: 400; step: 0.5 um", "Punktabstand [µm]: 0.5", "Pixel size: 0.5 um", "Step: .5 um",
+]  # fmt: skip
+OTHERS = [
+    "Traverse length: 5.6 mm", "Groove spacing: 3 um", "Mean spacing of profile elements: 21 um",
+    "Spacing (mean): 21 um", "Pitch of thread: 3 mm", "Line pitch: 5 um", "Y step: 5 um",
+    "Z step: 1 nm", "Sm spacing 20 um", "Step (height): 98 nm", "Sampling: 0.8 mm", "dy = 5 um",
+    "Interval between lines: 5 um", "Pitch in Y: 5 um", "Step width: 8 um", "Step: 0.5 um/s",
+    "Sampling rate: 500 nm", "Step 2 of 3: 0.5 mm", "Vertical increment: 1 nm", "Steps: 400",
+    "Spacing parameter S: 4 um", "Average pitch: 3 um", "Interval: 5 s", "Sampling length 0.8 mm",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", [*NAMED, *OTHERS])
+def test_only_the_distance_of_two_points_is_a_step(line: str) -> None:
+    found = step_of_header("t.txt", ["Profile", line], ".")
+    assert found == (pytest.approx(STEP, rel=1e-12) if line in NAMED else None)
 
 
 # ---------------------------------------------------------------------- instruments

@@ -34,7 +34,7 @@ _Z = re.compile(
 _BOTH = re.compile(r"\b(units?|einheit(en)?|unité?s?)\b", re.I)
 
 # A number that stands for itself: not that of "X1" or "Ra2".
-_NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?(?![^\W_e])"
+_NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
 # A field with a value names no column: "0.5 µm", "Cut-off (mm): 0.8". "Channel 1 (µm)" names one.
 _VALUE = re.compile(
     rf"(?<![^\W_])(?:\d+|\d*[.,]\d+\s*[(\[]?)\s*({_WORD})(?![^\W_])"
@@ -46,18 +46,20 @@ _HAS_NUMBER = re.compile(r"(?<![^\W_])\d|[:=]")
 # The step is named by words for the distance of two points, and by nothing else: a "step height" or
 # a "sampling length" is another length.
 _STEP = frozenset(
-    ("step", "stepsize", "stepwidth", "spacing", "increment", "pitch", "dx", "δx", "deltax",
+    ("step", "stepsize", "spacing", "increment", "pitch", "dx", "δx", "deltax",
      "xstep", "xspacing", "xpitch", "xincrement", "xscale", "pixelsize", "schrittweite",
      "punktabstand", "messpunktabstand", "samplinginterval", "sampleinterval",
      "pointinterval", "datainterval")
 )  # fmt: skip
 _STEP_IN_WORDS = (
     *(("interval",), ("sampling", "interval"), ("sample", "interval"), ("point", "interval")),
+    *(("sample", "spacing"), ("sample", "distance")),
     *(("pixel", "size"), ("delta", "x"), ("x", "scale"), ("point", "distance")),
     *(("sampling", "distance"), ("data", "interval")),
 )
+_PHRASES = (*((word,) for word in _STEP), *_STEP_IN_WORDS)
 _BESIDE_STEP = frozenset(
-    ("x", "in", "of", "the", "size", "width", "sampling", "sample", "measuring", "measurement",
+    ("x", "in", "of", "the", "size", "sampling", "measuring", "measurement",
      "lateral", "horizontal", "point", "points", "data", "between", "scan", "axis", "direction")
 )  # fmt: skip
 _FIRST_NUMBER = re.compile(_NUMBER, re.IGNORECASE)
@@ -112,7 +114,7 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
     columns = len(fields[0]) if fields else 2
     known: list[set[str]] = [set(), set()]
     for line in header:
-        if _FIRST_NUMBER.search(line):
+        if re.search(_NUMBER + r"(?![^\W_])", line, re.IGNORECASE):
             continue  # a length with its value ("Length: 2 mm") is not about the columns
         units = set(_units_in(line))
         if len(units) != 1:
@@ -169,10 +171,7 @@ def _step(text: str, decimal: str) -> float | None:
     within = _units_in(label.strip(" :=\t"))
     units = [unit[1]] if unit[1] else within
     words = _words(label, within)
-    phrases = {*((word,) for word in _STEP), *_STEP_IN_WORDS}
-    found = next((p for p in phrases if _holds(words, p)), None)
-    rest_of_label = [word for word in words if found is None or word not in found]
-    if found is None or len(set(units)) != 1 or not set(rest_of_label) <= _BESIDE_STEP:
+    if len(set(units)) != 1 or not any(_names_step(words, phrase) for phrase in _PHRASES):
         return None
     try:
         metres = METRES[unit_named(units[0])]
@@ -190,6 +189,10 @@ def _words(label: str, units: Sequence[str]) -> list[str]:
     return [word for word in words if word not in names]
 
 
-def _holds(words: Sequence[str], phrase: tuple[str, ...]) -> bool:
+def _names_step(words: Sequence[str], phrase: tuple[str, ...]) -> bool:
+    """Return whether a label holds this phrase, and nothing that gives it another meaning."""
     n = len(phrase)
-    return any(tuple(words[k : k + n]) == phrase for k in range(len(words) - n + 1))
+    return any(
+        tuple(words[k : k + n]) == phrase and {*words[:k], *words[k + n :]} <= _BESIDE_STEP
+        for k in range(len(words) - n + 1)
+    )

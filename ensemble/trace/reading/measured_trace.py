@@ -38,7 +38,11 @@ _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
 # Numbers that differ by less than this share of them are one, but for the last bits.
 _SAME = 1e-9
 # Names of a column that counts the points.
-_COUNTS = re.compile(r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*", re.I)
+_COUNTS = re.compile(
+    r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*"
+    r"|.*[(\[]\s*(px|pixels?|pts?|points?|samples?|#|-|1)\s*[)\]]\W*",
+    re.I,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -436,9 +440,9 @@ def _chosen(
         )
     columns = table.columns[picked]
     if wanted is not None:
-        marked, told = invalid_rows(table.columns, table.fields)
+        marked, told = invalid_rows(table.columns, table.fields, picked)
         columns[-1, marked] = np.nan
-        notes.extend([told] if told else [])
+        notes.extend(told)
     # Of columns of unequal length, those chosen end where they do.
     kept = np.arange(columns.shape[1])
     there = np.flatnonzero(np.isfinite(columns).any(axis=0))

@@ -74,12 +74,24 @@ def _usual(values: Array) -> tuple[float, float]:
         low, high = float(inside[0]), float(inside[-1])
 
 
-def invalid_rows(columns: Array, fields: Sequence[Sequence[str]]) -> tuple[Array, str]:
-    """Return which rows a column named "valid" marks with nought, and a description."""
-    for names in fields:
-        for k, name in enumerate(names):
-            if _VALID.match(name):
-                marked = columns[k] == 0
-                told = f"{counted(int(marked.sum()), 'height')} marked 0 in column {k + 1} ({name})"
-                return marked, f"{told} taken as drop-outs"
-    return np.zeros(columns.shape[1], dtype=bool), ""
+def invalid_rows(
+    columns: Array, fields: Sequence[Sequence[str]], chosen: Sequence[int]
+) -> tuple[Array, list[str]]:
+    """Return which rows a column named "valid" marks with nought, and descriptions.
+
+    Other columns beside the chosen ones that hold noughts and ones are described.
+    """
+    marked = np.zeros(columns.shape[1], dtype=bool)
+    notes = []
+    for k, column in enumerate(columns):
+        if k in chosen or set(np.unique(column)) != {0.0, 1.0}:
+            continue
+        names = [row[k] for row in fields if row[k]]
+        name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
+        if any(_VALID.match(text) for text in names):
+            marked |= column == 0
+            count = counted(int((column == 0).sum()), "height")
+            notes.append(f"{count} marked 0 in {name} taken as drop-outs")
+        else:
+            notes.append(f"{name} holds 0 and 1 alone: it is not used")
+    return marked, notes

@@ -17,7 +17,7 @@ _SHOWN = 60  # signs of a line that a message quotes
 _MISSING = frozenset(
     ("", "nan", "-nan", "nan(ind)", "-1.#ind", "1.#qnan", "inf", "-inf", "+inf",
      "bad", "n/a", "na", "#n/a", "null", "none", "nil", "invalid",
-     "missing", "nd", "overflow", "underflow", "x", "?")
+     "missing", "nd", "over", "under", "overflow", "underflow", "error", "x", "?")
 )  # fmt: skip
 _STARS = re.compile(r"[-*]+|#{2,}")  # as wide as the number that is missing
 _FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-'’]*")  # of a line: perhaps several, with commas

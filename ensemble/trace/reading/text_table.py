@@ -285,10 +285,13 @@ def _rows(reader: _Reader, start: int) -> tuple[list[_Row], list[int]]:
     """Return the rows of the block, empty ones too, and their lines from 0."""
     rows: list[_Row] = []
     places: list[int] = []
+    is_blank = [not line.strip() for line in reader.lines]
     for place in range(start, len(reader.lines)):
         row = reader.row(place)
         if row is None:
             break
+        if reader.count == 1 and place > start and is_blank[place - 1] and is_blank[place]:
+            break  # one empty line is a missing height, two are the end of a block
         lacks = not row.is_empty and not reader.is_whole(place)
         if lacks and reader.delimiter == " " and reader.count > 2:
             raise InputError(
@@ -338,11 +341,17 @@ def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
         touches = False
     for place in range(last + 1, len(lines)):
         if reader.may_be_row(place):
-            end = next(k for k in range(last + 1, place + 1) if reader.row(k) is None)
+            words = (k for k in range(last + 1, place + 1) if reader.row(k) is None)
+            end = next(words, last + 1)
             flaw = flaw_of(split(lines[end], reader.delimiter))
             if flaw is not None and reader.may_be_row(end):
                 raise InputError(f"line {end + 1} of {source} has {flaw}")
             held = "one number" if reader.count == 1 else f"{reader.count} numbers"
+            if end == last + 1 and reader.may_be_row(end):
+                raise InputError(
+                    f"line {end + 1} of {source} is {shown_line(lines[end])}: it must hold {held}, "
+                    "with an empty field for one that is missing"
+                )
             raise InputError(
                 f"line {end + 1} of {source} is {shown_line(lines[end])}: it ends the rows of "
                 f"{held} on lines {start + 1} to {last + 1}, and more numbers follow on line "
