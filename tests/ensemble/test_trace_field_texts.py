@@ -213,9 +213,9 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
     "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402, .* line 404"),
     "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
-    "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends the r"),
+    "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
-    "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* must hold 2 numbers, with"),
+    "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* must hold 2 num"),
     "a damaged first row": ([UM, "0.000,-0.5l", *TWO[1:]], {}, "line 2 of .* above the numbers"),
     "SMD": ("\r\n".join(SMD), {}, r"ISO 5436-2 \(SMD\).* export the trace as text"),
     "SMD, marked": ("\n".join(SMD).replace("\x03", "#\x03"), Z_UM, r"ISO 5436-2 \(SMD\)"),
@@ -308,8 +308,9 @@ def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(
 NAMED = [
     "Scan step: 0.5 um", "X-Pitch (um)\t0.5", "Spacing,0.5,um", "Data spacing 0.5 um", "dx=0.5um",
     "Sampling interval=0.5um", "Delta X: 0.5 um", "X Step: 500 nm", "Step size: 0.5 µm/pt",
-    "StepSize=0.5um", "Pitch X;0.5;[um]", "dx_um = 0.5", "Step in um: 0.5", "Sample spacing: 5e-7 m",
-    "points: 400; step: 0.5 um", "Punktabstand [µm]: 0.5", "Pixel size: 0.5 um", "Step: .5 um",
+    "StepSize=0.5um", "Pitch X;0.5;[um]", "dx_um = 0.5", "Step in um: 0.5",
+    "Sample spacing: 5e-7 m", "points: 400; step: 0.5 um", "Punktabstand [µm]: 0.5",
+    "Pixel size: 0.5 um", "Step: .5 um",
 ]  # fmt: skip
 OTHERS = [
     "Traverse length: 5.6 mm", "Groove spacing: 3 um", "Mean spacing of profile elements: 21 um",
