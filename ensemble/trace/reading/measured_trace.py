@@ -28,6 +28,7 @@ from adhesis.solver.values import ByValue
 
 MIN_POINTS = 32
 _COLUMN = checks.Bounds(1, 1_000_000, whole=True)
+_ROW = checks.Bounds(0, 1_000_000, whole=True)
 _TIP_RADIUS = checks.Bounds(0.0, checks.LENGTH.high, unit="m")
 MAX_POINTS = 5_000_000
 
@@ -182,8 +183,8 @@ def read_trace(
     step : float, optional
         Step in m, for heights without positions.
     columns : sequence of int or str, optional
-        Columns of positions and heights, or of heights alone: counted from 1, or names of a
-        DataFrame.
+        Columns of positions and heights, shape (2,), or of heights alone, shape (1,): counted from
+        1, or names of a DataFrame.
     row, channel : int, optional
         Row of a map (of an instrument file or a text) and channel of an instrument file, counted
         from 0.
@@ -215,6 +216,8 @@ def read_trace(
         named = hasattr(source, "iloc") and _are_names(columns)
         if columns is not None and not named:
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
+        row = None if row is None else checks.whole(parameter("row"), row, _ROW)
+        channel = None if channel is None else checks.whole(parameter("channel"), channel, _ROW)
     in_memory = _table_of(source, columns if named else None)
     if in_memory is not None:
         _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
