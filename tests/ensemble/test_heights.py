@@ -110,6 +110,8 @@ FOREIGN: dict[str, tuple[str, bytes, str]] = {
     "zip": ("x.zip", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
     "xlsx": ("x.xlsx", archive("xl/workbook.xml"), r"is a workbook: save its columns as text"),
     "xls": ("x.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "is a workbook"),
+    "xlsx as csv": ("x.csv", archive("xl/workbook.xml"), "is a workbook: save its columns as text"),
+    "zip as dat": ("x.dat", archive("x.csv"), r"is an archive \(zip\): unpack it first"),
     "npz": ("x.npz", saved(WAVE), r"archive of arrays: save the one of the heights as \.npy"),
     "npz as npy": ("x.npy", saved(WAVE), "archive of arrays"),
     "pdf": ("x.pdf", b"%PDF-1.7\n", "is a PDF: export the heights as text"),

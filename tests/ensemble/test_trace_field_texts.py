@@ -107,6 +107,10 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         {"unit": "um", "columns": [1, 3], "row": 1},
     ),
     "Korean, with a unit": ("\n".join(["위(㎛),높이(㎛)", *TWO]).encode("cp949"), {"unit": "um"}),
+    "an option against a line that names no column": (
+        ["Evaluation length in mm", *TWO],
+        {"unit": "um"},
+    ),
     "Latin-1": ("\n".join(["Höhe x [µm],z [µm]", *TWO]).encode("latin-1"), {}),
 }  # fmt: skip
 
@@ -203,6 +207,7 @@ Z_UM: Options = {"unit": "um", "step": STEP}
 REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "two steps": (["Step: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}, "9 nm and 500 nm: give"),
     "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "states no step with"),
+    "another unit": (["Stylus travel in mm", "Data", *ZS], {"step": STEP}, "states no unit"),
     "a speed": (["Step: 0.5 mm/s", "Z (um)", *ZS], {}, "states no step with its unit"),
     "a count on top": (["400", *ZS], Z_UM, "line 1 of .* is '400', at the end of a column"),
     "a step on top": (["0.500", *ZS], Z_UM, r"line 1 of .* is '0\.500', at the end of a column"),

@@ -97,6 +97,8 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
         Fields of those of its lines that have as many fields as the data.
     """
     names = [row for row in fields if not any(_VALUE.search(field) for field in row)]
+    if fields and len(fields[0]) == 1:
+        names = [row for row in names if _names_heights(row[0], row is fields[-1])]
     whole: dict[tuple[str, ...], Sequence[str]] = {}
     for row in names:
         found = [_units_in(field) for field in row]
@@ -129,6 +131,14 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
                 known[place] |= units
     picked = [next(iter(units)) if len(units) == 1 else None for units in known]
     return picked if columns > 1 else [picked[1], picked[1]]
+
+
+def _names_heights(line: str, is_last: bool) -> bool:
+    """Return whether a line above one column names it, and not another length."""
+    plain = line.replace("_", " ")
+    if _Z.search(plain) or _BOTH.search(plain):
+        return True
+    return is_last and not _X.search(plain)
 
 
 def step_of_header(name: str, header: Sequence[str], decimal: str) -> float | None:

@@ -125,7 +125,10 @@ def _channel(source: Source, channels: list[Any], wanted: int | None) -> Any:
     heights = [c for c in channels if "height" in str(getattr(c, "data_kind", "height")).lower()]
     if not heights:
         names = ", ".join(f"{c.index} {c.name}" for c in channels) or "none"
-        raise InputError(f"{source} holds no channel of heights (its channels: {names})")
+        raise InputError(
+            f"{source} holds no channel of heights (its channels: {names}): export the trace as "
+            "text"
+        )
     return heights[0]
 
 

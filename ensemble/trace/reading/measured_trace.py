@@ -250,8 +250,14 @@ def read_trace(
     except UnknownFormatError as error:
         raise InputError(source.container() or str(error)) from None
     heights, step, notes = equal_steps(source.name, scan.positions, 1.0, scan.heights, None)
+    length, slope = (heights.size - 1) * step, _slope(heights, step)
+    if not _SHORTEST <= length <= _LONGEST or slope > _STEEPEST:
+        raise InputError(
+            f"{source} would be {length_text(length)} long, and rise by {slope:.3g} times its step "
+            "from point to point: its lengths are wrong or damaged, so export it as text with units"
+        )
     notes = [scan.description, *notes]
-    return _in_metres(Trace(heights, step, source.name, tuple(notes), scan.tip_radius))
+    return Trace(heights, step, source.name, tuple(notes), scan.tip_radius)
 
 
 def _are_names(columns: Sequence[int | str] | None) -> bool:
@@ -392,7 +398,8 @@ def _from_table(
         if step is not None:
             columns = columns[1:]
             notes.append("the first column counts the points")
-    (x_unit, z_unit), given_by = _units(name, found, unit, columns, step)
+    named = units_of_header((), fields)  # by the names of the columns, not by other lines
+    (x_unit, z_unit), given_by = _units(name, found, named, unit, columns, step)
     column, heights = heights, heights * METRES[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
@@ -541,20 +548,25 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
 def _units(
     name: str,
     found: list[str | None],
+    named: list[str | None],
     unit: str | None,
     columns: Array,
     step: float | None,
 ) -> tuple[tuple[str, str], str]:
-    found = [found[-1]] * 2 if len(columns) == 1 else found
+    if len(columns) == 1:
+        found, named = [found[-1]] * 2, [named[-1]] * 2
     if unit is not None:
         given = parse_units(unit)
-        for kind, known, wanted in zip(("positions", "heights"), found, given, strict=True):
-            if known not in (None, wanted) and not (len(columns) == 1 and kind == "positions"):
+        told = parameter("unit")
+        for kind in range(2 - len(columns), 2):
+            if named[kind] not in (None, given[kind]):
                 raise InputError(
-                    f"{parameter('unit')} is {wanted} for the {kind}, and the header of {name} "
-                    f"has {known}: correct the wrong one"
+                    f"{parameter('unit')} is {given[kind]} for the {('positions', 'heights')[kind]}"
+                    f", and the header of {name} has {named[kind]}: correct the wrong one"
                 )
-        return given, parameter("unit")
+            if found[kind] not in (None, given[kind]):
+                told += f", against {found[kind]} in a line of the header"
+        return given, told
     if found[0] is not None and found[1] is not None:
         return (found[0], found[1]), "header"
     if found[0] is not None or found[1] is not None:
@@ -592,9 +604,16 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     return length <= _LONGEST_IN_METRES and length / (x.size - 1) <= _WIDEST_STEP_IN_METRES
 
 
+def _slope(heights: Array, step: float) -> float:
+    """Return the median slope from point to point; 0 if no two neighbours are known."""
+    rises = np.abs(np.diff(heights))
+    known = rises[np.isfinite(rises)]
+    return float(np.median(known)) / step if known.size else 0.0
+
+
 def _in_metres(trace: Trace) -> Trace:
     """Refuse a trace so steep that the unit of one of its columns must be another."""
-    slope = float(np.nanmedian(np.abs(np.diff(trace.heights))) / trace.step)
+    slope = _slope(trace.heights, trace.step)
     if slope > _STEEPEST:
         raise InputError(
             f"{trace.source} would rise by {slope:.3g} times its step from point to point: are "

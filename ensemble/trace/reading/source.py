@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -33,6 +34,7 @@ _DOCUMENTS = {
     b"GIF8": "a picture (GIF)",
 }
 _ZIP, _COMPOUND = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+_BOOK = "Workbook".encode("utf-16-le")
 _WORKBOOKS = frozenset((".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"))
 _BEGIN = 4096
 _BLOCK = 1 << 20
@@ -165,15 +167,25 @@ class Source:
 
     def container(self) -> str | None:
         """Return a message for a workbook or an archive that is no instrument's file, else None."""
-        with self.open() as stream:
-            begin = stream.read(_BEGIN)
-        if begin.startswith((_ZIP, _COMPOUND)) and self.suffix in _WORKBOOKS:
-            return f"{self} is a workbook: save its columns as text (CSV)"
-        if begin.startswith(_ZIP) and self.suffix == ".npz":
+        begin = self.beginning()
+        if begin.startswith(_COMPOUND) and (self.suffix in _WORKBOOKS or _BOOK in self.read()):
+            return _of_workbook(self)
+        if not begin.startswith(_ZIP):
+            return None
+        try:
+            with self.open() as stream, zipfile.ZipFile(stream) as file:
+                names = file.namelist()
+        except (OSError, zipfile.BadZipFile):
+            names = []
+        if self.suffix in _WORKBOOKS or any(re.match(r"xl/|content\.xml", n) for n in names):
+            return _of_workbook(self)
+        if names and all(name.endswith(".npy") for name in names):
             return f"{self} is an archive of arrays: save the one of the heights as .npy"
-        if begin.startswith(_ZIP) and self.suffix == ".zip":
-            return f"{self} is an archive (zip): unpack it first (unzip {self})"
-        return None
+        return f"{self} is an archive (zip): unpack it first (unzip {self})"
+
+
+def _of_workbook(source: Source) -> str:
+    return f"{source} is a workbook: save its columns as text (CSV)"
 
 
 def source_of(given: Any) -> Source:

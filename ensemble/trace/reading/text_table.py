@@ -45,7 +45,7 @@ _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searchin
 _ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
 # What people and programs write for the minus sign.
-_MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2212", "-"))
+_MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
 # Blanks that do not break a line mark thousands between digits.
 _THOUSANDS = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
 # Bytes that are no UTF-8. One between ASCII is a sign of Western Europe (µ, Å, ö); several in a row
