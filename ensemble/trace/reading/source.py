@@ -181,7 +181,10 @@ class Source:
             return _of_workbook(self)
         if names and all(name.endswith(".npy") for name in names):
             return f"{self} is an archive of arrays: save the one of the heights as .npy"
-        return f"{self} is an archive (zip): unpack it first (unzip {self})"
+        # Instruments write archives, too.
+        if self.suffix == ".zip" or (names and all(n.endswith((".csv", ".txt")) for n in names)):
+            return f"{self} is an archive (zip): unpack it first (unzip {self})"
+        return None
 
 
 def _of_workbook(source: Source) -> str:
