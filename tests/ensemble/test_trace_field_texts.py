@@ -82,6 +82,14 @@ READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
         ["Pitch: 0.5 um", "No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {},
     ),
+    "a count and an interval in quotes": (
+        [
+            '"Measurement data interval","0.5","um"',
+            '"No.","Height (um)"',
+            *(f'"{k}","{z}"' for k, z in enumerate(ZS, 1)),
+        ],
+        {},
+    ),
     "a lone column": (
         ["No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
         {"columns": [2], "step": STEP},
@@ -207,6 +215,7 @@ Z_UM: Options = {"unit": "um", "step": STEP}
 REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "two steps": (["Step: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}, "9 nm and 500 nm: give"),
     "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "states no step with"),
+    "names of two tables": ([UM, "Lc (mm),Ls (um)", *TWO], {}, "unit of the heights alone"),
     "another unit": (["Stylus travel in mm", "Data", *ZS], {"step": STEP}, "states no unit"),
     "a speed": (["Step: 0.5 mm/s", "Z (um)", *ZS], {}, "states no step with its unit"),
     "a count on top": (["400", *ZS], Z_UM, "line 1 of .* is '400', at the end of a column"),

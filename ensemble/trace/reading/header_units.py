@@ -99,16 +99,13 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
     names = [row for row in fields if not any(_VALUE.search(field) for field in row)]
     if fields and len(fields[0]) == 1:
         names = [row for row in names if _names_heights(row[0], row is fields[-1])]
-    whole: dict[tuple[str, ...], Sequence[str]] = {}
+    whole = set()
     for row in names:
         found = [_units_in(field) for field in row]
         if all(len(set(units)) == 1 for units in found):
-            whole[tuple(units[0] for units in found)] = row
-    if whole:
-        units_of_last, last = list(whole.items())[-1]
-        # Of several, those right above the numbers are theirs.
-        known_to_be = len(whole) == 1 or last is fields[-1]
-        return [unit if known_to_be else None for unit in units_of_last]
+            whole.add(tuple(units[0] for units in found))
+    if whole:  # of two that differ it is not known which
+        return [units[0] if len(set(units)) == 1 else None for units in zip(*whole, strict=True)]
     for row in reversed(names):
         found = [_units_in(field) for field in row]
         if any(found) and not any(_HAS_NUMBER.search(field) for field in row):
@@ -165,6 +162,7 @@ def step_of_header(name: str, header: Sequence[str], decimal: str) -> float | No
 
 def _parts(line: str, decimal: str) -> Iterator[str]:
     """Return statements of a line: between its delimiters, and all of it."""
+    line = line.replace('"', "")
     yield from re.split(r"[;\t]|,\s|\s{2,}", line)
     yield re.sub(r"[;\t]" if decimal == "," else r"[;\t,]", " ", line)
 
