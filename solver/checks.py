@@ -269,9 +269,9 @@ def instance(name: str, value: T, kind: type[Any], how: str) -> T:
         made = type(value)
         if (made.__module__, made.__qualname__) == (kind.__module__, kind.__qualname__):
             raise TypeError(
-                f"{name} is a {kind.__name__} made before adhesis was reloaded "
-                "(importlib.reload, %autoreload): start Python anew, since of a package that is "
-                "reloaded in parts no object fits another"
+                f"{name} is a {kind.__name__} made before a reload of adhesis (importlib.reload, "
+                "%autoreload), which makes new classes: start Python anew, and leave adhesis out "
+                "of the reload"
             )
         raise TypeError(_sentence(name, value, f"a {kind.__name__}; make one with {how}"))
     return value

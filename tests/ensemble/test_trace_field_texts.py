@@ -230,6 +230,7 @@ REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
     "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends"),
     "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
     "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* must hold 2 num"),
+    "a damaged last height": ([*ZS[:-1], "0.5l"], Z_UM, r"line 400 .* has '0\.5l'"),
     "a damaged first row": ([UM, "0.000,-0.5l", *TWO[1:]], {}, "line 2 of .* above the numbers"),
     "SMD": ("\r\n".join(SMD), {}, r"ISO 5436-2 \(SMD\).* export the trace as text"),
     "SMD, marked": ("\n".join(SMD).replace("\x03", "#\x03"), Z_UM, r"ISO 5436-2 \(SMD\)"),
@@ -431,7 +432,7 @@ def test_objects_of_other_libraries_are_refused_with_what_can_be_read(
 
 def test_an_object_from_before_a_reload_is_named_as_that() -> None:
     again = type("Problem", (), {"__module__": Problem.__module__})
-    with pytest.raises(TypeError, match="problem is a Problem made before adhesis was reloaded"):
+    with pytest.raises(TypeError, match="problem is a Problem made before a reload of adhesis"):
         checks.instance("problem", again(), Problem, "Problem(…)")
 
 

@@ -44,6 +44,7 @@ _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searchin
 # Numbers at each end that are held to all others; others that it needs; share of one printed form.
 _ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
+_DIGIT = re.compile(r"[+\-]?[.,]?\d")
 # What people and programs write for the minus sign.
 _MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
 # Blanks that do not break a line mark thousands between digits.
@@ -200,7 +201,7 @@ class _Reader:
         if not line or line[0] in COMMENT:
             return False
         if self.count == 1:
-            return is_grouped(line)
+            return is_grouped(line) or (" " not in line and _DIGIT.match(line) is not None)
         first = split(line, self.delimiter)[0]
         number = value(first, self.decimal)
         return (number is not None and not isnan(number)) or is_grouped(first)
