@@ -28,6 +28,6 @@ def words_of(text: str) -> list[str]:
         if _WHOLE.fullmatch(whole.strip()) and digits is not None:
             raise InputError(
                 f"is {quoted(text)}: numbers have a decimal point, as in {whole}.{digits[0]}; if "
-                f"two are meant, write {whole}.0,{digits[0]}.0"
+                f"two are meant, write {float(whole):.1f},{float(digits[0]):.1f}"
             )
     return [word.strip() for word in words]

@@ -38,12 +38,13 @@ def without_codes(heights: Array) -> tuple[Array, str]:
     known = np.array([is_known_code(value) for value in values], dtype=bool)
     nines = np.array([bool(_NINES.fullmatch(f"{value:g}")) for value in values], dtype=bool)
     repeated = times >= _REPEATED
-    likely = known | (nines & repeated)
+    on_both_sides = np.isin(-values, values)
+    likely = known | (nines & (repeated | on_both_sides))
     if (~likely).sum() < 2:
         return heights, ""
     low, high = _usual(values[~likely])
     away = np.maximum(low - values, values - high)
-    far = (away > _BEYOND * (high - low)) & (repeated | nines | np.isin(-values, values))
+    far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
     # Where hardly a height occurs twice, nines that do stand for no height even within the range.
     are_single = float(np.median(times)) == 1.0
     codes = far | (likely & (away > _BEYOND_KNOWN * (high - low)))
