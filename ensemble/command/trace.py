@@ -8,6 +8,7 @@ import sys
 from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.loop.cycle import control_of, in_options, turning_points_of
+from adhesis.ensemble.number_lists import words_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.reporter import StatusLine
@@ -80,9 +81,8 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _numbers(text: str, option: str) -> list[float]:
-    words = str(text).split(",")
     try:
-        values = [parse_work_of_adhesion(word.strip(), LARGEST_IN_JOULES) for word in words]
+        values = [parse_work_of_adhesion(word, LARGEST_IN_JOULES) for word in words_of(text)]
     except InputError as error:
         raise InputError(f"{option} {error}") from None
     if len(set(values)) < len(values):

@@ -195,7 +195,7 @@ def test_a_preload_is_the_turning_point_of_a_trace() -> None:
 @pytest.mark.parametrize(
     ("words", "control", "turns"),
     [
-        (["--stiffness", "0", "--max-stress", "300,100"], Control(0.0), (300.0, 100.0)),
+        (["--stiffness", "0", "--max-stress", "300.0,100.0"], Control(0.0), (300.0, 100.0)),
         (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3)),
         (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4)),
     ],
