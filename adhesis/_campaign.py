@@ -8,6 +8,7 @@ import json
 import os
 import re
 import tempfile
+import warnings
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
@@ -139,15 +140,16 @@ class Campaign:
         out : path
             The results file. One of this campaign is resumed, one of a smaller campaign extended.
         ranks : int
-            1 computes in this process. More start so many MPI ranks on this machine: one more than
-            cores is right, as the first only hands out.
+            1 computes in this process. More start so many ranks on this machine, by MPI where it is
+            installed, else as processes: one more than cores is right, as the first only hands out.
         progress : bool
             Whether lines on stderr, or in the notebook, show how far the campaign is.
 
         Returns
         -------
         CampaignResults
-            As :func:`adhesis.open` returns it. Failed tasks are counted in its ``repr``.
+            As :func:`adhesis.open` returns it. Failed tasks are counted in its ``repr``, and in a
+            warning with the first reason.
 
         Raises
         ------
@@ -169,40 +171,45 @@ class Campaign:
 
         if not path.exists():
             check_new_file("out", path)
-        if ranks == 1:
-            self._run_here(path, progress)
+        from adhesis.ensemble.errors import InputError
+        from adhesis.ensemble.run import launch
+
+        most = launch.largest_number_of_ranks()
+        if ranks > most:
+            raise InputError(
+                f"ranks is {ranks}: at most {most} are started here, on "
+                f"{checks.counted(launch.cores(), 'core')}"
+            )
+        mpirun = None if ranks == 1 else launch.mpi_launcher()
+        if mpirun is None:
+            self._run_here(path, ranks - 1, progress)
         else:
-            self._run_ranks(path, ranks, progress)
+            self._run_ranks(mpirun, path, ranks, progress)
         from adhesis._open import open as open_results
 
-        return open_results(path)
+        results = open_results(path)
+        _warn_of_failures(path)
+        return results
 
-    def _run_here(self, path: Path, progress: bool) -> None:
+    def _run_here(self, path: Path, processes: int, progress: bool) -> None:
         from adhesis.ensemble.reporter import log
-        from adhesis.ensemble.run.session import run_campaign
+        from adhesis.ensemble.run.session import Options, run_campaign
 
         with contextlib.nullcontext() if progress else contextlib.redirect_stderr(io.StringIO()):
-            summary = run_campaign(self.tables, path, say=log)
+            options = Options(processes=processes)
+            summary = run_campaign(self.tables, path, options=options, say=log)
         if summary.stopped:
             raise RuntimeError(
                 f"the campaign stopped early: {summary.stopped}; {summary.pending} of "
                 f"{summary.total} tasks are left in {path}, and the same call goes on"
             )
 
-    def _run_ranks(self, path: Path, ranks: int, progress: bool) -> None:
+    def _run_ranks(self, mpirun: str, path: Path, ranks: int, progress: bool) -> None:
         from adhesis.ensemble.command.campaigns.run import BAD_INPUT, DONE, SOME_FAILED
         from adhesis.ensemble.errors import InputError
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run import launch
 
-        mpirun, most = launch.launcher(), launch.largest_number_of_ranks()
-        if mpirun is None:
-            raise InputError(f"ranks is {ranks}: no mpirun was found, so take ranks=1")
-        if ranks > most:
-            raise InputError(
-                f"ranks is {ranks}: at most {most} are started here, on "
-                f"{checks.counted(launch.cores(), 'core')}"
-            )
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "campaign.toml")
             file.write_text(self.text, encoding="utf-8")
@@ -219,6 +226,19 @@ class Campaign:
                 sentence
                 or f"the ranks ended with exit code {code}; what was done is kept in {path}"
             )
+
+
+def _warn_of_failures(path: Path) -> None:
+    """Warn with the number of failed tasks and the first reason."""
+    from adhesis.ensemble.results.status import read_status
+
+    status = read_status(path)
+    if status["failed"]:
+        warnings.warn(
+            f"{status['failed']} of {status['tasks']} tasks failed, and the averages leave them "
+            f"out; first reason: {status['failures'][0]['error']}",
+            stacklevel=3,
+        )
 
 
 def _toml(source: Mapping[str, Any]) -> str:

@@ -132,7 +132,7 @@ def rank(options: argparse.Namespace) -> None:
     engine = measured(times, options.pretend)
     run_campaign(load_campaign(options.campaign), options.out, comm, engine=engine)
     times.run = time.perf_counter() - started
-    place = 0 if comm is None else comm.rank
+    place = comm.rank
     Path(f"{options.out}.{place}.json").write_text(json.dumps(vars(times)))
 
 

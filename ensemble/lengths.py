@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 
@@ -14,7 +15,17 @@ from adhesis.ensemble.errors import InputError, UnitError, quoted
 LONGEST_IN_METRES = 1.0  # m
 HIGHEST_IN_METRES = 1e-3  # m, of the heights of a roughness
 
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "Å": 1e-10, "inch": 25.4e-3}
+METRES = {
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "µm": 1e-6,
+    "nm": 1e-9,
+    "Å": 1e-10,
+    "inch": 25.4e-3,
+    "mil": 25.4e-6,
+    "µin": 25.4e-9,
+}
 
 OTHER_NAMES = {
     "um": "µm",
@@ -45,6 +56,14 @@ OTHER_NAMES = {
     "ångström": "Å",
     "in": "inch",
     "inches": "inch",
+    "mils": "mil",
+    "thou": "mil",
+    "uin": "µin",
+    "μin": "µin",
+    "uinch": "µin",
+    "μinch": "µin",
+    "microinch": "µin",
+    "microinches": "µin",
 }
 
 _WITH_UNIT = re.compile(r"\s*([+\-]?(?:\d+\.?\d*|\.\d+)(?:e[+\-]?\d+)?)\s*([^\W\d_]+)\s*", re.I)
@@ -65,7 +84,8 @@ def unit_named(name: str) -> str:
 
 
 def _unit_or_none(name: str) -> str | None:
-    """Return the unit of this name, capitals or not, or None."""
+    """Return the unit of this name, capitals or not, or None; ㎛ is one sign for µm."""
+    name = unicodedata.normalize("NFKC", name)
     for known in METRES:
         if name == known or name.lower() == known.lower():
             return known
@@ -150,7 +170,7 @@ def number_with_unit(
     InputError
         If it is anything else; the sentence begins with "is".
     """
-    found = _WITH_UNIT.fullmatch(text)
+    found = _WITH_UNIT.fullmatch(unicodedata.normalize("NFKC", text))
     if not found:
         raise InputError(f"is {quoted(text)}: it must be {rule}")
     unit = named(found[2])
@@ -163,7 +183,10 @@ def number_with_unit(
 
 def length_text(metres: float, digits: int = 3) -> str:
     """Format a length in a unit of its size: "5 µm"."""
-    for unit in ("m", "mm", "µm"):
-        if abs(metres) >= METRES[unit]:
-            return f"{metres / METRES[unit]:.{digits}g} {unit}"
-    return f"{metres / METRES['nm']:.{digits}g} nm"
+    unit = length_unit(metres)
+    return f"{metres / METRES[unit]:.{digits}g} {unit}"
+
+
+def length_unit(metres: float) -> str:
+    """Return the largest of m, mm, µm and nm that is not larger than a length; nm for less."""
+    return next((unit for unit in ("m", "mm", "µm") if abs(metres) >= METRES[unit]), "nm")

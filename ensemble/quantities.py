@@ -6,15 +6,20 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from adhesis.ensemble.lengths import METRES, length_unit
+from adhesis.ensemble.stresses import PASCALS, stress_unit
+
 _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range position step length "
-    "height_range tip_radius cut_off noise longest highest rise form_height rms_level noise_rms "
+    "height_range adhesion_range tip_radius cut_off noise longest highest rise form_height "
+    "rms_level noise_rms "
     "limit_step limit_noise limit_tip coefficient_real coefficient_imag narrowest_length",
     "m²": "m0",
     "1/m²": "m4",
     "m³": "power floor",
     "rad/m": "wave_number",
-    "Pa": "young modulus mean_stress pull_off_stress stress_change max_stress tension "
+    "Pa": "young strength preload modulus mean_stress pull_off_stress stress_change max_stress "
+    "tension "
     "largest_interior_tension",
     "Pa/m": "stiffness",
     "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
@@ -37,6 +42,32 @@ def with_units(table: Any) -> Any:
     """Return a DataFrame with the unit of every column in ``attrs["units"]``."""
     table.attrs["units"] = {name: UNITS.get(name, "") for name in table.columns}
     return table
+
+
+def shown_unit(name: str, largest: float) -> tuple[str, float]:
+    """Return a unit of its size for a quantity, and that in the SI unit; ("", 1) for a number.
+
+    Parameters
+    ----------
+    name : str
+        As in :data:`UNITS`.
+    largest : float
+        Largest of the values that are shown, in the SI unit.
+    """
+    unit = UNITS.get(name, "")
+    if unit == "m":
+        unit = length_unit(largest)
+        return unit, METRES[unit]
+    if unit == "Pa":
+        unit = stress_unit(largest)
+        return unit, PASCALS[unit]
+    return unit, 1.0
+
+
+def with_unit(name: str, value: float) -> str:
+    """Return a value and its unit: "20 kPa"; a number alone where there is none."""
+    unit, size = shown_unit(name, value)
+    return f"{value / size:g} {unit}".rstrip()
 
 
 # Of the turning points: in Pa under a load, else dimensionless.

@@ -266,6 +266,13 @@ def choice(name: str, value: T, choices: Iterable[T]) -> T:
 def instance(name: str, value: T, kind: type[Any], how: str) -> T:
     """Return an object of a class; otherwise a TypeError with ``how`` to make one."""
     if not isinstance(value, kind):
+        made = type(value)
+        if (made.__module__, made.__qualname__) == (kind.__module__, kind.__qualname__):
+            raise TypeError(
+                f"{name} is a {kind.__name__} made before a reload of adhesis (importlib.reload, "
+                "%autoreload), which makes new classes: start Python anew, and leave adhesis out "
+                "of the reload"
+            )
         raise TypeError(_sentence(name, value, f"a {kind.__name__}; make one with {how}"))
     return value
 

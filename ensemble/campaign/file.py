@@ -99,7 +99,8 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        reason = _given_twice(text, str(error)) or " ".join(str(error).split())
+        known = _given_twice(text, str(error)) or _foreign_sign(text, str(error))
+        reason = known or " ".join(str(error).split())
         raise InputError(f"{source} is not valid TOML: {reason}") from error
     for name in document:
         if name not in TABLES:
@@ -115,6 +116,35 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     campaign = Campaign(text=text, lists=tuple(lists), **tables)
     _check_together(source, campaign)
     return campaign
+
+
+# Signs that word processors and other keyboards put in the place of those of TOML.
+_PLAIN = {
+    **dict.fromkeys("\u201c\u201d\u201e\u201f\u00ab\u00bb\u2033\uff02", '"'),
+    **dict.fromkeys("\u2018\u2019\u201a\u201b\u2032\uff07\u00b4`", "'"),
+    **dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212\uff0d", "-"),
+    **dict.fromkeys("\u00a0\u2007\u2009\u202f\u3000\u200b\ufeff", " "),
+    "\uff1d": "=",
+    "\uff0c": ",",
+}
+
+
+def _foreign_sign(text: str, error: str) -> str | None:
+    """Return the sign on the line of an error that TOML has another one for, or None."""
+    found = re.search(r"\(at line (\d+)", error)
+    for number, line in enumerate(text.split("\n"), 1):
+        if found is not None and number != int(found[1]):
+            continue
+        # Quoted texts and comments may hold any sign.
+        bare = re.sub(r'"[^"]*"|\'[^\']*\'|#.*', lambda found: " " * len(found[0]), line)
+        for column, sign in enumerate(bare, 1):
+            if sign in _PLAIN:
+                shown = sign if sign.isprintable() and not sign.isspace() else "a blank"
+                return (
+                    f"line {number}, column {column} holds {shown} (U+{ord(sign):04X}), where TOML "
+                    f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
+                )
+    return None
 
 
 def _given_twice(text: str, error: str) -> str | None:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 
 from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.loop.cycle import control_of, in_options, turning_points_of
+from adhesis.ensemble.number_lists import words_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
 from adhesis.ensemble.reporter import StatusLine
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
+from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
-from adhesis.ensemble.trace.pool import Pool
 from adhesis.ensemble.trace.variants import Plan, clock, make_plan
 from adhesis.solver.model.half_space import HalfSpace
 
@@ -81,9 +81,8 @@ def execute(args: argparse.Namespace) -> int:
 
 
 def _numbers(text: str, option: str) -> list[float]:
-    words = str(text).split(",")
     try:
-        values = [parse_work_of_adhesion(word.strip(), LARGEST_IN_JOULES) for word in words]
+        values = [parse_work_of_adhesion(word, LARGEST_IN_JOULES) for word in words_of(text)]
     except InputError as error:
         raise InputError(f"{option} {error}") from None
     if len(set(values)) < len(values):
@@ -98,32 +97,31 @@ class _Progress:
         self.plan = plan
         self.line = StatusLine(_SECONDS_BETWEEN_LINES)
 
-    def __call__(self, pool: Pool) -> None:
-        finished = not pool.running and not pool.waiting
-        self.line.show(lambda: self._text(pool, finished), last=finished)
+    def __call__(self, loops: Loops) -> None:
+        finished = not loops.running and not loops.waiting
+        self.line.show(lambda: self._text(loops, finished), last=finished)
 
-    def _text(self, pool: Pool, finished: bool) -> str:
-        now = time.monotonic()
+    def _text(self, loops: Loops, finished: bool) -> str:
         running = ", ".join(
-            f"{name} ({branch} {drive:+.3g})" for name, (_, branch, drive) in pool.running.items()
+            f"{name} ({branch} {drive:+.3g})" for name, (_, branch, drive) in loops.running.items()
         )
-        left = self._left(pool, now)
-        line = f"{len(pool.done)} of {len(self.plan.runs)} loops"
+        left = self._left(loops)
+        line = f"{len(loops.done)} of {len(self.plan.runs)} loops"
         if running:
             line += f"; running {running}"
         line += f"; {self.line.seconds:.0f} s so far"
-        return line + (f", about {clock(left)} left" if pool.done and not finished else "")
+        return line + (f", about {clock(left)} left" if loops.done and not finished else "")
 
-    def _left(self, pool: Pool, now: float) -> float:
+    def _left(self, loops: Loops) -> float:
         """Expected wall seconds, corrected by what the loops have taken so far."""
         expected = self.plan.seconds
-        running = {name: now - started for name, (started, _, _) in pool.running.items()}
-        ended = list(pool.took)[1:]  # the first one loads what the processes share
+        running = {name: seconds for name, (seconds, _, _) in loops.running.items()}
+        ended = list(loops.took)[1:]  # the first one loads what the processes share
         predicted = sum(expected[name] for name in ended)
-        ratio = sum(pool.took[name] for name in ended) / predicted if predicted > 0 else 1.0
+        ratio = sum(loops.took[name] for name in ended) / predicted if predicted > 0 else 1.0
         rest = [
             max(ratio * expected[name] - seconds, 0.25 * seconds)
             for name, seconds in running.items()
         ]
-        waiting = sum(ratio * expected[job.name] for job in pool.waiting)
-        return max([(waiting + sum(rest)) / pool.processes, *rest])
+        waiting = sum(ratio * expected[name] for name in loops.waiting)
+        return max([(waiting + sum(rest)) / max(loops.processes, 1), *rest])

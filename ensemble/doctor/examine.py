@@ -93,7 +93,7 @@ def examine(directory: Path | str | None = None) -> Diagnosis:
     if not mpi_loads:
         checks.append(Check("MPI library", False, texts["mpi"], needed=False))
     elif mpirun is None:
-        text = "no mpirun and no mpiexec in PATH; adhesis run works in one process"
+        text = "no mpirun and no mpiexec in PATH; adhesis run --ranks starts processes instead"
         checks.append(Check("ranks", False, text, needed=False))
     else:
         together = _run_probe([mpirun, "-n", str(_RANKS)], directory)

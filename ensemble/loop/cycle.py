@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.number_lists import words_of
 from adhesis.ensemble.stresses import parse_stress
 from adhesis.solver.loading.loop import check_cycle
 from adhesis.solver.loading.path import check_path
@@ -72,7 +73,7 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     control = control_of(args, half_space)
     _refuse_several(args, "max_penetration", "max_stress", "path")
     if args.path is not None:
-        words = [word.strip() for word in args.path.split(",")]
+        words = _words("--path", args.path)
         out = words[-1] == _OUT
         rule = "numbers with commas between them"
         points = _numbers("--path", words[:-1] if out else words, rule)
@@ -96,10 +97,10 @@ def turning_points_of(args: argparse.Namespace, control: Control) -> tuple[float
         raise InputError("--max-stress belongs to load control: give --stiffness 0 with it")
     text = args.max_stress if control.is_load else args.max_penetration
     name = "--max-stress" if control.is_load else "--max-penetration"
-    words = str(text).split(",")
     if text is None:
         points: tuple[float, ...] = (_MAX_PENETRATION,)
     else:
+        words = _words(name, text)
         rule = "one or more numbers, as 1.5 or 0.5,1.5"
         if control.is_fixed:
             rule = "one or more numbers between 0 and 1, as 0.9 or 0.3,0.6"
@@ -147,6 +148,13 @@ def _refuse_several(args: argparse.Namespace, *names: str) -> None:
         raise InputError(f"{' and '.join(given)} are given: a loop has one of them")
 
 
+def _words(option: str, text: str) -> list[str]:
+    try:
+        return words_of(text)
+    except InputError as error:
+        raise InputError(f"{option} {error}") from None
+
+
 def _numbers(option: str, words: list[str], rule: str) -> tuple[float, ...]:
     try:
         values = tuple(float(word) for word in words)
@@ -159,6 +167,6 @@ def _numbers(option: str, words: list[str], rule: str) -> tuple[float, ...]:
 
 def _stresses(option: str, words: list[str]) -> tuple[float, ...]:
     try:
-        return tuple(parse_stress(word.strip()) for word in words)
+        return tuple(parse_stress(word) for word in words)
     except InputError as error:
         raise InputError(f"{option} {error}") from None

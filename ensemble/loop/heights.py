@@ -62,8 +62,8 @@ def read_heights(
     if not holds_numbers(source):
         raise InputError(
             source.container()
-            or f"{path} is neither text nor .npy: --trace reads files of instruments, as adhesis "
-            "trace does"
+            or f"{path} is neither text nor .npy: --trace reads files of instruments, and a text "
+            "that holds zero bytes (UTF-16 without a mark) is to be saved as UTF-8"
         )
     if source.is_npy:
         array = load_array(source)
@@ -71,16 +71,17 @@ def read_heights(
             raise InputError(_not_one_column(source, *array.shape))
         return _in_metres(source, array.reshape(-1), given)
     table = read_column(source, delimiter, decimal)
-    if len(table.columns) > 1:
-        raise InputError(_not_one_column(source, table.columns.shape[1], len(table.columns)))
+    if len(table.filled) > 1:
+        raise InputError(_not_one_column(source, table.columns.shape[1], len(table.filled)))
     unit = _unit_of(source, table, given)
-    missing = np.flatnonzero(~np.isfinite(table.columns[0]))
+    heights = table.columns[table.filled[0]]
+    missing = np.flatnonzero(~np.isfinite(heights))
     if missing.size:
         raise InputError(
             f"{path} has no finite height on line {table.lines[missing[0]]}: --heights needs every "
             "height of the period (adhesis trace fills gaps)"
         )
-    return _in_metres(source, table.columns[0], unit)
+    return _in_metres(source, heights, unit)
 
 
 def _not_one_column(source: Source, rows: int, columns: int) -> str:

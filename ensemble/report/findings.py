@@ -12,9 +12,11 @@ from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.precision import as_percent
+from adhesis.ensemble.quantities import with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import cell_name, lines_along, place, together
 from adhesis.ensemble.report.tables.loss_tables import least
+from adhesis.ensemble.stresses import stress_text
 from adhesis.ensemble.task.doubt import bound, doubtful, why_beyond
 from adhesis.solver.loading.zero_range import beyond_limit
 
@@ -30,27 +32,41 @@ def verdict(data: Aggregate) -> list[str]:
 def _outcome(data: Aggregate) -> str:
     cells = sorted(
         (cell for cell in data.cells if cell.done),
-        key=lambda cell: cell.estimates["loss_dimensionless"].mean,
+        key=lambda cell: cell.estimates["loss"].mean,
     )
-    ends = sorted({cell.campaign.cycle.turning_point for cell in cells})
-    end = f"{ends[0]:g}" if len(ends) == 1 else f"{ends[0]:g} … {ends[-1]:g}"
-    load = data.campaign.cycle.under_load
-    to = f"a mean stress of {end} Pa" if load else f"Δ/h_max = {end}"
-    top = f"A loop to {to} and back until detached loses"
+    top = f"A loop to {turning_point(data)} and back until detached loses"
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}."
-    low, high = cells[0], cells[-1]
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
     return (
-        f"{top}, on average over realisations, from {_loss(low)} to {_loss(high)}; "
+        f"{top}, on average over realisations, from {_loss(cells[0])} to {_loss(cells[-1])}; "
         f"{100 * min(share):.0f} to {100 * max(share):.0f} % of it is lost where edges run inside "
         "patches."
     )
 
 
+def turning_point(data: Aggregate) -> str:
+    """Return "Δ/h_max = 0.5 … 0.9": to where the finished loops were loaded."""
+    cycle = data.campaign.cycle
+    ends = sorted({cell.campaign.cycle.turning_point for cell in data.cells if cell.done})
+    if cycle.under_load:
+        texts = [stress_text(end) for end in ends]
+        return f"a mean stress of {' … '.join(dict.fromkeys((texts[0], texts[-1])))} by a weight"
+    texts = [f"{end:g}" for end in ends]
+    end = " … ".join(dict.fromkeys((texts[0], texts[-1])))
+    return f"{penetration_sign(data)} = {end}"
+
+
+def penetration_sign(data: Aggregate) -> str:
+    """Return what is prescribed along the loops of a campaign, in units of h_max."""
+    return "Δ/h_max" if data.campaign.cycle.stiffness is None else "u_tot/h_max"
+
+
 def _loss(cell: Cell) -> str:
-    dimensionless, loss = cell.estimates["loss_dimensionless"].mean, cell.estimates["loss"].mean
-    return f"W~ = {dimensionless:.3g} or {1e3 * loss:.3g} mJ/m² at {cell_name(cell)}"
+    loss, gamma = cell.estimates["loss"].mean, cell.work_of_adhesion
+    beside = [f"{loss / gamma:.3g} γ"] if gamma > 0 else []
+    beside.append(f"W~ = {cell.estimates['loss_dimensionless'].mean:.3g}")
+    return f"{1e3 * loss:.3g} mJ/m² ({', '.join(beside)}) at {cell_name(cell)}"
 
 
 def _percent(share: float) -> str:
@@ -60,9 +76,7 @@ def _percent(share: float) -> str:
 
 def _statistical(data: Aggregate) -> str:
     errors = [
-        error
-        for cell in data.cells
-        if np.isfinite(error := cell.estimates["loss_dimensionless"].relative_error)
+        error for cell in data.cells if np.isfinite(error := cell.estimates["loss"].relative_error)
     ]
     counts = sorted({cell.done for cell in data.cells if cell.done})
     many = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
@@ -76,7 +90,8 @@ def _statistical(data: Aggregate) -> str:
         else f"{_percent(errors[0])} %"
     )
     return (
-        f"With {many} {plural} of each {point}, the 95 % interval of the mean W~ reaches {reach} "
+        f"With {many} {plural} of each {point}, the 95 % interval of the mean loss in J/m² reaches "
+        f"{reach} "
         "from it, on the further side."
     )
 
@@ -133,10 +148,17 @@ def missing(data: Aggregate) -> list[str]:
             f"averages are over the {data.done} finished ones."
         )
     if data.failed:
-        out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.")
-    empty = [cell_name(cell) for cell in data.cells if not cell.done]
+        why = f" First reason: {data.failures[0][1]}." if data.failures else ""
+        out.append(f"{data.failed} of {total} tasks failed; the averages leave them out.{why}")
+    empty = [cell_name(cell) for cell in data.cells if not cell.done and cell.pending]
     if empty:
         out.append(f"No task is finished yet for {_listed(empty)}.")
+    failed = [cell_name(cell) for cell in data.cells if not cell.done and not cell.pending]
+    if failed:
+        out.append(
+            f"WARNING: all tasks failed for {_listed(failed)}: figures and averages lack "
+            f"{'this cell' if len(failed) == 1 else 'these cells'}."
+        )
     few = [cell_name(cell) for cell in data.cells if cell.done == 1]
     if few:
         out.append(f"Only one realisation, hence no spread, for {_listed(few)}.")
@@ -360,7 +382,7 @@ def _growth(data: Aggregate, of_paper: bool) -> list[str]:
 def _along(data: Aggregate, axis: Axis) -> list[str]:
     """Whether the mean loss is monotone along a further axis, in every line of cells."""
     for_all = lines_along(data, axis)
-    steps = [np.diff([c.estimates["loss_dimensionless"].mean for c in line]) for line in for_all]
+    steps = [np.diff([c.estimates["loss"].mean for c in line]) for line in for_all]
     steps = [step for step in steps if step.size]
     if not steps:
         return []
@@ -372,9 +394,9 @@ def _along(data: Aggregate, axis: Axis) -> list[str]:
         for verb, count in (("grows", up), ("falls", down), ("is not monotone", mixed))
         if count
     ]
-    low, high = axis.values[0], axis.values[-1]
+    low, high = (with_unit(axis.name, end) for end in (min(axis.values), max(axis.values)))
     return [
-        f"Along {axis.name} from {min(low, high):g} to {max(low, high):g} the mean loss "
+        f"Along {axis.name} from {low} to {high} the mean loss in J/m² "
         f"{', '.join(parts)} of {len(steps)} series of cells that are else alike."
     ]
 
@@ -387,14 +409,16 @@ def _order_in_slope(data: Aggregate, of_paper: bool) -> list[str]:
         if len(cells) < 3:
             continue
         cells.sort(key=lambda c: c.estimates["m2"].mean)
-        steps = np.diff([c.estimates["loss_dimensionless"].mean for c in cells])
+        quantity = "loss_dimensionless" if of_paper else "loss"
+        steps = np.diff([c.estimates[quantity].mean for c in cells])
         verb = "falls with m2" if steps[0] < 0 else "grows with m2"
         if not (np.all(steps > 0) or np.all(steps < 0)):
             verb = "is not monotone in m2"
         found.setdefault(verb, []).append(f"{gamma:g}")
     parts = [f"{verb} at γ = {_listed(gammas, ', ')} J/m²" for verb, gammas in found.items()]
     rest = "; the paper's table is not monotone" if of_paper else ""
-    return [f"Through H, the mean loss {', and '.join(parts)}{rest}."] if parts else []
+    what = "mean W~" if of_paper else "mean loss in J/m²"
+    return [f"Through H, the {what} {', and '.join(parts)}{rest}."] if parts else []
 
 
 def _unloading_exceeds_loading(data: Aggregate, of_paper: bool) -> list[str]:
@@ -433,7 +457,8 @@ def _spectrum(data: Aggregate) -> list[str]:
     if not parts:
         return []
     depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
-    depth = f"Δ/h_max = {' or '.join(sorted(depths))}"
+    sign = "p̄/p̄_max" if data.campaign.cycle.under_load else penetration_sign(data)
+    depth = f"{sign} = {' or '.join(sorted(depths))}"
     return [
         "Slope of the loading spectrum of the deformed surface at small wave numbers and "
         f"{depth}, fitted, against Persson's -(2+H): "

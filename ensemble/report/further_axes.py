@@ -7,28 +7,30 @@ from collections.abc import Iterable
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.quantities import shown_unit, with_unit
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
-    "max_stress": r"turning point $\bar p_\mathrm{max}$ (Pa)",
-    "period": r"period $\lambda$ (m)",
+    "max_stress": r"turning point $\bar p_\mathrm{max}$",
+    "preload": r"preload $\bar p_\mathrm{max}$",
+    "period": r"period $\lambda$",
     "n0": "lowest harmonic $n_0$",
     "ratio": r"$q_\mathrm{max}/q_\mathrm{min}$",
     "rolloff": r"roll-off $q_\mathrm{r}/q_\mathrm{min}$",
-    "h_rms": r"root mean square height $h_\mathrm{rms}$ (m)",
+    "h_rms": r"root mean square height $h_\mathrm{rms}$",
     "m2": "mean square slope $m_2$",
     "c0": "$C_0$ (m²)",
-    "stiffness": "stiffness $k$ (Pa/m)",
-    "young": "Young's modulus $E$ (Pa)",
+    "stiffness": "stiffness $k$",
+    "young": "Young's modulus $E$",
     "poisson": r"Poisson's ratio $\nu$",
-    "adhesion_range": r"range of adhesion $\delta$ (m)",
-    "strength": r"strength $\sigma_\mathrm{th}$ (Pa)",
+    "adhesion_range": r"range of adhesion $\delta$",
+    "strength": r"strength $\sigma_\mathrm{th}$",
 }
 
 
 def place(others: Iterable[tuple[str, float]]) -> str:
-    """Return "max_penetration = 0.8, ratio = 8"; empty without further axes."""
-    return ", ".join(f"{name} = {value:g}" for name, value in others)
+    """Return "max_stress = 20 kPa, ratio = 8"; empty without further axes."""
+    return ", ".join(f"{name} = {with_unit(name, value)}" for name, value in others)
 
 
 def cell_name(cell: Cell) -> str:
@@ -37,9 +39,11 @@ def cell_name(cell: Cell) -> str:
     return f"{name}, {place(cell.others)}" if cell.others else name
 
 
-def axis_label(axis: Axis) -> str:
-    """Return the label of an axis of a figure."""
-    return _LABELS.get(axis.name, axis.name)
+def axis_label(axis: Axis) -> tuple[str, float]:
+    """Return the label of an axis of a figure, and its unit in the SI unit."""
+    unit, size = shown_unit(axis.name, max(axis.values))
+    label = _LABELS.get(axis.name, axis.name)
+    return (f"{label} ({unit})" if unit else label), size
 
 
 def together(data: Aggregate, axis: Axis) -> set[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.escape import code_span, fence, markdown, printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
+from adhesis.ensemble.quantities import with_unit
 from adhesis.ensemble.report import findings, paper
 from adhesis.ensemble.report.figures.catalogue import Illustration
 from adhesis.ensemble.report.figures.style import left_out
@@ -114,12 +115,8 @@ def write_page(data: Aggregate, sections: Sequence[tuple[str, Sequence[Illustrat
 
 def _summary(data: Aggregate) -> str:
     sweep, cycle = data.campaign.sweep, data.campaign.cycle
-    tops = {cell.campaign.cycle.turning_point for cell in data.cells}
-    top = f"Δ/h_max = {_list(tops)}"
-    if cycle.under_load:
-        top = f"a mean stress of {_list(tops)} Pa"
     further = "".join(
-        f"{axis.name} = {_list(axis.values)}; "
+        f"{axis.name} = {', '.join(with_unit(axis.name, v) for v in sorted(axis.values))}; "
         for axis in data.further
         if axis.name not in ("max_penetration", "max_stress")
     )
@@ -130,7 +127,7 @@ def _summary(data: Aggregate) -> str:
     return (
         f"{data.done} loops of {data.done + data.failed + data.pending} tasks: "
         f"H = {_list(sweep.hurst)}; γ = {_list(sweep.work_of_adhesion)} J/m²; {further}"
-        f"{many}. Each loop was loaded to {top} "
+        f"{many}. Each loop was loaded to {findings.turning_point(data)} "
         f"in {cycle.load_steps} steps and unloaded until detached; "
         f"method `{data.campaign.solver.method}`. Numbers: `losses.csv`; curves: `curves.nc`."
     )

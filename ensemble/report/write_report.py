@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -45,14 +45,30 @@ def write_report(
     data = aggregate(path, beside)
     directory = Path(directory)
     writing = Writing()
-    with writing.output("the report in", directory), staged_folder(directory) as folder:
-        _write_files(data, folder, progress)
+    with writing.output("the report in", directory):
+        with staged_folder(directory) as folder:
+            drawn = _write_files(data, folder, progress)
+        _remove_other_figures(directory, drawn)
     writing.finish()
     _print_summary(data, directory, stream or sys.stdout)
     return data
 
 
-def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], None]) -> None:
+def _remove_other_figures(directory: Path, drawn: Collection[str]) -> None:
+    """Remove figures that an earlier report has left and this one does not show."""
+    from adhesis.ensemble.report.figures.catalogue import ALL
+
+    known = {item.name for item in ALL}
+    for path in directory.iterdir():
+        is_figure = path.stem in known or path.stem.startswith("loss_along_")
+        if is_figure and path.suffix in (".png", ".pdf") and path.stem not in drawn:
+            path.unlink()
+
+
+def _write_files(
+    data: Aggregate, directory: Path, progress: Callable[[str], None]
+) -> Collection[str]:
+    """Write all files; returns the names of the figures."""
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
     from adhesis.ensemble.report.curves_dataset import write_curves
@@ -63,6 +79,7 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
         MECHANISMS,
         PENETRATIONS,
         SHAPES,
+        Illustration,
         along_axes,
     )
     from adhesis.ensemble.report.figures.loss_figures import of_penetration
@@ -83,13 +100,17 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
         loss_tables.companions(data).write_csv(directory / "beside.csv")
     mechanisms.slopes(data).write_csv(directory / "slopes.csv")
     with_shapes = (*SHAPES, *HEIGHTS) if data.fields.penetration.size else HEIGHTS
-    sections = (
+    found: tuple[tuple[str, Sequence[Illustration]], ...] = (
         ("loops", LOOPS),
         ("losses", LOSSES),
         ("axes", along_axes(data)),
         ("mechanisms", MECHANISMS),
         ("fields", with_shapes),
         ("companions", PENETRATIONS if of_penetration(data) else ()),
+    )
+    sections = tuple(
+        (name, [i for i in items if i.is_worth(data if i.whole else data.shown)])
+        for name, items in found
     )
     items = [item for _, illustrations in sections for item in illustrations]
     for number, item in enumerate(items, 1):
@@ -103,6 +124,7 @@ def _write_files(data: Aggregate, directory: Path, progress: Callable[[str], Non
     page = write_page(data, sections)
     (directory / "report.md").write_text(page, encoding="utf-8")
     (directory / "report.html").write_text(html_page(page, directory), encoding="utf-8")
+    return [item.name for item in items]
 
 
 def _print_summary(data: Aggregate, directory: Path, stream: IO[str]) -> None:

@@ -354,5 +354,17 @@ def _failure_lines(failures: list[dict[str, Any]]) -> list[str]:
         lines.append(f"  {_task(f)}, after {f['seconds']:.3g} s")
     if len(failures) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(failures) - _MOST_FAILURES_SHOWN} more (--json lists all)")
-    lines.append("again: adhesis run CAMPAIGN.toml --redo failed")
+    lines.append(advice_on_failures([f["error"] for f in failures]))
     return lines
+
+
+def advice_on_failures(errors: Sequence[str]) -> str:
+    """Return what to do about failed tasks: those that the solver refused fail again."""
+    recurring = sum(error.startswith("PathError") for error in errors)
+    if not recurring:
+        return "again: adhesis run CAMPAIGN.toml --redo failed"
+    which = "they fail" if recurring == len(errors) else f"{recurring} of them fail"
+    return (
+        f"{which} again if they are computed again: follow the reason given, in a campaign with "
+        "other values"
+    )

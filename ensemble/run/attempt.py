@@ -10,12 +10,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any
+from typing import Any, Protocol
 
 from adhesis.ensemble.run.interrupt import raised_by_handler
 
-StopCheck = Callable[[], None]
-"""Called by a task now and then; it raises an exception to end the task."""
+
+class StopCheck(Protocol):
+    """Called by a task now and then, with a note on how far it is; it raises to end the task."""
+
+    def __call__(self, note: Any = None) -> None:
+        """Return if the task is to go on."""
+
+
 Compute = Callable[[int, StopCheck], Any]
 
 # Interval at which a task in progress checks whether to stop, in s.
@@ -55,22 +61,31 @@ class Outcome:
 
 
 def attempt(
-    compute: Compute, task: int, rank: int, stop: Callable[[], bool], limit: float | None
+    compute: Compute, task: int, rank: int, stop: Callable[[Any], bool], limit: float | None
 ) -> Outcome:
     """Compute one task; failures become part of the outcome.
+
+    Parameters
+    ----------
+    compute : callable
+    task, rank : int
+    stop : callable
+        Takes the note of the task's last check, or None; returns whether to give it up.
+    limit : float, optional
+        Longest time of the task, in s.
 
     Raises
     ------
     GivenUp
-        If ``stop()`` was true while it ran.
+        If ``stop`` returned True while it ran.
     Exception
         One that the handler of a signal raised meanwhile.
     """
     started = time.perf_counter()
     end = started + (math.inf if limit is None else limit)
 
-    def check() -> None:
-        if stop():
+    def check(note: Any = None) -> None:
+        if stop(note):
             raise GivenUp
         if time.perf_counter() > end:
             raise TimeLimit(f"longer than the time limit of {limit:g} s")

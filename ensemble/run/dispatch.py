@@ -1,4 +1,4 @@
-"""Hand-out of tasks to ranks: one master, the others work. Knows ranks, not files.
+"""Hand-out of tasks to workers by one master. Knows ranks, not files.
 
 Tasks are numbers; what one means, and where its result goes, is the business of three callables:
 
@@ -9,20 +9,29 @@ Tasks are numbers; what one means, and where its result goes, is the business of
                            it raises ends the run (a disk that fails is not a task that fails).
 ``collect(outcome)``       on the master, after the worker already has its next task.
 
-A waiting rank looks for a message and sleeps, it never spins: blocking receives burn a core each.
-Every task that a worker is sent is answered exactly once, done or given up, so the master knows
-at any time what is in flight, and a stop is over when everything is answered.
+Messages go through a :class:`Channel`: MPI between ranks, pipes between processes of one machine,
+or :class:`OwnWorker`, where the master's process works itself. A waiting rank looks for a message
+and sleeps, it never spins: blocking receives burn a core each. Every task that a worker is sent is
+answered exactly once, done or given up, so the master knows at any time what is in flight, and a
+stop is over when everything is answered.
 
-A worker sends heartbeats from its main thread, wherever it looks whether it is to stop: no further
-thread uses MPI. One that was not heard from for :attr:`Limits.silence` is out of reach, and its
-tasks are handed out again. It may come back, so each task has one owner, who alone delivers it:
+========================  ==========  ======================================================
+message                   from        meaning
+========================  ==========  ======================================================
+``("task", task)``        master      compute it
+``("halt",)``             master      give up what was sent; looked for during a task
+``("dismissed",)``        master      nothing more will come
+``("alive", task, note)`` worker      it still computes; ``note`` is what ``check`` was given
+``("outcome", outcome)``  worker      of one task
+``("given up", task)``    worker      not computed, as the run stops
+``("stop", reason)``      worker      asked to stop the run, such as by a signal
+``("ended", why)``        channel     the worker's process has ended; another one takes over
+``("goodbye",)``          worker      answers its dismissal
+========================  ==========  ======================================================
 
-- before it delivers, a worker claims the task, and what is claimed is not handed out again;
-- it waits for the answer, and the first claim is granted, unless nobody else can have the task: it
-  was handed out for the first time, the master has never handed the worker's tasks to others, and
-  cannot have done so since, as it has answered a heartbeat of less than half that time ago.
-
-A worker that is out of reach at the end is not waited for: :attr:`Master.out_of_reach`.
+The hand-out is crash-only: a worker that was not heard from for :attr:`Limits.silence` ends the
+run with :class:`Unresponsive`. What was delivered is kept, so the same run can simply be started
+again; nobody has to decide which of two workers has a task.
 """
 
 from __future__ import annotations
@@ -31,9 +40,9 @@ import heapq
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from adhesis.ensemble.run.attempt import Compute, GivenUp, Outcome, attempt
 from adhesis.ensemble.run.schedule import Schedule
@@ -41,6 +50,7 @@ from adhesis.ensemble.run.units import Units
 
 Deliver = Callable[[Outcome], Outcome]
 Collect = Callable[[Outcome], None]
+Message = tuple[Any, ...]
 
 MASTER = 0
 # Sleep between two looks for a message, growing from the first to the second value, in s.
@@ -48,27 +58,34 @@ SHORTEST_PAUSE, LONGEST_PAUSE = 1e-3, 5e-3
 # A worker holds so much work ahead, by measured times in s, but at most so many tasks: it need not
 # wait for the next short one while the master sleeps.
 AHEAD, MOST_AHEAD = 0.05, 32
-# A worker that was not heard from for so long (s) is out of reach. Its heartbeats come at the first
-# share of that; after the second share without an answer it asks before it delivers a task.
-SILENCE, BEAT_SHARE, LEASE_SHARE = 120.0, 1 / 12, 0.5
+# A worker that was not heard from for so long (s) ends the run; it reports at this interval (s).
+SILENCE, REPORT_INTERVAL = 120.0, 10.0
 # A look of the master counts as at most so much silence (s): messages wait while it is held up.
 _LONGEST_LOOK = 1.0
 
 
-class Overdue(Exception):
-    """Workers did not answer a stop in time."""
+class Unresponsive(Exception):
+    """Error for workers that did not answer in time: what was delivered is kept."""
 
 
 class Channel(Protocol):
-    """Messages between ranks; nothing here waits."""
+    """Messages between a master and its workers; nothing here waits.
+
+    Attributes
+    ----------
+    rank : int
+        The own one.
+    workers : sequence of int
+        Ranks that work.
+    """
 
     rank: int
-    size: int
+    workers: Sequence[int]
 
-    def send(self, to: int, message: tuple[Any, ...], *, urgent: bool = False) -> None:
+    def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
         """Send a message; urgent ones are looked for while a task is in progress."""
 
-    def poll(self, *, urgent: bool = False) -> tuple[int, tuple[Any, ...]] | None:
+    def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
         """Return the next message and who sent it, or None."""
 
 
@@ -87,7 +104,9 @@ class Limits:
     grace : float
         How long workers may take to answer a stop or their dismissal, in s.
     silence : float
-        How long a worker may not be heard from until its tasks are handed to others, in s.
+        How long a worker may not be heard from until the run ends, in s.
+    report_interval : float
+        Time between two signs of life of a worker, in s; several fit into ``silence``.
     """
 
     stop: Callable[[], str | None] = lambda: None
@@ -95,51 +114,15 @@ class Limits:
     task_seconds: float | None = None
     grace: float = 30.0
     silence: float = SILENCE
-
-
-def work_alone(
-    schedule: Schedule,
-    group_of: Mapping[int, Hashable],
-    compute: Compute,
-    deliver: Deliver,
-    collect: Collect,
-    limits: Limits,
-    units: Units | None = None,
-) -> str | None:
-    """Do every task in this process; returns why it stopped early, or None."""
-    units = units or Units()
-    while (reason := limits.stop()) is None:
-        first = schedule.take(limits.time_left())
-        if first is None:
-            return "no time left for another task" if schedule.waiting else None
-        for task in units.tasks(first):
-            if (reason := limits.stop()) is not None:
-                return reason
-            try:
-                outcome = attempt(
-                    compute, task, MASTER, lambda: limits.stop() is not None, limits.task_seconds
-                )
-            except GivenUp:
-                return limits.stop()
-            outcome = deliver(outcome)
-            if done := units.answered(task, _measured(outcome)):
-                schedule.measured(group_of[done[0]], done[1])
-            collect(outcome)
-    return reason if schedule.waiting else None
-
-
-def _measured(outcome: Outcome) -> float | None:
-    """Time of a task that has a result."""
-    return outcome.seconds if outcome.error is None else None
+    report_interval: float = REPORT_INTERVAL
 
 
 class Master:
-    """Hands out; see the module.
+    """Master of a hand-out; see the module.
 
     Parameters
     ----------
     channel : Channel
-        Ranks 1 … size - 1 work.
     schedule : Schedule
     group_of : mapping of int to hashable
         Group of each task, for its measured time.
@@ -151,8 +134,11 @@ class Master:
         Replaced when the run is simulated.
     units : Units, optional
         Tasks that go to one worker together; the schedule knows the first one of each.
-    report : callable
-        Gets a line about a worker that is out of reach, or back.
+
+    Attributes
+    ----------
+    notes : dict of int to object
+        Last note of each task that is handed out and not answered; None before the first.
     """
 
     def __init__(
@@ -166,10 +152,8 @@ class Master:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
         units: Units | None = None,
-        report: Callable[[str], None] = lambda text: None,
     ) -> None:
         self._channel = channel
-        self._report = report
         self._units = units or Units()
         self._schedule = schedule
         self._group_of = group_of
@@ -178,35 +162,23 @@ class Master:
         self._tick = tick
         self._clock = clock
         self._sleep = sleep
+        self.notes: dict[int, Any] = {}
         # Of each worker, the tasks that it was sent and has not answered, with the mean times of
         # their groups: nothing is queued behind a task of a group that was not measured.
-        self._sent: dict[int, dict[int, float]] = {r: {} for r in range(1, channel.size)}
+        self._sent: dict[int, dict[int, float]] = {rank: {} for rank in channel.workers}
         # Workers that may have room, the emptiest first (entries go stale).
         self._room = [(0, rank) for rank in self._sent]
         self._halted: float | None = None
         self._reason: str | None = None
         self._dismissed = False
-        # Time that the master was awake, when each worker was last heard from by that clock, and
-        # the workers that are out of reach.
+        # Time that the master was awake, and when each worker was last heard from by that clock.
         self._awake, self._looked, self._next_count = 0.0, clock(), 0.0
         self._heard = dict.fromkeys(self._sent, 0.0)
-        self._silent: set[int] = set()
-        self._recalled: set[int] = set()  # that ever were
-        # Who delivers a task that was claimed; tasks that were handed out again, and those of them
-        # that are done.
-        self._owner: dict[int, int] = {}
-        self._shared: set[int] = set()
-        self._finished: set[int] = set()
 
     @property
     def in_flight(self) -> int:
         """Tasks handed out and not answered."""
-        return sum(len(tasks) for rank, tasks in self._sent.items() if rank not in self._silent)
-
-    @property
-    def out_of_reach(self) -> tuple[int, ...]:
-        """Workers that have not answered their dismissal, once the run is over."""
-        return tuple(sorted(self._silent))
+        return sum(len(tasks) for tasks in self._sent.values())
 
     def run(self) -> str | None:
         """Hand out until nothing waits and everything is answered.
@@ -218,13 +190,13 @@ class Master:
 
         Raises
         ------
-        Overdue
-            If workers did not answer a stop within the grace time.
+        Unresponsive
+            If a worker was silent for too long, or did not answer a stop within the grace time.
         """
         pause = SHORTEST_PAUSE
         self._consider_stopping()
         self._hand_out()
-        while self._waits():
+        while self.in_flight:
             self._consider_stopping()
             message = self._look()
             if message is None:
@@ -239,56 +211,27 @@ class Master:
             return "no time left for another task"
         return self._reason
 
-    def _waits(self) -> bool:
-        """Whether a worker within reach has a task, or could have one if any were within reach."""
-        if not self._silent:
-            return any(self._sent.values())
-        if any(tasks for rank, tasks in self._sent.items() if rank not in self._silent):
-            return True
-        if self._halted is not None or len(self._silent) < len(self._sent):
-            return False
-        return bool(self._schedule.waiting) or any(self._sent.values())
-
-    def _look(self) -> tuple[int, tuple[Any, ...]] | None:
-        """Return the next message; if there is none, look for workers that are out of reach."""
+    def _look(self) -> tuple[int, Message] | None:
+        """Return the next message; if there is none, look for workers that are silent."""
         message = self._channel.poll()
         now = self._clock()
         self._awake += min(now - self._looked, _LONGEST_LOOK)
         self._looked = now
         if message is not None:
             self._heard[message[0]] = self._awake
-            if message[0] in self._silent:
-                self._silent.discard(message[0])
-                self._report(f"rank {message[0]} answers again")
-                heapq.heappush(self._room, (len(self._sent[message[0]]), message[0]))
         elif self._awake > self._next_count:
-            self._next_count = self._awake + self._limits.silence * BEAT_SHARE
+            self._next_count = self._awake + self._limits.silence / 12
             for rank, heard in self._heard.items():
-                if rank not in self._silent and self._awake - heard > self._limits.silence:
-                    self._recall(rank)
+                if self._awake - heard > self._limits.silence:
+                    raise Unresponsive(
+                        f"rank {rank} has not answered for {self._limits.silence:g} s"
+                    )
         return message
-
-    def _recall(self, rank: int) -> None:
-        """Let others do the tasks of a worker that is out of reach."""
-        self._silent.add(rank)
-        self._recalled.add(rank)
-        within_reach = (tasks for r, tasks in self._sent.items() if r not in self._silent)
-        kept = {task for tasks in within_reach for task in tasks} | self._finished
-        tasks = [t for t in self._sent[rank] if t not in kept and t not in self._owner]
-        for task in tasks:
-            self._units.answered(task, None)
-        self._shared.update(tasks)
-        self._schedule.add(self._units.form(tasks))
-        text = f"rank {rank} does not answer for {self._limits.silence:g} s"
-        if self._sent[rank]:
-            text += f": {len(tasks)} of its {len(self._sent[rank])} tasks are handed to others"
-        self._report(text)
-        self._hand_out()
 
     def _consider_stopping(self) -> None:
         if self._halted is not None:
             if self._clock() - self._halted > self._limits.grace:
-                raise Overdue(f"{self.in_flight} tasks did not stop in time ({self._reason})")
+                raise Unresponsive(f"{self.in_flight} tasks did not stop in time ({self._reason})")
         elif (reason := self._limits.stop()) is not None:
             self._halt(reason)
 
@@ -298,34 +241,28 @@ class Master:
             for rank in self._sent:
                 self._channel.send(rank, ("halt",), urgent=True)
 
-    def _receive(self, rank: int, message: tuple[Any, ...]) -> None:
-        kind: Literal["alive", "claim", "outcome", "given up", "stop"] = message[0]
+    def _receive(self, rank: int, message: Message) -> None:
+        kind, *content = message
         if kind == "alive":
-            answer = ("heard", message[1], rank in self._recalled)
-            self._channel.send(rank, answer, urgent=True)
-            self._hand_out()  # it may have come back
-            return
-        if kind == "stop":  # a worker received a request to stop, such as a signal
-            self._halt(message[1])
-            return
-        if kind == "claim":
-            _, task, waits = message
-            granted = task not in self._finished and self._owner.setdefault(task, rank) == rank
-            if waits:
-                self._channel.send(rank, ("answer", granted))
-            return
-        if kind == "given up":
-            if message[1] not in self._shared:
-                self._units.answered(message[1], None)
-            self._answered(rank, message[1])
+            task, note = content
+            if task in self._sent[rank]:
+                self.notes[task] = note
+        elif kind == "stop":
+            self._halt(content[0])
+        elif kind == "given up":
+            self._units.answered(content[0], None)
+            self._answered(rank, content[0])
             self._hand_out()
-            return
-        outcome: Outcome = message[1]
+        elif kind == "ended":
+            for task in list(self._sent[rank]):
+                self._finish(rank, Outcome(task, rank, 0.0, error=content[0]))
+        else:
+            self._finish(rank, content[0])
+
+    def _finish(self, rank: int, outcome: Outcome) -> None:
         self._answered(rank, outcome.task)
-        self._owner.pop(outcome.task, None)
-        if outcome.task in self._shared:
-            self._finished.add(outcome.task)
-        elif done := self._units.answered(outcome.task, _measured(outcome)):
+        seconds = outcome.seconds if outcome.error is None else None
+        if done := self._units.answered(outcome.task, seconds):
             self._schedule.measured(self._group_of[done[0]], done[1])
         self._hand_out()
         self._collect(outcome)
@@ -333,6 +270,7 @@ class Master:
 
     def _answered(self, rank: int, task: int) -> None:
         del self._sent[rank][task]
+        self.notes.pop(task, None)
         heapq.heappush(self._room, (len(self._sent[rank]), rank))
 
     def _hand_out(self) -> None:
@@ -342,7 +280,7 @@ class Master:
         while self._room and self._halted is None and self._schedule.waiting:
             load, rank = self._room[0]
             sent = self._sent[rank]
-            if rank in self._silent or len(sent) != load or not self._has_room(sent):
+            if len(sent) != load or not self._has_room(sent):
                 heapq.heappop(self._room)
                 continue
             first = self._schedule.take(self._limits.time_left())
@@ -352,7 +290,8 @@ class Master:
             tasks = self._units.tasks(first)
             for task in tasks:
                 sent[task] = math.inf if seconds is None else seconds / len(tasks)
-                self._channel.send(rank, ("task", task, task in self._shared))
+                self.notes[task] = None
+                self._channel.send(rank, ("task", task))
             heapq.heapreplace(self._room, (len(sent), rank))
 
     @staticmethod
@@ -362,27 +301,24 @@ class Master:
     def _dismiss(self) -> None:
         self._dismissed = True
         for rank in self._sent:
-            if rank in self._silent:  # nobody needs what it may still compute
-                self._channel.send(rank, ("halt",), urgent=True)
             self._channel.send(rank, ("dismissed",))
         waiting, end = set(self._sent), self._clock() + self._limits.grace
-        while waiting - self._silent:
+        while waiting:
             message = self._look()
             if message is None:
                 if self._clock() > end:  # what has no task answers at once, or hangs
-                    self._silent |= waiting
+                    names = ", ".join(map(str, sorted(waiting)))
+                    raise Unresponsive(f"rank {names} did not answer at the end")
                 self._sleep(SHORTEST_PAUSE)
-            elif message[1][0] == "goodbye":
+            elif message[1][0] in ("goodbye", "ended"):
                 waiting.discard(message[0])
-                del self._heard[message[0]]
-            elif message[1][0] != "stop":
-                self._receive(*message)
-            elif self._schedule.waiting:
+                self._heard.pop(message[0], None)
+            elif message[1][0] == "stop" and self._schedule.waiting:
                 self._reason = self._reason or message[1][1]
 
 
 class Worker:
-    """Computes what it is sent until it is dismissed; see the module.
+    """Worker of a hand-out, which computes what it is sent until it is dismissed; see the module.
 
     Parameters
     ----------
@@ -409,26 +345,36 @@ class Worker:
         self._halted = False
         self._reported = False
         self._looking = False
-        # When it last sent a heartbeat, when the last one was that the master has answered, and
-        # whether the master ever handed its tasks to others: they may lie among its messages yet.
-        self._beat_at = self._answered_at = -math.inf
-        self._recalled = False
-        self._inbox: deque[tuple[Any, ...]] = deque()
+        self._reported_at = -math.inf
+        self._task: int | None = None
+        self._note: Any = None
 
     def run(self) -> None:
         """Work until dismissed."""
-        while True:
-            kind, *rest = self._inbox.popleft() if self._inbox else self._received()
-            if kind == "dismissed":
-                self._channel.send(MASTER, ("goodbye",))
-                return
-            task, shared = rest
-            if self._stopped():
-                self._channel.send(MASTER, ("given up", task))
-            else:
-                self._do(task, shared)
+        while self.act(self._received()):
+            pass
 
-    def _received(self) -> tuple[Any, ...]:
+    def act(self, message: Message) -> bool:
+        """Act on a message; returns whether more may come."""
+        if message[0] == "dismissed":
+            self._channel.send(MASTER, ("goodbye",))
+            return False
+        self._task, self._note = message[1], None
+        answer: Message = ("given up", self._task)
+        if not self._stopped():
+            try:
+                outcome = attempt(
+                    *(self._compute, self._task, self._channel.rank),
+                    *(self._stopped, self._limits.task_seconds),
+                )
+                answer = ("outcome", self._deliver(outcome))
+            except GivenUp:
+                pass
+        self._task = None
+        self._channel.send(MASTER, answer)
+        return True
+
+    def _received(self) -> Message:
         """Wait for the next message."""
         pause = SHORTEST_PAUSE
         while (message := self._channel.poll()) is None:
@@ -437,33 +383,10 @@ class Worker:
             pause = min(1.5 * pause, LONGEST_PAUSE)
         return message[1]
 
-    def _do(self, task: int, shared: bool) -> None:
-        try:
-            outcome = attempt(
-                self._compute, task, self._channel.rank, self._stopped, self._limits.task_seconds
-            )
-            given_up = not self._may_deliver(task, shared)
-        except GivenUp:
-            given_up = True
-        answer = ("given up", task) if given_up else ("outcome", self._deliver(outcome))
-        self._channel.send(MASTER, answer)
-
-    def _may_deliver(self, task: int, shared: bool) -> bool:
-        """Claim a task; wait for the answer if somebody else may have it."""
-        if not shared:
-            self._channel.send(MASTER, ("claim", task, False))
-            self._look()
-            lease = self._limits.silence * LEASE_SHARE
-            if not self._recalled and self._clock() - self._answered_at < lease:
-                return True
-        self._channel.send(MASTER, ("claim", task, True))
-        while (message := self._received())[0] != "answer":
-            self._inbox.append(message)
-        granted: bool = message[1]
-        return granted
-
-    def _stopped(self) -> bool:
+    def _stopped(self, note: Any = None) -> bool:
         """Whether the master or a signal to this rank asks to stop; a signal is passed on."""
+        if note is not None:
+            self._note = note
         if not self._looking:  # the timer of a task may go off within a look
             self._looking = True
             try:
@@ -473,17 +396,58 @@ class Worker:
         return self._halted or self._reported
 
     def _look(self) -> None:
-        """Send a heartbeat if it is time to, and look for urgent messages."""
+        """Report if it is time to, and look for urgent messages."""
         now = self._clock()
-        if now - self._beat_at > self._limits.silence * BEAT_SHARE:
-            self._beat_at = now
-            self._channel.send(MASTER, ("alive", now))
-        while (message := self._channel.poll(urgent=True)) is not None:
-            kind, *rest = message[1]
-            if kind == "heard":
-                self._answered_at, self._recalled = rest
-            else:
-                self._halted = True
+        if now - self._reported_at > self._limits.report_interval:
+            self._reported_at = now
+            self._channel.send(MASTER, ("alive", self._task, self._note))
+        while self._channel.poll(urgent=True) is not None:
+            self._halted = True
         if not self._halted and not self._reported and (reason := self._limits.stop()) is not None:
             self._reported = True
             self._channel.send(MASTER, ("stop", reason))
+
+
+class OwnWorker:
+    """Channel of a master whose own process works: on a task each time it looks for a message.
+
+    Parameters
+    ----------
+    compute, deliver : callable
+    limits : Limits
+    """
+
+    def __init__(self, compute: Compute, deliver: Deliver, limits: Limits) -> None:
+        self.rank = MASTER
+        self.workers: Sequence[int] = (MASTER,)
+        self._boxes: dict[bool, deque[Message]] = {False: deque(), True: deque()}
+        self._answers = _Answers(self._boxes[True])
+        self._worker = Worker(self._answers, compute, deliver, limits)
+
+    def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
+        """Keep a message for the worker."""
+        self._boxes[urgent].append(message)
+
+    def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
+        """Return what the worker has sent; if there is nothing, let it work."""
+        if not self._answers.sent and self._boxes[False]:
+            self._worker.act(self._boxes[False].popleft())
+        return (MASTER, self._answers.sent.popleft()) if self._answers.sent else None
+
+
+class _Answers:
+    """The same channel as the worker sees it."""
+
+    def __init__(self, urgent: deque[Message]) -> None:
+        self.rank = MASTER
+        self.workers: Sequence[int] = ()
+        self.sent: deque[Message] = deque()
+        self._urgent = urgent
+
+    def send(self, to: int, message: Message, *, urgent: bool = False) -> None:
+        """Keep a message for the master."""
+        self.sent.append(message)
+
+    def poll(self, *, urgent: bool = False) -> tuple[int, Message] | None:
+        """Return the next urgent message; others are brought by the master."""
+        return (MASTER, self._urgent.popleft()) if urgent and self._urgent else None

@@ -10,6 +10,7 @@ last bits of sums split over threads would depend on their number.
 from __future__ import annotations
 
 import ctypes
+import importlib.util
 import os
 import resource
 import shutil
@@ -110,6 +111,11 @@ def launcher() -> str | None:
         if found:
             return found
     return None
+
+
+def mpi_launcher() -> str | None:
+    """Return the ``mpirun`` of :func:`launcher` where ranks can use MPI, else None."""
+    return launcher() if importlib.util.find_spec("mpi4py") is not None else None
 
 
 def launch_environment(ranks: int) -> dict[str, str]:

@@ -11,8 +11,8 @@ import os
 import pickle
 import sys
 import time
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Self, TypeVar
 
 from adhesis.ensemble.errors import InputError, RankError
 
@@ -39,6 +39,31 @@ _HINTS = (
 )
 
 
+class OneRank:
+    """Communicator of a process that is alone, with what a run calls of MPI's."""
+
+    rank, size = 0, 1
+
+    def bcast(self, value: T) -> T:
+        """Return the value."""
+        return value
+
+    def allgather(self, value: T) -> list[T]:
+        """Return the values of all ranks."""
+        return [value]
+
+    def Ibarrier(self) -> Self:
+        """Return a request that is complete."""
+        return self
+
+    def Test(self) -> bool:
+        """Return that it is."""
+        return True
+
+    def Abort(self, code: int) -> None:
+        """Leave the end to the caller: there are no other ranks."""
+
+
 def launched(environ: Mapping[str, str] = os.environ) -> tuple[int, int, str]:
     """Return (number of processes, this one's place, launcher) from the launcher's variables.
 
@@ -53,7 +78,7 @@ def launched(environ: Mapping[str, str] = os.environ) -> tuple[int, int, str]:
 
 
 def world() -> Any:
-    """Return COMM_WORLD, or None if this process is alone.
+    """Return COMM_WORLD, or :class:`OneRank` if this process is alone.
 
     Raises
     ------
@@ -62,7 +87,7 @@ def world() -> Any:
     """
     size, _, launcher = launched()
     if "mpi4py.MPI" not in sys.modules and not any(name.startswith(_HINTS) for name in os.environ):
-        return None
+        return OneRank()
     try:
         from mpi4py import MPI
     except (ImportError, RuntimeError, OSError) as error:
@@ -70,7 +95,7 @@ def world() -> Any:
             raise RankError(
                 f"{launcher} started {size} processes, but mpi4py cannot be used here: {error}"
             ) from error
-        return None
+        return OneRank()
     comm = MPI.COMM_WORLD
     if size > 1 and comm.size == 1:
         library = MPI.Get_library_version().split(",")[0].split("\n")[0].strip("\x00 ")
@@ -78,7 +103,7 @@ def world() -> Any:
             f"{launcher} started {size} processes, but MPI ({library}) sees only one in each: "
             "the launcher belongs to another MPI than mpi4py; use the mpirun of that one"
         )
-    return comm if comm.size > 1 else None
+    return comm if comm.size > 1 else OneRank()
 
 
 def together(comm: Any, function: Callable[[], T]) -> T:
@@ -89,8 +114,6 @@ def together(comm: Any, function: Callable[[], T]) -> T:
     InputError
         On every rank, if it was raised on rank 0.
     """
-    if comm is None:
-        return function()
     answer: tuple[bool, Any] | None = None
     if comm.rank == 0:
         try:
@@ -123,11 +146,11 @@ def one_a_node_first(comm: Any, function: Callable[[bool], T]) -> T:
 
     Parameters
     ----------
-    comm : MPI communicator or None
+    comm : MPI communicator or OneRank
     function : callable
         Called with whether this is the first rank of its node.
     """
-    if comm is None:
+    if comm.size == 1:
         return function(True)
     from mpi4py import MPI
 
@@ -157,7 +180,7 @@ class MpiChannel:
         self._mpi = MPI
         self._comm = comm.Dup()
         self.rank: int = comm.rank
-        self.size: int = comm.size
+        self.workers: Sequence[int] = range(1, comm.size)
 
     def send(self, to: int, message: tuple[Any, ...], *, urgent: bool = False) -> None:
         """Send a message to a rank."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,14 +19,23 @@ from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run.attempt import Compute, Outcome, StopCheck
-from adhesis.ensemble.run.dispatch import SILENCE, Limits, Master, Worker, work_alone
+from adhesis.ensemble.run.attempt import Outcome, StopCheck
+from adhesis.ensemble.run.dispatch import (
+    REPORT_INTERVAL,
+    SILENCE,
+    Channel,
+    Limits,
+    Master,
+    OwnWorker,
+    Worker,
+)
 from adhesis.ensemble.run.interrupt import GRACE, Deadline, StopSignals
 from adhesis.ensemble.run.launch import described_signal
 from adhesis.ensemble.run.lock import RunLock
 from adhesis.ensemble.run.plan import Group, Plan, Selection, group_of, prepare, prior
+from adhesis.ensemble.run.processes import Processes, Work
 from adhesis.ensemble.run.progress import Counts, ProgressLine
-from adhesis.ensemble.run.ranks import MpiChannel, one_a_node_first, together
+from adhesis.ensemble.run.ranks import MpiChannel, OneRank, one_a_node_first, together
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.ensemble.task.compute import Runner, check_task, methods_of
@@ -99,7 +108,7 @@ class Engine:
     methods : callable
         The methods that tasks are computed by: they are compiled before the first task.
     silence : float
-        How long a rank may not be heard from until its tasks are handed to others, in s.
+        How long a rank may not be heard from until the run ends, in s.
     """
 
     compute: Callable[[Campaign, Task, Progress | None], Row] = field(default_factory=Runner)
@@ -127,6 +136,8 @@ class Options:
         When to give up what is in flight.
     patience : float
         How long to wait for another run to let go of the results file, in s.
+    processes : int
+        Processes that compute beside this one where there are no ranks; 0 computes here.
     """
 
     part: Part = WHOLE
@@ -134,6 +145,7 @@ class Options:
     max_failures: int | None = 20
     deadline: Deadline | None = None
     patience: float = 10.0
+    processes: int = 0
 
 
 @dataclass(frozen=True)
@@ -171,25 +183,6 @@ class Summary:
         return self.total - self.done - self.failed
 
 
-class OutOfReach(Exception):
-    """Ranks do not answer at the end of a run, so that the ranks cannot end together.
-
-    Attributes
-    ----------
-    summary : Summary
-        What the run has left.
-    """
-
-    def __init__(self, ranks: tuple[int, ...], summary: Summary) -> None:
-        names = ", ".join(map(str, ranks))
-        super().__init__(
-            f"rank {names} does not answer and is ended"
-            if len(ranks) == 1
-            else f"ranks {names} do not answer and are ended"
-        )
-        self.summary = summary
-
-
 def run_campaign(
     campaign: Campaign,
     path: Path | str,
@@ -207,7 +200,7 @@ def run_campaign(
         The results file; made, resumed or extended as it is found.
     comm : MPI communicator, optional
         Called on every rank of it: rank 0 hands out, the others compute. Without it, or with one
-        rank, this process computes.
+        rank, this process computes, or hands out to processes that it starts.
     options : Options, optional
     say : callable
         Gets a line about what was found and what will be done, on rank 0.
@@ -219,17 +212,14 @@ def run_campaign(
     InputError
         On every rank, before any work, if the campaign cannot be computed or the file is foreign,
         damaged, of another campaign, in use or not writable.
-    adhesis.ensemble.run.dispatch.Overdue
-        If workers did not stop in time when asked to; the results file is sound.
-    OutOfReach
-        On rank 0, if workers do not answer at the end; the results file is sound. The other ranks
-        wait: the caller has to end the job.
+    adhesis.ensemble.run.dispatch.Unresponsive
+        On rank 0, if a worker does not answer; the results file is sound. The other ranks wait:
+        the caller has to end the job.
     """
     options, engine = options or Options(), engine or Engine()
     path = target_of(path)
-    if comm is not None and comm.size == 1:
-        comm = None
-    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+    comm = comm or OneRank()
+    size = max(comm.size, 1 + options.processes)
     lock = RunLock(path)
     with ExitStack() as stack, StopSignals() as signals:
         stack.push(lock)
@@ -250,37 +240,29 @@ def run_campaign(
             raise
         origins = [""] * size
         if plan.rows:
-            origins = _origins(comm)
+            origins = _origins(comm, size)
             _warm_up(comm, engine.methods(campaign, [plan.tasks[row] for row in plan.rows]), say)
-        own_rows = comm is not None and engine.all_write
-        if own_rows and rank > 0:
+        own_rows = comm.size > 1 and engine.all_write
+        if own_rows and comm.rank > 0:
             lock.join()
         writer = None
-        if own_rows or rank == 0:
+        if own_rows or comm.rank == 0:
             all_of_them = comm if own_rows else None
             writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
         session = _Session(campaign, plan, writer, options, signals, engine)
         with engine.watch():
-            if comm is None:
-                stopped = session.alone()
-            elif rank == 0:
-                stopped, out_of_reach = session.master(MpiChannel(comm), own_rows)
-                if out_of_reach:
-                    raise OutOfReach(out_of_reach, session.summary(stopped))
-            else:
-                session.worker(MpiChannel(comm), own_rows)
-                stopped = None
+            stopped = session.run(comm, own_rows)
     return together(comm, lambda: session.summary(stopped))
 
 
-def _origins(comm: Any) -> list[str]:
+def _origins(comm: Any, size: int) -> list[str]:
     """Return versions and processor of each rank, on which the last bits of its rows depend.
 
-    All ranks run one installation, but nodes may have different processors.
+    All ranks run one installation, but nodes may have different processors; processes that this one
+    starts have its own.
     """
     known = together(comm, versions)
-    own = processor()
-    processors = [own] if comm is None else comm.allgather(own)
+    processors = comm.allgather(processor()) * (size // comm.size)
     return [origin_of(known | {"processor": name}) for name in processors]
 
 
@@ -296,13 +278,25 @@ def _warm_up(comm: Any, methods: Collection[str], say: Callable[[str], None]) ->
 
     def prepare_rank(first: bool) -> bool:
         lacking = any(compiled_in(method) is None for method in methods)
-        hands_out = comm is not None and comm.rank == 0  # and computes no task
+        hands_out = comm.size > 1 and comm.rank == 0  # and computes no task
         if lacking or not hands_out:
-            heard = first and (comm is None or hands_out)
+            heard = first and comm.rank == 0
             warm_up(methods, say if heard else lambda text: None, many_gaps=lacking)
         return True
 
     one_a_node_first(comm, prepare_rank)
+
+
+@dataclass(frozen=True)
+class _Computing:
+    """``compute`` of :mod:`adhesis.ensemble.run.dispatch`, for the tasks of a campaign."""
+
+    campaign: Campaign
+    tasks: Sequence[Task]
+    compute: Callable[[Campaign, Task, Progress | None], Row]
+
+    def __call__(self, row: int, check: StopCheck) -> Row:
+        return self.compute(self.campaign, self.tasks[row], lambda *_: check())
 
 
 class _Session:
@@ -330,57 +324,55 @@ class _Session:
             row: group_of(campaign, task) for row, task in enumerate(plan.tasks)
         }
         self._units = Units({row: campaign.branch_of(t) for row, t in enumerate(plan.tasks)})
+        self._compute = _Computing(campaign, plan.tasks, engine.compute)
         self._limits = Limits(
             stop=self._stop,
             time_left=self._time_left,
             task_seconds=campaign.solver.time_limit,
             grace=GRACE if options.deadline is None else options.deadline.grace,
             silence=engine.silence,
+            report_interval=min(REPORT_INTERVAL, engine.silence / 12),
         )
 
-    def alone(self) -> str | None:
-        schedule = self._schedule()
-        progress = ProgressLine(self._counts, lambda: self._estimate(schedule, 0, 1))
-        try:
-            return work_alone(
-                schedule,
-                self._groups,
-                self._computing(progress.tick),
-                self._write,
-                lambda outcome: self._count(outcome, progress, schedule),
-                self._limits,
-                self._units,
-            )
-        finally:
-            progress.close()
+    def run(self, comm: Any, own_rows: bool) -> str | None:
+        """Hand out, work, or both; returns on rank 0 why the run stopped early, or None."""
+        if comm.rank > 0:
+            deliver = self._write if own_rows else lambda outcome: outcome
+            Worker(MpiChannel(comm), self._compute, deliver, self._limits).run()
+            return None
+        limits = self._limits
+        with ExitStack() as stack:
+            channel: Channel
+            if comm.size > 1:
+                channel = MpiChannel(comm)
+            elif self._options.processes and self._plan.rows:
+                work = Work(self._compute, limits.task_seconds, limits.report_interval)
+                channel = stack.enter_context(Processes(self._options.processes, work))
+            else:
+                channel = OwnWorker(self._compute_here, self._write, self._limits)
+                own_rows = True
+            return self._hand_out(channel, own_rows)
 
-    def master(self, channel: MpiChannel, own_rows: bool) -> tuple[str | None, tuple[int, ...]]:
+    def _hand_out(self, channel: Channel, own_rows: bool) -> str | None:
         schedule = self._schedule()
-        workers = channel.size - 1
 
         def collect(outcome: Outcome) -> None:
             self._count(outcome if own_rows else self._write(outcome), progress, schedule)
 
-        progress = ProgressLine(
+        progress = self._progress = ProgressLine(
             self._counts,
             lambda: self._estimate(
-                schedule, master.in_flight / self._campaign.branch_loops, workers
+                *(schedule, master.in_flight / self._campaign.branch_loops, len(channel.workers))
             ),
         )
         master = Master(
-            *(channel, schedule, self._groups, collect, self._limits),
-            tick=progress.tick,
+            *(channel, schedule, self._groups, collect, self._limits, progress.tick),
             units=self._units,
-            report=progress.say,
         )
         try:
-            return master.run(), master.out_of_reach
+            return master.run()
         finally:
             progress.close()
-
-    def worker(self, channel: MpiChannel, own_rows: bool) -> None:
-        deliver = self._write if own_rows else lambda outcome: outcome
-        Worker(channel, self._computing(lambda: None), deliver, self._limits).run()
 
     def summary(self, stopped: str | None) -> Summary:
         done = self._plan.done + self._counts.done
@@ -399,15 +391,14 @@ class _Session:
             precisions=() if batches is None else tuple(batches.precisions),
         )
 
-    def _computing(self, tick: Callable[[], None]) -> Compute:
-        def compute(row: int, check: StopCheck) -> Row:
-            def progress(*_: object) -> None:
-                check()
-                tick()
+    def _compute_here(self, row: int, check: StopCheck) -> Row:
+        """Compute in the process that shows the progress."""
 
-            return self._engine.compute(self._campaign, self._plan.tasks[row], progress)
+        def check_and_show(note: Any = None) -> None:
+            check(note)
+            self._progress.tick()
 
-        return compute
+        return self._compute(row, check_and_show)
 
     def _write(self, outcome: Outcome) -> Outcome:
         assert self._writer is not None

@@ -14,7 +14,7 @@ import numpy as np
 from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.quantities import with_error
 from adhesis.ensemble.reporter import bar
-from adhesis.ensemble.trace.pool import Pool, Result, Watch
+from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.variants import Cycle, Plan, default_tables, make_plan
 from adhesis.solver import views
@@ -118,7 +118,7 @@ class Answer(ByValue):
     ----------
     loss, pull_off_stress, contact_fraction : Quantity
     results : dict
-        Numbers of each loop by name (:func:`adhesis.ensemble.trace.worker.run`); a text if it
+        Numbers of each loop by name (:func:`adhesis.ensemble.trace.job.run`); a text if it
         failed.
     warnings : tuple of str
     seconds : float
@@ -284,7 +284,7 @@ def loss_of_trace(
     progress : bool
         Whether a bar shows how many of the loops are done, in a terminal or notebook.
     watch : callable, optional
-        Called with the :class:`~adhesis.ensemble.trace.pool.Pool` about once a second.
+        Called with the :class:`~adhesis.ensemble.trace.loops.Loops` about once a second.
 
     Raises
     ------
@@ -322,11 +322,11 @@ def loss_of_trace(
         return run_plan(prepared, cycle, plan, watch)
     with bar("loops") as shown:
 
-        def both(pool: Pool) -> None:
-            done, runs = len(pool.done), len(plan.runs)
+        def both(loops: Loops) -> None:
+            done, runs = len(loops.done), len(plan.runs)
             shown(done, runs, f"{done}/{runs} loops")
             if watch is not None:
-                watch(pool)
+                watch(loops)
 
         return run_plan(prepared, cycle, plan, both)
 
@@ -396,7 +396,7 @@ def check(prepared: Prepared, cycle: Cycle) -> None:
 def run_plan(prepared: Prepared, cycle: Cycle, plan: Plan, watch: Watch | None = None) -> Answer:
     """Run a plan; see :func:`loss_of_trace`."""
     started = time.monotonic()
-    results = Pool(plan.jobs, plan.processes).run(watch)
+    results = Loops(plan.jobs, plan.processes).run(watch)
     main = results.get("answer")
     if not isinstance(main, dict):
         raise NoAnswer(f"the loop could not be run to its end: {main}")

@@ -9,7 +9,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.escape import printable
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
-from adhesis.ensemble.trace.reading.text_table import DELIMITERS
+from adhesis.ensemble.trace.reading.printed_numbers import DELIMITERS
 
 _NAMES = (
     *("unit", "step", "columns", "delimiter", "decimal", "row", "channel", "degree", "cut_off"),

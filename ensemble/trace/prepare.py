@@ -290,13 +290,13 @@ def _filled(
         raise InputError(
             f"{trace.source} has a gap of {length_text(longest_here)} at {length_text(at)}: "
             f"up to {length_text(allowed)} "
-            f"is interpolated ({parameter('longest_gap')} allows more)"
+            f"is interpolated ({parameter('longest_gap')} allows more){_why_missing(trace)}"
         )
     share = float(gaps.mean())
     if share > _MAX_MISSING:
         raise InputError(
             f"{trace.source} lacks {100 * share:.1f} % of its heights: up to "
-            f"{100 * _MAX_MISSING:.0f} % may lack"
+            f"{100 * _MAX_MISSING:.0f} % may lack{_why_missing(trace)}"
         )
     index = np.arange(heights.size)
     filled = heights.copy()
@@ -311,6 +311,12 @@ def _filled(
         )
     )
     return filled, gaps
+
+
+def _why_missing(trace: Trace) -> str:
+    """Return how heights became drop-outs when they were read, to follow a message."""
+    told = [note for note in trace.notes if "drop-outs" in note]
+    return f"; {'; '.join(told)}" if told else ""
 
 
 # ---------------------------------------------------------------------- form

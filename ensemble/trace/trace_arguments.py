@@ -99,10 +99,12 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     reading.add_argument(
         "--step", type=length, metavar="S", help="step, for heights without positions: 0.5um"
     )
-    reading.add_argument("--columns", metavar="X,Z", help="columns of a text, from 1")
+    reading.add_argument(
+        "--columns", metavar="X,Z", help="columns of a text, from 1; Z: heights alone"
+    )
     reading.add_argument("--delimiter", metavar="C", help="of a text, if it is not found out")
     reading.add_argument("--decimal", choices=[",", "."], help="decimal sign, if not found out")
-    reading.add_argument("--row", type=int, metavar="K", help="row of an instrument's map, from 0")
+    reading.add_argument("--row", type=int, metavar="K", help="row of a map, from 0")
     reading.add_argument("--channel", type=int, metavar="K", help="of an instrument's file, from 0")
     making = parser.add_argument_group("preparing a trace")
     making.add_argument(

@@ -12,8 +12,8 @@ import numpy as np
 from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.run.launch import cores
+from adhesis.ensemble.trace.job import Job
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.worker import Job
 from adhesis.solver.checks import counted
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace

@@ -51,6 +51,10 @@ def _start(worker: _Worker) -> None:
     try:
         with signals_held():
             worker.start()
+    except KeyError as error:
+        # A signal that reached another thread is handled here all the same. If its handler raises
+        # after the new thread has begun, `threading` fails to strike it off a second time.
+        raise error if error.__context__ is None else error.__context__ from None
     finally:
         threading.stack_size(size)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import os
 import queue
 import random
 import signal
@@ -19,21 +20,19 @@ from adhesis.ensemble.run import ranks
 from adhesis.ensemble.run.attempt import GivenUp, Outcome, attempt
 from adhesis.ensemble.run.dispatch import (
     AHEAD,
-    BEAT_SHARE,
     MOST_AHEAD,
-    SILENCE,
+    REPORT_INTERVAL,
     Limits,
     Master,
-    Overdue,
+    OwnWorker,
+    Unresponsive,
     Worker,
-    work_alone,
 )
+from adhesis.ensemble.run.processes import Processes, Work
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.solver.runtime import jit as module
 from tools.interrupted import Interrupt
-
-BEAT = SILENCE * BEAT_SHARE
 
 
 class SimulatedRanks:
@@ -42,7 +41,7 @@ class SimulatedRanks:
     rank = 0
 
     def __init__(self, workers, seconds, *, halts=True, signal_at=None, message_time=20e-6):
-        self.size = workers + 1
+        self.workers = range(1, workers + 1)
         self._seconds = seconds
         self._halts = halts
         self._message_time = message_time
@@ -56,7 +55,11 @@ class SimulatedRanks:
         if signal_at is not None:
             heapq.heappush(self._ends, (signal_at, 1, ("stop", "SIGUSR1 received")))
         for rank in self._queue:
-            heapq.heappush(self._ends, (BEAT, rank, ("alive", BEAT)))
+            self._report_later(rank)
+
+    def _report_later(self, rank):
+        at = self.now + REPORT_INTERVAL
+        heapq.heappush(self._ends, (at, rank, ("alive", None, None)))
 
     def clock(self):
         """Return the simulated time."""
@@ -69,10 +72,8 @@ class SimulatedRanks:
     def send(self, to, message, *, urgent=False):
         """Let the simulated worker act on a message."""
         self.now += self._message_time
-        if message[0] == "heard":
-            return
         if message[0] == "dismissed":
-            self._ends = [e for e in self._ends if e[1:] != (to, ("alive", e[0]))]
+            self._ends = [e for e in self._ends if (e[1], e[2][0]) != (to, "alive")]
             heapq.heapify(self._ends)
             heapq.heappush(self._ends, (self.now, to, ("goodbye",)))
         elif message[0] == "halt":
@@ -101,8 +102,7 @@ class SimulatedRanks:
             _, rank, message = heapq.heappop(self._ends)
             self.now += self._message_time
             if message[0] == "alive":
-                again = message[1] + BEAT
-                heapq.heappush(self._ends, (again, rank, ("alive", again)))
+                self._report_later(rank)
             if message[0] in ("outcome", "given up"):
                 task = message[1].task if message[0] == "outcome" else message[1]
                 self.answered.append(task)
@@ -298,7 +298,7 @@ def test_a_stop_that_arrives_when_all_is_done_stops_nothing():
 
 
 def test_workers_that_do_not_answer_a_stop_are_not_waited_for():
-    with pytest.raises(Overdue, match="5 tasks did not stop in time"):
+    with pytest.raises(Unresponsive, match="5 tasks did not stop in time"):
         simulate(
             5,
             [1000.0] * 50,
@@ -316,7 +316,8 @@ class Mailboxes:
     """A channel between a master and workers in threads of one process."""
 
     def __init__(self, rank, boxes):
-        self.rank, self.size, self._boxes = rank, len(boxes) // 2, boxes
+        self.rank, self._boxes = rank, boxes
+        self.workers = range(1, len(boxes) // 2)
 
     def send(self, to, message, *, urgent=False):
         """Put a message into a box of its receiver."""
@@ -360,116 +361,14 @@ def test_a_stop_reaches_a_worker_in_the_middle_of_its_task():
     assert (collected, ended) == ([], [True])
 
 
-# ---------------------------------------------------------------- workers out of reach
-
-
-class Freezing(Mailboxes):
-    """The channel of a worker that hangs as it sends its first message of a kind for a task."""
-
-    def __init__(self, rank, boxes, kind, task):
-        super().__init__(rank, boxes)
-        self._kind, self._task = kind, task
-        self.frozen, self.thawed = threading.Event(), threading.Event()
-
-    def send(self, to, message, *, urgent=False):
-        """Hang once, before the message is sent."""
-        if message[:2] == (self._kind, self._task) and not self.frozen.is_set():
-            self.freeze()
-        super().send(to, message, urgent=urgent)
-
-    def freeze(self):
-        """Hang until thawed."""
-        self.frozen.set()
-        assert self.thawed.wait(60)
-
-
-@pytest.mark.parametrize("returns", [False, True], ids=["stays away", "returns"])
-@pytest.mark.parametrize("point", ["computing", "computed", "delivering"])
-def test_tasks_of_a_worker_out_of_reach_are_done_by_others_and_delivered_once(point, returns):
-    """Worker 1 has task 0; what it delivers itself stays its own.
-
-    The others do nothing until it hangs. If it returns, it does so when all other tasks are done
-    but the one that worker 3 is kept busy with until worker 1 has answered for task 0.
-    """
-    tasks, kept, boxes = range(8), 2, mailboxes(4)
-    channel = Freezing(1, boxes, "claim" if point == "computed" else "", 0)
-    delivered: list[tuple[int, int]] = []
-    returned, reports = threading.Event(), []
-
-    def compute(rank):
-        def run(task, check):
-            if rank == 1 and task == 0 and point == "computing":
-                channel.freeze()
-            while rank > 1 and not channel.frozen.is_set():
-                check()
-                time.sleep(1e-3)
-            while returns and task == kept and not returned.is_set():
-                check()
-                time.sleep(1e-3)
-            return task
-
-        return run
-
-    def deliver(rank):
-        def write(outcome):
-            if rank == 1 and outcome.task == 0 and point == "delivering":
-                channel.freeze()
-            delivered.append((outcome.task, rank))
-            return outcome
-
-        return write
-
-    class Watching(Mailboxes):
-        """The master's channel, by which the test learns that worker 1 has answered."""
-
-        def poll(self, *, urgent=False):
-            message = super().poll(urgent=urgent)
-            if message and message[0] == 1 and message[1][0] in ("outcome", "given up"):
-                returned.set()
-            return message
-
-    def tick():
-        others = {task for task, _ in delivered} | {kept}
-        if returns and reports and others >= set(tasks) - ({0} if point == "delivering" else set()):
-            channel.thawed.set()
-
-    limits = Limits(silence=0.5)
-    workers = [
-        threading.Thread(target=Worker(own, compute(rank), deliver(rank), limits).run, daemon=True)
-        for rank, own in ((1, channel), (2, Mailboxes(2, boxes)), (3, Mailboxes(3, boxes)))
-    ]
-    rounds = {task: task for task in tasks}
-    schedule = Schedule(tasks, dict.fromkeys(tasks, 0), {0: 1.0}, rounds)
-    collected: list[Outcome] = []
-    master = Master(
-        *(Watching(0, boxes), schedule, dict.fromkeys(tasks, 0), collected.append, limits, tick),
-        report=reports.append,
-    )
-    for worker in workers:
-        worker.start()
-    try:
-        assert master.run() is None
-        at_the_end = list(delivered)
-    finally:
-        channel.thawed.set()
-        boxes[1, False].put((0, ("answer", False)))  # if it asks a master that has ended
-        for worker in workers:
-            worker.join(60)
-    lost = {0} if point == "delivering" and not returns else set()
-    assert sorted(task for task, _ in at_the_end) == sorted(set(tasks) - lost)
-    assert sorted(outcome.task for outcome in collected) == sorted(set(tasks) - lost)
-    assert ((0, 1) in delivered) == (point == "delivering")
-    assert len(delivered) == len(tasks)
-    assert master.out_of_reach == (() if returns else (1,))
-    assert any(text.startswith("rank 1 does not answer for 0.5 s: ") for text in reports)
-    assert ("rank 1 answers again" in reports) == returns
+# ---------------------------------------------------------------- workers that are silent
 
 
 class Scripted:
     """A channel whose messages come at given times of a clock that sleep moves on."""
 
-    def __init__(self, rank, size, messages=()):
-        self.rank, self.size, self.now = rank, size, 0.0
+    def __init__(self, workers, messages=()):
+        self.rank, self.workers, self.now = 0, range(1, workers + 1), 0.0
         self.messages = sorted(messages, key=lambda m: m[0])
         self.sent = []
 
@@ -492,28 +391,65 @@ class Scripted:
         return None
 
 
-def scripted_master(channel, tasks, units=None, **options):
-    units = units or Units()
+def scripted_master(channel, tasks, collected=None):
     group_of = dict.fromkeys(tasks, 0)
-    schedule = Schedule(units.form(tasks), group_of, {0: 1.0}, {task: task for task in tasks})
-    collected: list[Outcome] = []
-    master = Master(
-        *(channel, schedule, group_of, collected.append, Limits(silence=120)),
+    schedule = Schedule(tasks, group_of, {0: 1.0}, {task: task for task in tasks})
+    collected = [] if collected is None else collected
+    limits = Limits(silence=120)
+    return Master(
+        *(channel, schedule, group_of, collected.append, limits),
         clock=channel.clock,
         sleep=channel.sleep,
-        units=units,
-        **options,
     )
-    return master, collected
 
 
 def done(task, rank):
     return ("outcome", Outcome(task, rank, 1.0))
 
 
+def alive(rank, until):
+    return [(10.0 * k, rank, ("alive", None, None)) for k in range(int(until / 10))]
+
+
+def test_a_worker_that_is_silent_for_too_long_ends_the_run():
+    """What was delivered until then is kept; who reports that it computes may take its time."""
+    collected = []
+    script = [*alive(1, 1000), *alive(2, 320), (300.0, 1, done(0, 1))]
+    channel = Scripted(2, script)
+    with pytest.raises(Unresponsive, match="rank 2 has not answered for 120 s"):
+        scripted_master(channel, range(4), collected).run()
+    assert [outcome.task for outcome in collected] == [0]
+    assert 310 + 120 < channel.now < 310 + 135
+
+
+def test_eight_tasks_on_eight_silent_workers_are_computed_once():
+    """The run ends; the next one, which finds nothing done, hands each of them out once."""
+    handed = []
+    for script in (
+        [m for rank in range(1, 9) for m in alive(rank, 100)],
+        [
+            m
+            for rank in range(1, 9)
+            for m in [*alive(rank, 500), (500.0, rank, done(rank - 1, rank))]
+        ]
+        + [(500.1, rank, ("goodbye",)) for rank in range(1, 9)],
+    ):
+        channel, collected = Scripted(8, script), []
+        master = scripted_master(channel, range(8), collected)
+        if handed:
+            assert master.run() is None
+            assert channel.now == pytest.approx(500, abs=1)
+        else:
+            with pytest.raises(Unresponsive):
+                master.run()
+            assert collected == []
+        handed.append([message[1] for _, message in channel.sent if message[0] == "task"])
+    assert handed == [list(range(8))] * 2
+    assert sorted(outcome.task for outcome in collected) == list(range(8))
+
+
 def test_a_master_that_was_held_up_takes_nobody_for_lost():
     """Its clock jumps by an hour, and what workers sent meanwhile is not there at first."""
-    beats = [(10.0 * k, r, ("alive", 10.0 * k)) for k in range(5) for r in (1, 2)]
     late = [(3700.0, 1, done(0, 1)), (3700.0, 2, done(1, 2))]
     last = [(3702.0, 1, ("goodbye",)), (3702.0, 2, ("goodbye",))]
 
@@ -521,92 +457,100 @@ def test_a_master_that_was_held_up_takes_nobody_for_lost():
         def sleep(self, seconds):
             self.now += seconds if not 50 < self.now < 3000 else 3600
 
-    reports = []
-    channel = HeldUp(0, 3, beats + late + last)
-    master, collected = scripted_master(channel, range(2), report=reports.append)
-    assert master.run() is None
-    assert (reports, master.out_of_reach, len(collected)) == ([], (), 2)
+    collected = []
+    channel = HeldUp(2, alive(1, 50) + alive(2, 50) + late + last)
+    assert scripted_master(channel, range(2), collected).run() is None
+    assert len(collected) == 2
 
 
-def test_a_worker_that_does_not_answer_its_dismissal_is_not_waited_for():
-    """It hangs when it has no task any more; within the grace, and not only after the silence."""
-    channel = Scripted(0, 3, [(1.0, 1, done(0, 1)), (2.0, 2, done(1, 2)), (2.1, 1, ("goodbye",))])
-    master, collected = scripted_master(channel, range(2))
-    assert master.run() is None
-    assert (len(collected), master.out_of_reach) == (2, (2,))
+def test_a_worker_that_does_not_answer_its_dismissal_ends_the_run():
+    """It hangs when it has no task any more: within the grace, and not only after the silence."""
+    collected = []
+    script = [(1.0, 1, done(0, 1)), (2.0, 2, done(1, 2)), (2.1, 1, ("goodbye",))]
+    channel = Scripted(2, script)
+    with pytest.raises(Unresponsive, match="rank 2 did not answer at the end"):
+        scripted_master(channel, range(2), collected).run()
+    assert len(collected) == 2
     assert channel.now == pytest.approx(2 + Limits().grace, abs=0.1)
 
 
-def test_the_tasks_of_a_unit_are_handed_to_another_worker_together():
-    """But for the one that is done; the same task is handed out again if the other is lost too."""
-    units = Units({task: task // 3 for task in range(6)})
-    beats = [(10.0 * k, 2, ("alive", 10.0 * k)) for k in range(20)]
-    beats += [(10.0 * k, 3, ("alive", 10.0 * k)) for k in range(60)]
-    script = [
-        (1.0, 1, done(0, 1)),  # then nothing more of worker 1, nor of worker 2 after 190 s
-        (2.0, 2, done(3, 2)),
-        (3.0, 2, done(4, 2)),
-        (4.0, 2, done(5, 2)),
-        (400.0, 3, ("claim", 1, True)),
-        (400.1, 3, done(1, 3)),
-        (400.2, 3, ("claim", 2, True)),
-        (400.3, 3, done(2, 3)),
-        (401.0, 3, ("goodbye",)),
-    ]
-    channel = Scripted(0, 4, beats + script)
-    master, collected = scripted_master(channel, range(6), units)
-    assert master.run() is None
-    assert sorted(outcome.task for outcome in collected) == list(range(6))
-    assert master.out_of_reach == (1, 2)
-    handed = [(to, *message[1:]) for to, message in channel.sent if message[0] == "task"]
-    assert handed[:6] == [(1 + task // 3, task, False) for task in range(6)]
-    assert handed[6:] == [(2, 1, True), (2, 2, True), (3, 1, True), (3, 2, True)]
-    assert [m for to, m in channel.sent if to == 3 and m[0] == "answer"] == [("answer", True)] * 2
+def test_a_worker_reports_while_it_computes_with_the_note_of_its_task():
+    sent, now = [], 0.0
+    script = [("task", 5), ("dismissed",)]
 
+    class OneTask(Scripted):
+        def send(self, to, message, *, urgent=False):
+            sent.append(message)
 
-@pytest.mark.parametrize(
-    ("shared", "recalled", "answered", "asks"),
-    [
-        (False, False, 0.0, False),
-        (False, False, 55.0, False),
-        (False, False, 65.0, True),  # no heartbeat was answered for half the time
-        (False, True, 0.0, True),
-        (True, False, 0.0, True),
-    ],
-)
-@pytest.mark.parametrize("granted", [True, False])
-def test_a_worker_asks_before_it_delivers_what_others_may_have(
-    shared, recalled, answered, asks, granted
-):
-    channel = Scripted(1, 2)
-    delivered = []
-    script = [((False), ("task", 5, shared)), (False, ("answer", granted)), (False, ("dismissed",))]
-    if not asks:
-        del script[1]
+        def poll(self, *, urgent=False):
+            return None if urgent else (0, script.pop(0))
 
     def compute(task, check):
-        channel.now += answered  # in compiled code, say
-        return task
+        nonlocal now
+        for k in range(1, 36):
+            now = float(k)
+            check(f"step {k}")
 
-    def poll(*, urgent=False):
-        if urgent and channel.sent and channel.sent[-1][1][0] == "alive":
-            sent_at = channel.sent[-1][1][1]
-            channel.sent.append((1, ("heard",)))
-            # The answers to later heartbeats are under way.
-            return (0, ("heard", sent_at, recalled)) if sent_at == 0.0 else None
-        return None if urgent else (0, script.pop(0)[1])
+    worker = Worker(OneTask(0), compute, lambda o: o, Limits(), clock=lambda: now)
+    worker.run()
+    reports = [message for message in sent if message[0] == "alive"]
+    assert reports == [("alive", 5, None), *(("alive", 5, f"step {k}") for k in (11, 22, 33))]
+    assert [message[0] for message in sent[-2:]] == ["outcome", "goodbye"]
 
-    channel.poll = poll
-    Worker(
-        *(channel, compute, lambda o: delivered.append(o.task) or o, Limits(silence=120)),
-        clock=channel.clock,
-    ).run()
-    kinds = [message[0] for to, message in channel.sent if to == 0 and message[0] != "alive"]
-    first = [] if shared else [("claim", 5, False)]
-    claims = [message for to, message in channel.sent if to == 0 and message[0] == "claim"]
-    assert claims == first + ([("claim", 5, True)] if asks else [])
-    assert delivered == ([5] if granted or not asks else [])
-    assert kinds[-2:] == ["outcome" if delivered else "given up", "goodbye"]
+
+# ---------------------------------------------------------------- processes
+
+
+def hand_out(channel, tasks, limits=None, tick=lambda: None):
+    group_of = dict.fromkeys(range(tasks), 0)
+    outcomes: list[Outcome] = []
+    schedule = Schedule(range(tasks), group_of, {0: 1.0})
+    limits = limits or Limits()
+    reason = Master(channel, schedule, group_of, outcomes.append, limits, tick).run()
+    return outcomes, reason
+
+
+def half(task, check):
+    """Compute in a process: something that is done, fails, or never ends."""
+    if task == 3:
+        raise ValueError("three")
+    while task >= 100:
+        check("waiting")
+        time.sleep(1e-3)
+    return task / 2
+
+
+def test_processes_are_workers_like_any_other():
+    with Processes(2, Work(half)) as channel:
+        outcomes, reason = hand_out(channel, 20)
+    assert reason is None
+    found = {outcome.task: outcome.error or outcome.result for outcome in outcomes}
+    assert found == {k: "ValueError: three" if k == 3 else k / 2 for k in range(20)}
+    assert {outcome.rank for outcome in outcomes} <= {1, 2}
+
+
+def never(task, check):
+    """Compute in a process until told to stop."""
+    return half(100, check)
+
+
+def test_a_process_that_is_killed_fails_its_task_and_is_replaced():
+    killed = []
+    with Processes(1, Work(never, report_interval=0.01)) as channel:
+
+        def tick():
+            if not killed and master.notes.get(0):
+                killed.extend(channel.pids)
+                os.kill(channel.pids[0], signal.SIGKILL)
+            elif killed and master.notes.get(1):
+                stopping.append("enough")
+
+        stopping, outcomes = [], []
+        limits = Limits(stop=lambda: stopping[0] if stopping else None)
+        schedule = Schedule([0, 1], {0: 0, 1: 0}, {0: 1.0})
+        master = Master(channel, schedule, {0: 0, 1: 0}, outcomes.append, limits, tick)
+        assert master.run() == "enough"
+    assert [(o.task, o.error) for o in outcomes] == [(0, "its process ended with code -9")]
 
 
 def test_tasks_that_would_not_end_in_time_stay_behind():
@@ -621,17 +565,8 @@ def test_tasks_that_would_not_end_in_time_stay_behind():
 
 
 def alone(compute, tasks=3, limits=None):
-    group_of = dict.fromkeys(range(tasks), 0)
-    outcomes: list[Outcome] = []
-    reason = work_alone(
-        Schedule(range(tasks), group_of, {0: 1.0}),
-        group_of,
-        compute,
-        lambda outcome: outcome,
-        outcomes.append,
-        limits or Limits(),
-    )
-    return outcomes, reason
+    limits = limits or Limits()
+    return hand_out(OwnWorker(compute, lambda outcome: outcome, limits), tasks, limits)
 
 
 def test_a_task_that_raises_is_a_failure_and_the_rest_goes_on():
@@ -747,7 +682,7 @@ def test_attempts_work_in_a_thread_too():
 
     def run():
         try:
-            attempt(lambda task, check: check(), 0, 0, lambda: True, None)
+            attempt(lambda task, check: check(), 0, 0, lambda note: True, None)
         except GivenUp:
             seen.append("given up")
 
@@ -803,7 +738,9 @@ def test_one_process_does_a_unit_at_once_and_stops_between_its_tasks():
         order.append(task)
 
     limits = Limits(stop=lambda: "enough" if len(order) == 3 else None)
-    reason = work_alone(schedule, group_of, compute, lambda o: o, lambda o: None, limits, units)
+    channel = OwnWorker(compute, lambda outcome: outcome, limits)
+    master = Master(channel, schedule, group_of, lambda o: None, limits, units=units)
+    reason = master.run()
     assert (reason, order) == ("enough", [0, 2, 1])
 
 
@@ -815,6 +752,8 @@ def test_ranks_that_get_ready_wait_without_burning_a_core(monkeypatch):
     looks, left = threading.Event(), threading.Event()
 
     class Comm:
+        size = 2
+
         def __init__(self, rank):
             self.rank = rank
 

@@ -132,7 +132,7 @@ def test_other_keys_take_no_unit() -> None:
     ("key", "value", "units"),
     [
         ("young", '"1 mPa"', "Pa, kPa, MPa, GPa"),
-        ("period", '"1 kPa"', "m, cm, mm, µm, nm, Å, inch"),
+        ("period", '"1 kPa"', "m, cm, mm, µm, nm, Å, inch, mil, µin"),
         ("work_of_adhesion", '["20 kJ/m2"]', "J/m², mJ/m²"),
     ],
 )

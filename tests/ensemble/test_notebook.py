@@ -33,6 +33,8 @@ from adhesis import (
 )
 from adhesis.ensemble.loop import saved
 from adhesis.ensemble.quantities import with_error
+from adhesis.ensemble.report import findings
+from adhesis.ensemble.results.status import as_text, read_status
 from adhesis.ensemble.trace.prepare import prepare_trace
 from adhesis.ensemble.trace.reading import measured_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
@@ -374,6 +376,25 @@ def test_a_campaign_is_priced_run_resumed_and_opened(campaign, tmp_path, capsys)
         campaign.run(file, ranks=0)
     with pytest.raises(ValueError, match="seconds is -1"):
         campaign.price(seconds=-1)
+
+
+def test_failed_tasks_are_loud(tmp_path):
+    """A weight that draws the surface into full contact fails every loop of a cell, always."""
+    campaign = adhesis.Campaign(
+        {
+            "profile": {"period": 1e-3, "n0": 2, "ratio": 2, "h_rms": 1e-7},
+            "material": {"young": 1e6, "poisson": 0.5},
+            "sweep": {"hurst": [0.8], "work_of_adhesion": [1e-4, 1.0], "realisations": 2},
+            "cycle": {"control": "load", "max_stress": 100.0, "load_steps": 5},
+        }
+    )
+    with pytest.warns(UserWarning, match=r"2 of 4 tasks failed.*first reason: PathError: under a"):
+        results = campaign.run(tmp_path / "r.h5")
+    assert repr(results).endswith("2 done, 2 failed, 0 pending>")
+    assert "they fail again if they are computed again" in as_text(read_status(tmp_path / "r.h5"))
+    text = " ".join(findings.missing(results.averages))
+    assert "WARNING: all tasks failed for H = 0.8, γ = 1 J/m²" in text
+    assert "yet" not in text
 
 
 @pytest.mark.mpi

@@ -328,30 +328,6 @@ def test_loops_are_drawn_with_one_standard_deviation(data):
     assert "sigma" in axes.get_ylabel()
 
 
-def test_the_loading_branch_takes_half_of_the_panel(data, tmp_path):
-    """Though unloading reaches further; an axis that needs no stretching is left alone."""
-    plan = campaign(gamma=(0.04,), realisations=2)
-    values = rows(plan)
-    values["unloading_contact_fraction"][:, plan.unloading_penetration < 0.5] = 0.0
-    short = aggregate(write(tmp_path / "short.h5", plan, values))
-    for averages, stretched in ((data, True), (short, False)):
-        with style():
-            figure = loops.loop_against_penetration(averages)
-            figure.draw_without_rendering()
-        for axes in figure.axes:
-            ends = axes.transLimits.transform(axes.transScale.transform([(0.0, 0.5), (0.9, 0.5)]))[
-                :, 0
-            ]
-            low = min(line.get_xdata().min() for line in axes.lines if line.get_label()[0] == "$")
-            assert (axes.get_xscale() == "function") is stretched
-            if stretched:
-                assert low < -1
-                assert ends[1] - ends[0] == pytest.approx(0.48, abs=0.02)
-                ticks = axes.get_xticks()
-                assert np.sum(ticks >= 0) > 3
-                assert np.sum(ticks < 0) > 1
-
-
 def test_losses_are_drawn_with_their_intervals_and_the_paper_beside(data):
     """A panel for each γ; few points are not joined by a line."""
     with style():
@@ -480,18 +456,20 @@ def test_a_campaign_without_the_papers_values_draws_what_it_has(tmp_path):
     assert said.endswith("; the nearest to it here is H = 0.5, γ = 0.02 and 0.05 J/m².")
 
 
-def test_shapes_show_profile_and_surface_at_the_same_separation(data):
+def test_shapes_show_the_surface_above_the_profile(data):
+    """In the frame of the profile, so that branches of different separation can be compared."""
     with style():
         figure = shapes_and_spectra.shapes(data)
     assert len(figure.axes) == 6
     cell = data.cell(0.8, 0.01)
     shape = data.fields.shapes[data.cells.index(cell)]
     drawn = lines_of(figure.axes[0])
-    separation = shape.h_max * (1 - data.fields.penetration[-1])
     assert len(drawn["rigid"]) == 4 * 255 + 1  # 256 nodes would be seen as a polygon
     nodes = drawn["rigid"][::4, 1], drawn["unloading"][::4, 1]
-    np.testing.assert_allclose(nodes[0], 1e6 * (shape.height - separation), atol=1e-9)
-    np.testing.assert_allclose(nodes[1], 1e6 * shape.displacement[1, -1], atol=1e-9)
+    np.testing.assert_allclose(nodes[0], 1e6 * shape.height, atol=1e-9)
+    above = shape.displacement[1, -1] - shape.height
+    np.testing.assert_allclose(nodes[1] - nodes[0], 1e6 * (above - above.min()), atol=1e-9)
+    assert (nodes[1] - nodes[0]).min() == pytest.approx(0, abs=1e-9)  # they touch
     detail = lines_of(figure.axes[1])["rigid"]
     assert detail[:, 1].max() == pytest.approx(drawn["rigid"][:, 1].max())
     assert len(detail) < len(drawn["rigid"]) / 3
@@ -670,8 +648,10 @@ def test_one_finished_task_of_one_cell_is_enough(tmp_path, laid_out):
     parts: list[str] = []
     data = write_report(path, tmp_path / "out", io.StringIO(), progress=parts.append)
     assert data.done == 1
-    assert len(laid_out) == 13
-    figures = [f"figure {k} of 13, {name}" for k, name in enumerate(laid_out, 1)]
+    # losses against H, m2 and γ would be single points
+    assert not {"table1_losses", "loss_against_m2", "pull_off_stress"} & set(laid_out)
+    assert len(laid_out) == 10
+    figures = [f"figure {k} of 10, {name}" for k, name in enumerate(laid_out, 1)]
     assert parts == ["averages", "tables", *figures, "pages"]
 
 
@@ -735,14 +715,14 @@ def test_the_order_of_the_losses_in_m2_is_reported_as_one_through_hurst(losses, 
             done=9,
             estimates={
                 "m2": SimpleNamespace(mean=1e-3 * (k + 1)),
-                "loss_dimensionless": SimpleNamespace(mean=loss),
+                "loss": SimpleNamespace(mean=loss),
             },
         )
         for k, loss in enumerate(losses)
     ]
     data = SimpleNamespace(works_of_adhesion=(0.04,), cells=cells)
     (sentence,) = findings._order_in_slope(data, of_paper=False)
-    assert sentence == f"Through H, the mean loss {verb} at γ = 0.04 J/m²."
+    assert sentence == f"Through H, the mean loss in J/m² {verb} at γ = 0.04 J/m²."
 
 
 def test_findings_compare_with_the_paper(data):
@@ -894,16 +874,16 @@ def test_the_reading_nearest_to_the_paper_is_named(file, tmp_path):
 
 def test_the_page_begins_with_what_came_out_and_how_well_it_is_known(data, report):
     outcome, statistical, numerical = findings.verdict(data)
-    means = [cell.estimates["loss_dimensionless"].mean for cell in data.cells]
-    assert f"from W~ = {min(means):.3g}" in outcome
-    assert f"to W~ = {max(means):.3g}" in outcome
+    means = [1e3 * cell.estimates["loss"].mean for cell in data.cells]
+    assert f"from {min(means):.3g} mJ/m²" in outcome
+    assert f"to {max(means):.3g} mJ/m²" in outcome
     errors = [
         max(e.high - e.mean, e.mean - e.low) / e.mean
-        for e in (cell.estimates["loss_dimensionless"] for cell in data.cells)
+        for e in (cell.estimates["loss"] for cell in data.cells)
     ]
     assert "5 realisations" in statistical
     least, most = (float(f"{100 * half:.2g}") for half in (min(errors), max(errors)))
-    assert f"mean W~ reaches {least:g} to {most:g} % from it" in statistical
+    assert f"mean loss in J/m² reaches {least:g} to {most:g} % from it" in statistical
     assert "at most 0.01 % of it" in numerical
     audit = max(np.abs(cell.values["audit_residual"]).max() for cell in data.cells)
     assert f"closes within {100 * audit:.2g} %" in numerical

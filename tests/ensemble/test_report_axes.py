@@ -136,7 +136,7 @@ def test_tables_curves_and_page_have_every_axis(report, data):
     assert {"loss_along_ratio", "loss_along_max_penetration"} < set(drawn)
     page = (directory / "report.md").read_text(encoding="utf-8")
     assert "show the cells at ratio = 100, max_penetration = 0.9" in page
-    assert "Along max_penetration from 0.5 to 0.9 the mean loss" in page
+    assert "Along max_penetration from 0.5 to 0.9 the mean loss in J/m²" in page
 
 
 def test_figures_along_an_axis_hold_the_means_there(data):
@@ -148,21 +148,23 @@ def test_figures_along_an_axis_hold_the_means_there(data):
         for container in axes.containers:
             values = container.lines[0].get_ydata()
             assert low <= min(values) <= max(values) <= high
-    lines = [axes.containers[1].lines[0] for axes in figure.axes]  # the second γ
-    for line, name, unit, hurst in zip(
+    # a panel for each (H, γ), a line for each ratio: the second one
+    lines = [axes.containers[1].lines[0] for axes in figure.axes]
+    places = [(h, g) for h in (0.7, 0.8) for g in (0.01, 0.04)]
+    for line, name, unit, at in zip(
         lines,
         np.repeat(
-            ["loss_dimensionless", "pull_off_stress", "pull_off_penetration",
-             "largest_contact_fraction", "loss_per_contact"], 2
+            ["loss", "pull_off_stress", "pull_off_penetration",
+             "largest_contact_fraction", "loss_per_contact"], 4
         ),
-        np.repeat([1, 1e3, 1, 1, 1e-3], 2),
-        [0.7, 0.8] * 5,
+        np.repeat([1e-3, 1e3, 1, 1, 1e-3], 4),
+        places * 5,
         strict=True,
     ):  # fmt: skip
         cells = [
             c
             for c in data.cells
-            if (c.hurst, c.work_of_adhesion) == (hurst, 0.04) and c.others[0] == ("ratio", 100)
+            if (c.hurst, c.work_of_adhesion) == at and c.others[0] == ("ratio", 100)
         ]
         np.testing.assert_allclose(line.get_xdata(), TOPS, atol=0.01)
         mean = [c.estimates[name].mean / unit for c in cells]
@@ -198,7 +200,7 @@ def test_opened_tables_and_figures_have_every_axis(file):
     names = ["hurst", "work_of_adhesion", "ratio", "max_penetration"]
     assert results.losses.index.names == names
     assert results.mechanisms.index.names == [*names, "kind"]
-    assert len(results.plot.loss_along("ratio")) == 2
+    assert len(results.plot.loss_along("ratio")) == 4
     with pytest.raises(ValueError, match="there are ratio, max_penetration"):
         results.plot.loss_along("young")
 

@@ -61,11 +61,19 @@ def test_a_run_from_nothing_to_done(tmp_path):
         assert file.attrs["seed"] == 5
 
 
-def test_where_there_is_no_launcher_one_process_computes(tmp_path, monkeypatch):
+def test_where_there_is_no_mpi_processes_compute_what_ranks_would(tmp_path, monkeypatch):
     monkeypatch.setattr(launch, "launcher", lambda: None)
-    process, _ = run(tmp_path, "--ranks", "2")
-    assert process.returncode == 0
-    assert "no mpirun was found, so one process computes" in process.stderr
+    process, out = run(tmp_path, "--ranks", "3", fake=None)
+    assert process.returncode == 0, process.stderr
+    assert (
+        "without MPI (mpirun and mpi4py): 2 workers as processes of this machine" in process.stderr
+    )
+    (tmp_path / "alone").mkdir()
+    alone, expected = run(tmp_path / "alone", fake=None)
+    assert alone.returncode == 0, alone.stderr
+    assert differences(out, expected) == []
+    with h5py.File(out) as file:
+        assert set(file["rank"][:]) == {1, 2}
 
 
 def test_the_version_is_told():

@@ -228,7 +228,9 @@ class Job:
 class Submit(Protocol):
     """How a job is submitted; see :func:`submit`."""
 
-    def __call__(self, *words: str, realisations: int = 3, launcher: str = "") -> Job:
+    def __call__(
+        self, *words: str, realisations: int = 3, launcher: str = "", silence: int = 120
+    ) -> Job:
         """Submit."""
 
 
@@ -244,7 +246,7 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Submit
     if mpirun is None:
         pytest.skip("no mpirun here")
 
-    def submit(*words: str, realisations: int = 3, launcher: str = "") -> Job:
+    def submit(*words: str, realisations: int = 3, launcher: str = "", silence: int = 120) -> Job:
         folder = tmp_path_factory.mktemp("a study, ")
         text = campaign_text(realisations=str(realisations))
         (folder / "study.toml").write_text(text)
@@ -252,9 +254,9 @@ def submit(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Submit
         adhesis.parent.mkdir()
         adhesis.write_text(
             f"""#!/bin/sh
-behaviour=log=begun
+behaviour="log=begun hold=2 silence={silence}"
 if [ "$1" = report ]; then exec mkdir "$4"; fi
-if [ -z "$SLURM_RESTART_COUNT$SLURM_ARRAY_TASK_ID" ]; then behaviour="log=begun hold=2"; fi
+if [ -n "$SLURM_RESTART_COUNT$SLURM_ARRAY_TASK_ID" ]; then behaviour=log=begun; fi
 exec {sys.executable} {ROOT}/tests/support/fake_run.py "$behaviour" "$@"
 """
         )
@@ -279,6 +281,7 @@ def jobs(cluster: Cluster, submit: Submit) -> dict[str, Job]:
     jobs = {"limited": submit(*limited, realisations=10)}
     jobs["parts"] = submit(str(ROOT / "jobs" / "parts.sh"), "2", "--mem=1", "study.toml")
     jobs["killed"] = submit("--nodes=1", "--ntasks-per-node=3", realisations=10)
+    jobs["stopped"] = submit("--nodes=1", "--ntasks-per-node=3", realisations=10, silence=2)
     jobs["cancelled"] = submit("--ntasks=2", realisations=10)
     if "pmix" in cluster.call("srun", "--mpi=list"):
         # Without SLURM_EXPORT_ENV ranks would lack PYTHONPATH.
@@ -308,6 +311,18 @@ def test_a_job_with_a_killed_rank_is_requeued(cluster: Cluster, jobs: dict[str, 
     os.kill(max(ranks), signal.SIGKILL)
     job.wait(lambda: job.values["Restarts"] == "1", "requeued")
     assert "adhesis run ended with 137" in job.log
+    job.wait(lambda: job.values["JobState"] == "COMPLETED", "finished")
+    assert job.done_tasks() == 40
+
+
+def test_a_job_with_a_rank_that_hangs_comes_back_and_finishes(jobs: dict[str, Job]) -> None:
+    job = jobs["stopped"]
+    job.wait(lambda: job.done_tasks() > 0, "a first task")
+    ranks = processes_in(job.folder, "fake_run.py")
+    os.kill(max(ranks), signal.SIGSTOP)
+    job.wait(lambda: job.values["Restarts"] == "1", "requeued")
+    assert "has not answered for 2 s" in job.log
+    assert "adhesis run ended with 75" in job.log
     job.wait(lambda: job.values["JobState"] == "COMPLETED", "finished")
     assert job.done_tasks() == 40
 

@@ -31,8 +31,8 @@ from adhesis.ensemble.trace.answer import (
     make_cycle,
     run_plan,
 )
+from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import what_was_read
-from adhesis.ensemble.trace.pool import Pool
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.ensemble.trace.trace_page import page_text, summary
@@ -195,7 +195,7 @@ def test_a_preload_is_the_turning_point_of_a_trace() -> None:
 @pytest.mark.parametrize(
     ("words", "control", "turns"),
     [
-        (["--stiffness", "0", "--max-stress", "300,100"], Control(0.0), (300.0, 100.0)),
+        (["--stiffness", "0", "--max-stress", "300.0,100.0"], Control(0.0), (300.0, 100.0)),
         (["--stiffness", "1e9", "--max-penetration", "0.6,0.3"], Control(1e9), (0.6, 0.3)),
         (["--max-penetration", "0.6"], Control(), (0.6, 0.2, 0.4)),
     ],
@@ -365,15 +365,15 @@ def test_unphysical_input_is_doubted_and_zero_range_comes_first() -> None:
 
 def test_a_process_that_is_killed_is_said_and_replaced() -> None:
     _, _, plan = small_plan()
-    pool = Pool(plan.jobs, processes=1)
+    loops = Loops(plan.jobs, processes=1)
     killed: list[str] = []
 
-    def watch(pool: Pool) -> None:
-        if not killed and pool.running:
-            killed.extend(pool.running)
-            os.kill(pool.pids[-1], signal.SIGKILL)
+    def watch(loops: Loops) -> None:
+        if not killed and loops.running:
+            killed.extend(loops.running)
+            os.kill(loops.pids[-1], signal.SIGKILL)
 
-    done = pool.run(watch, every=0.05)
+    done = loops.run(watch, every=0.05)
     assert set(done) == {job.name for job in plan.jobs}
     failed = [name for name, found in done.items() if isinstance(found, str)]
     assert failed == killed
@@ -384,23 +384,23 @@ def test_a_process_that_is_killed_is_said_and_replaced() -> None:
 def test_an_interrupt_ends_all_loops_of_a_trace(processes: int) -> None:
     """In what was raised, though it is of a class that loops fail with; and no process is left."""
     _, _, plan = small_plan()
-    pool = Pool(plan.jobs, processes=processes)
+    loops = Loops(plan.jobs, processes=processes)
 
     def handler(number: int, frame: object) -> None:
         raise Interrupt
 
-    def watch(pool: Pool) -> None:
-        if processes == 0 or len(pool.running) == processes:
+    def watch(loops: Loops) -> None:
+        if processes == 0 or len(loops.running) == processes:
             os.kill(os.getpid(), signal.SIGALRM)
 
     before = signal.signal(signal.SIGALRM, handler)
     try:
         with pytest.raises(Interrupt):
-            pool.run(watch, every=0.05)
+            loops.run(watch, every=0.05)
     finally:
         signal.signal(signal.SIGALRM, before)
-    assert len(pool.pids) == processes
-    for pid in pool.pids:
+    assert len(loops.pids) == processes
+    for pid in loops.pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
 

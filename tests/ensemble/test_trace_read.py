@@ -348,7 +348,8 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
     ("words", "reported"),
     [
         (["--plan"], "states no unit"),
-        (["--plan", "--unit", "um", "--columns", "1"], "--columns is 1: it must name two of the 2"),
+        (["--plan", "--unit", "um", "--columns", "3"], "--columns is 3: it must name two of the 2"),
+        (["--plan", "--unit", "um", "--columns", "2"], "header states no step with its unit: give"),
         (["--plan", "--unit", "um", "--cut-off", "1m"], "--cut-off is 1 m"),
         (["--plan", "--unit", "um", "--tip-radius", "5"], "--tip-radius is 5, which would be 5 m"),
         (["--plan", "--unit", "um", "--tip-radius", "5m"], "trusted from 50 µm on (what a tip of"),
@@ -369,7 +370,7 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
         (["--plan", "--unit", "um", "--method", "magic"], "method is 'magic'"),
         (["--unit", "um"], "--to is missing: give the directory for the page, or --plan"),
         (["--plan", "--unit", "um", "--columns", "x"], "--columns is 'x': it must be two whole"),
-        (["--plan", "--work-of-adhesion", "1,1"], "--work-of-adhesion is '1,1': its values must"),
+        (["--plan", "--work-of-adhesion", "1.0,1.0"], "is '1.0,1.0': its values must"),
         (
             ["--plan", "--work-of-adhesion", "1;2"],
             "--work-of-adhesion is '1;2': it must be a",
@@ -410,5 +411,5 @@ def test_what_cannot_be_read_names_all_that_can() -> None:
 
 def test_a_foreign_line_says_what_to_do_with_it(tmp_path: Path) -> None:
     (tmp_path / "h.csv").write_text("1\n2\n3\n4\npause\n5\n6\n7\n")
-    with pytest.raises(InputError, match="it must hold one number; remove the line or begin it"):
+    with pytest.raises(InputError, match=r"line 5 .* 'pause': it ends the rows .* lines 1 to 4"):
         read_heights(tmp_path / "h.csv")

@@ -74,7 +74,7 @@ from pathlib import Path
 import numpy as np
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.task.compute import Runner
-from adhesis.ensemble.trace.worker import Job, run
+from adhesis.ensemble.trace.job import Job, run
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.precompile import COMPILED_METHODS, compiled_in, warm, watch_compilation
 def kept():

@@ -15,8 +15,9 @@ import pytest
 
 from adhesis.ensemble.doctor import examine
 from adhesis.ensemble.run import launch
-from adhesis.ensemble.trace.pool import Pool
-from adhesis.ensemble.trace.worker import Job
+from adhesis.ensemble.run.processes import Work
+from adhesis.ensemble.trace.job import Job
+from adhesis.ensemble.trace.loops import Loops
 from tests.support.campaign_support import ROOT, environment, has_ended, wait_until
 from tests.support.launchers import MPIRUN
 
@@ -65,7 +66,7 @@ def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
     (probe,) = [examine._run_probe([], study)]
     assert probe.failure == ""
     assert len(probe.reports) == 1
-    (answer,) = Pool([IMPOSSIBLE], 1).run().values()
+    (answer,) = Loops([IMPOSSIBLE], 1).run().values()
     assert str(answer).startswith("ValueError")  # from the solver, so that was found
 
 
@@ -96,7 +97,9 @@ PARENT = """
 import json, subprocess, sys, time
 from adhesis.ensemble.run.launch import python, python_environment
 worker = subprocess.Popen(
-    python("-m", "adhesis.ensemble.trace.worker"), stdin=int(sys.argv[1]), env=python_environment()
+    python("-m", "adhesis.ensemble.run.process_worker", "1"),
+    stdin=int(sys.argv[1]),
+    env=python_environment(),
 )
 print(json.dumps(worker.pid), flush=True)
 time.sleep(600)
@@ -117,8 +120,11 @@ def test_a_worker_ends_with_its_parent_even_if_that_is_killed():
     try:
         worker = json.loads(parent.stdout.readline())
         with os.fdopen(os.dup(ours), "wb") as jobs:
-            pickle.dump(IMPOSSIBLE, jobs)
-        assert pickle.load(parent.stdout)[0] == "failed"  # so it has come to its loop
+            pickle.dump(Work(divmod), jobs)
+            pickle.dump((False, ("task", 0)), jobs)
+        while (message := pickle.load(parent.stdout))[0] == "alive":
+            pass
+        assert message[0] == "outcome"  # so it has come to its task
         parent.send_signal(signal.SIGKILL)
         parent.wait()
         wait_until(lambda: has_ended(worker))

@@ -9,7 +9,6 @@ import ast
 import re
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -68,30 +67,6 @@ NOT_IN_SOLVER = {
 # The mechanics start no threads for their work: one module keeps the handlers of signals out of the
 # compiler, the other has locks against the threads of callers.
 THREADING = {"adhesis.solver.runtime.uninterrupted", "adhesis.solver.runtime.threads"}
-# All that campaigns know of the mechanics.
-SOLVER_FOR_ENSEMBLE = {
-    "adhesis.solver.checks",
-    "adhesis.solver.model.control",
-    "adhesis.solver.observables",
-    "adhesis.solver.loading.zero_range",
-    "adhesis.solver.model.jump",
-    "adhesis.solver.loading.loop",
-    "adhesis.solver.loading.loop_result",
-    "adhesis.solver.model.half_space",
-    "adhesis.solver.method",
-    "adhesis.solver.loading.path",
-    "adhesis.solver.model.problem",
-    "adhesis.solver.model.profile",
-    "adhesis.solver.references.single_wave",
-    "adhesis.solver.registry",
-    "adhesis.solver.runtime.uninterrupted",
-    "adhesis.solver.model.measured_profile",
-    "adhesis.solver.loading.turning_points",
-    "adhesis.solver.validate.claims",
-    "adhesis.solver.values",
-    "adhesis.solver.views",
-    "adhesis.solver.precompile",
-}
 
 
 def modules() -> Iterator[tuple[str, Path]]:
@@ -163,25 +138,6 @@ def test_the_statements_are_seen_wherever_they_stand(tmp_path: Path) -> None:
     assert len(PATHS) > 80
 
 
-# A command, and the module that does its work.
-COMMANDS = {"merge.py", "status.py", "warm.py"}
-
-
-def test_no_file_name_of_campaigns_stands_for_two_things() -> None:
-    names = Counter(
-        path.name
-        for module, path in PATHS.items()
-        if module.startswith("adhesis.ensemble") and path.name != "__init__.py"
-    )
-    assert {name for name, count in names.items() if count > 1} <= COMMANDS
-
-
-def test_no_folder_has_more_than_thirteen_modules() -> None:
-    modules = Counter(path.parent for path in PATHS.values() if path.name != "__init__.py")
-    assert len(modules) > 30
-    assert {folder for folder, count in modules.items() if count > 13} == set()
-
-
 def test_no_circle_of_modules() -> None:
     assert circle({m: {n for n in names if n in PATHS} for m, names in imports().items()}) == []
 
@@ -196,17 +152,6 @@ def test_mechanics_know_nothing_of_campaigns_ranks_and_files() -> None:
             assert all(n.startswith("adhesis.solver") for n in names if n.startswith("adhesis"))
             found = {name.split(".")[0] for name in names} & NOT_IN_SOLVER
             assert found == ({"threading"} if module in THREADING else set()), module
-
-
-def test_campaigns_know_the_public_modules_of_mechanics_alone() -> None:
-    used = {
-        name
-        for module, names in imports().items()
-        if module.startswith("adhesis.ensemble")
-        for name in names
-        if name.startswith("adhesis.solver")
-    }
-    assert used == SOLVER_FOR_ENSEMBLE
 
 
 @pytest.mark.parametrize("package", IMPORTERS)

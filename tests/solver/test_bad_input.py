@@ -789,7 +789,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         TypeError,
         "columns is 'a': it must be a whole number",
     ),
-    ("read_trace", lambda: read_trace(__file__, row=1), InputError, "row is 1: "),
+    ("read_trace", lambda: read_trace(__file__, row=-1), InputError, "row is -1: "),
     (
         "loss_of_trace",
         lambda: answer(prepared=TRACE),

@@ -213,6 +213,22 @@ def test_work_that_is_not_to_be_interrupted_goes_on_while_the_caller_is(alarm):
     assert seen == ["end", "inner"]
 
 
+def test_an_interrupt_that_meets_the_start_of_a_thread_arrives_as_itself(monkeypatch):
+    """A signal may reach another thread, and its handler then runs though signals are held."""
+    name = next(n for n in ("_start_joinable_thread", "_start_new_thread") if hasattr(threading, n))
+    start = getattr(threading, name)
+
+    def interrupted_start(*args, **options):
+        start(*args, **options)
+        while any(not thread.is_alive() for thread in threading.enumerate()):
+            time.sleep(1e-3)  # until the thread has struck itself off those that begin
+        raise Interrupt
+
+    monkeypatch.setattr(threading, name, interrupted_start)
+    with pytest.raises(Interrupt):
+        uninterrupted(lambda: time.sleep(0.2))()
+
+
 def test_uninterrupted_work_returns_and_raises_as_it_does_by_itself():
     @uninterrupted
     def divide(a: float, *, by: float) -> tuple[float, bool]:

@@ -3,8 +3,8 @@
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
 itself, 71 too little memory or too few processes, 74 the results file could not be written, 75
-stopped early (a signal, the walltime): run the same command again to resume. 137: a rank that
---ranks started was killed; the same holds.
+stopped early (a signal, the walltime, a rank that does not answer): run the same command again to
+resume. 137: a rank that --ranks started was killed; the same holds.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ranks",
         metavar="N",
-        help="start N ranks here (one more than cores is right: rank 0 only waits)",
+        help="start N ranks here, without MPI as processes (one more than cores is right: rank 0 "
+        "only waits)",
     )
     parser.add_argument(
         "--dry-run",
@@ -104,20 +105,22 @@ def execute(
     Tests pass another engine than loops, and what starts a rank with it.
     """
     from adhesis.ensemble.run import launch
-    from adhesis.ensemble.run.ranks import wait_for_all, world
+    from adhesis.ensemble.run.ranks import OneRank, wait_for_all, world
 
     started = time.time()
-    comm = None
+    comm: Any = OneRank()
+    processes = 0
     try:
         if args.ranks is not None and not args.dry_run and launch.STARTED not in os.environ:
-            code = _start_ranks(args, program)
-            if code is not None:
-                return code
+            ranks, mpirun = _ranks(args), launch.mpi_launcher()
+            if ranks > 1 and mpirun is not None:
+                return _start_ranks(mpirun, ranks, args, program)
+            processes = ranks - 1
         comm = world()
-        code = _run(args, comm, started, engine)
-        return code if comm is None or comm.rank == 0 else DONE
+        code = _run(args, comm, processes, started, engine)
+        return code if comm.rank == 0 else DONE
     except InputError as error:
-        if comm is None:
+        if comm.size == 1:
             raise
         if comm.rank == 0 and not launch.hand_over(BAD_INPUT, f"adhesis run: {error}"):
             write_line(f"adhesis run: {error}")
@@ -142,8 +145,8 @@ def execute(
         return OUR_ERROR
 
 
-def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int | None:
-    """Start ranks and wait for them; None if this process is to compute alone."""
+def _ranks(args: argparse.Namespace) -> int:
+    """Return how many ranks are to be started."""
     from adhesis.ensemble.run import launch
     from adhesis.ensemble.run.ranks import launched
     from adhesis.solver.checks import counted
@@ -157,16 +160,15 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
         )
     if launched()[0] > 1:
         raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
-    if ranks == 1:
-        return None
-    mpirun = launch.launcher()
-    if mpirun is None:
-        print(
-            "no mpirun was found, so one process computes; MPIRUN=PATH names one",
-            file=sys.stderr,
-            flush=True,
-        )
-        return None
+    return ranks
+
+
+def _start_ranks(
+    mpirun: str, ranks: int, args: argparse.Namespace, program: Sequence[str] | None
+) -> int:
+    """Start ranks and wait for them; returns the exit code."""
+    from adhesis.ensemble.run import launch
+
     code, sentence = launch.run_ranks(mpirun, ranks, args.words, program)
     if code not in _CODES:
         sentence = (
@@ -185,25 +187,26 @@ def _end_job(comm: Any, code: int, sentence: str = "") -> None:
 
     if not hand_over(code, sentence) and sentence:
         write_line(sentence)
-    if comm is not None:
-        comm.Abort(code)
+    comm.Abort(code)
 
 
-def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | None) -> int:
+def _run(
+    args: argparse.Namespace, comm: Any, processes: int, started: float, engine: Engine | None
+) -> int:
     from adhesis.ensemble.campaign.file import load_campaign
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
-    from adhesis.ensemble.run.dispatch import Overdue
+    from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
     from adhesis.ensemble.run.ranks import together
-    from adhesis.ensemble.run.session import Options, OutOfReach, run_campaign
+    from adhesis.ensemble.run.session import Options, run_campaign
+    from adhesis.solver.checks import counted
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
     path = Path(args.out or f"{Path(args.campaign).stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
-        alone = comm is None or comm.rank == 0
-        return _tell_price(campaign, path, args, engine) if alone else DONE
+        return _tell_price(campaign, path, args, engine) if comm.rank == 0 else DONE
     if args.part and not args.out:
         raise InputError("--part needs --out: every part has a results file of its own")
     most = _number("--max-failures", args.max_failures, whole=True)
@@ -213,25 +216,23 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
         max_failures=int(most) or None,
         deadline=deadline(parse_duration(args.walltime) if args.walltime else None, started),
         patience=_number("--patience", args.patience),
+        processes=processes,
     )
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
+    if processes:
+        workers = counted(processes, "worker")
+        say(f"without MPI (mpirun and mpi4py): {workers} as processes of this machine")
     try:
         summary = run_campaign(campaign, path, comm, options, say, engine)
-    except Overdue as error:
-        # Nobody can be waited for; what was given up anyway is lost, the results file is sound.
-        text = f"adhesis run: {error}; run the same command again to resume"
+    except Unresponsive as error:
+        # Nobody can be waited for: what is in flight is lost, the results file is sound.
+        text = f"adhesis run: {error}; what was done is kept, run the same command again to resume"
         _end_job(comm, RESUME, text)
         return RESUME
-    except OutOfReach as error:
-        # The ranks cannot end together: MPI would wait for those that do not answer.
-        _report_end(campaign, path, error.summary, say)
-        code = _code(error.summary, options)
-        _end_job(comm, code, f"adhesis run: {error}; what was done is kept")
-        return code
-    if comm is None or comm.rank == 0:
+    if comm.rank == 0:
         _report_end(campaign, path, summary, say)
     return _code(summary, options)
 
@@ -260,7 +261,7 @@ def _report_end(
         f"{summary.computed} computed in {duration(summary.seconds)}"
     )
     if summary.failed:
-        say(f"why they failed: adhesis status {path}; again: adhesis run … --redo failed")
+        say(f"why they failed, and what to do: adhesis status {path}")
     for line in precision_lines(summary.precisions):
         say(line)
     if summary.doubtful:

@@ -13,6 +13,7 @@ from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.report.figures.loss_figures import errorbar
 from adhesis.ensemble.report.figures.style import (
     MM,
+    MOST_CURVES,
     MOST_PANELS,
     ONE_COLUMN,
     TWO_COLUMNS,
@@ -22,15 +23,14 @@ from adhesis.ensemble.report.figures.style import (
     new_figure,
     panels,
     say_below,
-    shown_gammas,
     spread_out,
 )
 from adhesis.ensemble.report.further_axes import axis_label, lines_along, place, together
 
-TURNING_POINTS = ("max_penetration", "max_stress")
+TURNING_POINTS = ("max_penetration", "max_stress", "preload")
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
-_LOSS = ("loss_dimensionless", r"loss $\tilde W$", 1.0)
+_LOSS = ("loss", "loss (mJ/m²)", 1e-3)
 _OF_TURNING_POINT = (
     ("pull_off_stress", "largest tension (kPa)", 1e3),
     ("pull_off_penetration", r"last contact lost at $\Delta/h_\mathrm{max}$", 1.0),
@@ -44,7 +44,8 @@ def with_figure(data: Aggregate) -> list[Axis]:
     return [
         axis
         for axis in data.further
-        if not together(data, axis) & {"hurst", "work_of_adhesion"} and lines_along(data, axis)
+        if not together(data, axis) & {"hurst", "work_of_adhesion"}
+        and any(len(line) > 1 for line in lines_along(data, axis))
     ]
 
 
@@ -58,61 +59,86 @@ def along(axis: Axis) -> Callable[[Aggregate], Figure]:
 
 
 def _draw(data: Aggregate, axis: Axis) -> Figure:
-    """Means with intervals against an axis: a column for each H, a line for each γ."""
-    fixed, lines = _lines(data, axis)
-    hursts = spread_out(data.hursts, MOST_PANELS)
-    gammas = shown_gammas(data)
+    """Means with intervals against an axis, every cell of it and of one more further axis.
+
+    With one more: a column for each (H, γ), a line for each of its values. Else a column for each
+    H, a line for each γ.
+    """
+    second = _second_axis(data, axis)
+    fixed, lines = _lines(data, axis, second)
+    titles = list(dict.fromkeys(title for title, _ in lines))
+    titles = [titles[round(k)] for k in spread_out(range(len(titles)), MOST_PANELS)]
+    labels = list(dict.fromkeys(label for _, label in lines))
+    labels = [labels[round(k)] for k in spread_out(range(len(labels)), MOST_CURVES)]
     rows = [_LOSS, *(_OF_TURNING_POINT if axis.name in TURNING_POINTS else ())]
-    width = ONE_COLUMN if len(hursts) == 1 else TWO_COLUMNS
+    width = ONE_COLUMN if len(titles) == 1 else TWO_COLUMNS
     height = (22 + 40 * len(rows)) * MM
-    figure = new_figure(len(rows), len(hursts), width, height, sharex=True, sharey="row")
+    figure = new_figure(len(rows), len(titles), width, height, sharex=True, sharey="row")
     low, high = min(axis.values), max(axis.values)
     logarithmic = low > 0 and high > _LOG_FROM * low
-    grid = panels(figure, len(rows), len(hursts))
+    grid = panels(figure, len(rows), len(titles))
+    axis_text, axis_unit = axis_label(axis)
     for row, (name, label, unit) in zip(grid, rows, strict=True):
-        for axes, hurst in zip(row, hursts, strict=True):
-            for order, (k, gamma) in enumerate(gammas):
-                line = lines.get((hurst, gamma), [])
+        for axes, title in zip(row, titles, strict=True):
+            for k, of_line in enumerate(labels):
+                line = lines.get((title, of_line), [])
                 if not line:
                     continue
                 x = np.array([dict(cell.others)[axis.name] for cell in line], dtype=float)
-                aside = (order - (len(gammas) - 1) / 2) * 0.01
+                aside = (k - (len(labels) - 1) / 2) * 0.01
                 x = x * (high / low) ** aside if logarithmic else x + aside * (high - low)
+                x /= axis_unit
                 found = [cell.estimates[name] for cell in line]
                 above = name != "pull_off_penetration"
-                errorbar(axes, x, found, k, gamma_label(gamma), unit=unit, from_zero=above)
+                errorbar(axes, x, found, k, of_line, unit=unit, from_zero=above)
                 if name == "largest_contact_fraction" and axis.name == "max_penetration":
                     turning = [cell.curves["loading_contact_fraction"].mean[-1] for cell in line]
                     axes.plot(x, turning, "x", color="0.2", markersize=5, zorder=6, label="_")
         if name != "pull_off_penetration":
             row[0].set_ylim(bottom=0)  # when the panels, which share it, are all drawn
         row[0].set_ylabel(label)
-    for axes, hurst in zip(grid[0], hursts, strict=True):
-        label_panel(axes, f"H = {hurst:g}")
+    for axes, title in zip(grid[0], titles, strict=True):
+        label_panel(axes, title)
     for axes in grid[-1]:
-        axes.set_xlabel(axis_label(axis))
+        axes.set_xlabel(axis_text)
         if logarithmic:
             axes.set_xscale("log")
-    handles, _ = grid[0][0].get_legend_handles_labels()
-    legend_above(figure, handles, 3)
+    handles, texts = grid[0][0].get_legend_handles_labels()
+    if any(texts):
+        legend_above(figure, handles, 3 if second is None else 2)
     say_below(figure, place(fixed))
     return figure
 
 
-def _lines(
-    data: Aggregate, axis: Axis
-) -> tuple[list[tuple[str, float]], dict[tuple[float, float], list[Cell]]]:
-    """Return the values on the other further axes that all figures share, and the cells there."""
+def _second_axis(data: Aggregate, axis: Axis) -> Axis | None:
+    """Return the further axis whose values are the lines of a figure along another one."""
     moving = together(data, axis)
+    return next((other for other in data.further if other.name not in moving), None)
+
+
+def _lines(
+    data: Aggregate, axis: Axis, second: Axis | None
+) -> tuple[list[tuple[str, float]], dict[tuple[str, str], list[Cell]]]:
+    """Return the values that all lines share, and the cells by title of a panel and label.
+
+    Further axes beside these two are at one place, that of :attr:`Aggregate.shown`.
+    """
+    moving = together(data, axis)
+    names = set() if second is None else together(data, second)
 
     def at(cell: Cell) -> list[tuple[str, float]]:
-        return [other for other in cell.others if other[0] not in moving]
+        return [other for other in cell.others if other[0] not in moving | names]
 
     wanted = {(c.hurst, c.work_of_adhesion): at(c) for c in data.shown.cells}
-    lines = {
-        (line[0].hurst, line[0].work_of_adhesion): line
-        for line in lines_along(data, axis)
-        if at(line[0]) == wanted[line[0].hurst, line[0].work_of_adhesion]
-    }
+    lines = {}
+    for line in lines_along(data, axis):
+        cell = line[0]
+        if at(cell) != wanted[cell.hurst, cell.work_of_adhesion]:
+            continue
+        title, label = f"H = {cell.hurst:g}", gamma_label(cell.work_of_adhesion)
+        if second is not None:
+            value = dict(cell.others)[second.name]
+            title, label = f"{title}, {label}", place([(second.name, value)])
+        lines[title, label] = line
     every = list(wanted.values())
     return [other for other in every[0] if all(other in one for one in every)], lines

@@ -35,6 +35,8 @@ class Illustration:
         used where the campaign is the paper's.
     whole : bool
         Whether it draws all cells, and not those of :attr:`Aggregate.shown`.
+    is_worth : callable
+        Returns whether there is something to see: more than one point, or fields.
     """
 
     name: str
@@ -44,6 +46,19 @@ class Illustration:
     of_paper: str = ""
     beside_paper: Callable[[Aggregate], str] | None = None
     whole: bool = False
+    is_worth: Callable[[Aggregate], bool] = lambda data: True
+
+
+def _several_hursts(data: Aggregate) -> bool:
+    return len({cell.hurst for cell in data.cells if cell.done}) > 1
+
+
+def _several_works_of_adhesion(data: Aggregate) -> bool:
+    return len({cell.work_of_adhesion for cell in data.cells if cell.done}) > 1
+
+
+def _with_shape(data: Aggregate) -> bool:
+    return any(shape is not None for shape in data.fields.shapes)
 
 
 def _compared_with(figure: PaperFigure, addition: str = "") -> Callable[[Aggregate], str]:
@@ -65,8 +80,7 @@ LOOPS = (
         "fig7_loop_against_penetration",
         "Mean stress and contact fraction against penetration",
         "Lines: means over realisations; shading: one standard deviation of a single realisation. "
-        "A realisation that has detached counts with zero. Grey ground: the penetrations of the "
-        "loading branch, stretched to half of the panel where unloading takes more of it.",
+        "A realisation that has detached counts with zero.",
         loops.loop_against_penetration,
         "Fig. 7",
     ),
@@ -80,6 +94,7 @@ LOSSES = (
         loss_figures.loss_against_hurst,
         "Table 1",
         lambda data: "Stars: the paper's values, which have no error.",
+        is_worth=_several_hursts,
     ),
     Illustration(
         "loss_against_m2",
@@ -87,14 +102,15 @@ LOSSES = (
         f"Means with 95 % intervals, a panel for each γ, a point for each H. {_BELOW}",
         loss_figures.loss_against_slope,
         beside_paper=lambda data: "Stars: the paper's values, at the m2 that it quotes.",
+        is_worth=_several_hursts,
     ),
 )
 SHAPES = (
     Illustration(
         "fig3_shapes",
         "Deformed shapes",
-        "The first realisation that kept its fields: rigid profile h - s and "
-        "elastic surface v on both branches, at the same separation. In contact the two coincide. "
+        "The first realisation that kept its fields: rigid profile h, and the elastic surface "
+        "above it on both branches, at the same prescribed value. In contact the two coincide. "
         "Right: one and a half of the longest waves around the highest point, carried on across "
         "the end of the period where it lies near one.",
         shapes_and_spectra.shapes,
@@ -104,6 +120,7 @@ SHAPES = (
             " Its separations (92, 51 and 20 µm) are larger than h_max of any profile with "
             "h_rms = 1 µm, so the states here are those that the campaign kept.",
         ),
+        is_worth=_with_shape,
     ),
     Illustration(
         "fig4_spectra_of_branches",
@@ -178,6 +195,7 @@ MECHANISMS = (
         "Largest mean tension on unloading, means with 95 % intervals. The curves are moved apart "
         "a little.",
         loss_figures.pull_off,
+        is_worth=_several_works_of_adhesion,
     ),
 )
 PENETRATIONS = (
@@ -190,6 +208,8 @@ PENETRATIONS = (
         loss_figures.loss_against_penetration,
     ),
 )
+
+ALL = (*LOOPS, *LOSSES, *SHAPES, *HEIGHTS, *MECHANISMS, *PENETRATIONS)
 
 
 def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
@@ -212,7 +232,7 @@ def along_axes(data: Aggregate) -> tuple[Illustration, ...]:
                 else ""
             )
             + (
-                " Other further axes: as written below the panels."
+                " A line for each value of the other axis; more axes: as written below the panels."
                 if set(data.further) - {a for a in data.further if a.name in together(data, axis)}
                 else ""
             ),

@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
@@ -31,7 +30,6 @@ from adhesis.solver.model.profile import Array
 
 _MARKERS_PER_CURVE = 8
 _INTERVALS, _FINE = 60, 50  # of a band, and places between two points that are sorted into them
-_STRETCHED = "0.955"  # ground where an axis is stretched
 
 
 def contact_against_stress(data: Aggregate) -> Figure:
@@ -93,10 +91,7 @@ def _envelope(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
 
 
 def loop_against_penetration(data: Aggregate) -> Figure:
-    """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations.
-
-    The range of the loading branch is stretched.
-    """
+    """Fig. 7: σ~ and A/A0 against Δ~ with one standard deviation over realisations."""
     hursts = spread_out(data.hursts, MOST_PANELS)
     height = (13 + 46 * len(hursts)) * MM
     figure = new_figure(len(hursts), 2, TWO_COLUMNS, height, sharex=True)
@@ -113,39 +108,8 @@ def loop_against_penetration(data: Aggregate) -> Figure:
         row[1].set_ylim(bottom=0)
     for axes in grid[-1]:
         axes.set_xlabel(r"penetration $\tilde\Delta = \Delta/h_\mathrm{max}$")
-    _stretch_loading(data, figure.axes)
     _legend(data, figure, 6)
     return figure
-
-
-def _stretch_loading(data: Aggregate, panels_of_penetration: list[Axes]) -> None:
-    """Give the penetrations of the loading branch half of the width of panels that share them.
-
-    Unloading reaches so much further that loading would be a line at the edge.
-    """
-    cells = [cell for cell in data.cells if cell.done]
-    start = min(float(cell.penetration["loading"][0]) for cell in cells)
-    top = max(float(cell.penetration["loading"][-1]) for cell in cells)
-    drawn = [cell.penetration["unloading"][_in_contact(data, cell, "unloading")] for cell in cells]
-    low = min(float(penetration.min()) for penetration in drawn)
-    factor = (start - low) / (top - start)
-    if factor <= 1:
-        return
-
-    def stretched(x: Array) -> Array:
-        return np.where(x > start, start + factor * (x - start), x)
-
-    def as_they_were(x: Array) -> Array:
-        return np.where(x > start, start + (x - start) / factor, x)
-
-    left = [x for x in MaxNLocator(4).tick_values(low, start) if low <= x < start]
-    right = [x for x in MaxNLocator(4).tick_values(start, top) if start <= x <= top]
-    margin = 0.03 * (start - low)
-    for axes in panels_of_penetration:
-        axes.set_xscale("function", functions=(stretched, as_they_were))
-        axes.set_xlim(low - margin, top + margin / factor)
-        axes.set_xticks([*left, *right], [f"{x:g}" for x in (*left, *right)])
-        axes.axvspan(start, top + margin / factor, color=_STRETCHED, zorder=0, label="_")
 
 
 def _curves_of(data: Aggregate, hurst: float) -> list[tuple[int, Cell]]:

@@ -50,9 +50,16 @@ _STAR: Any = {
 }
 
 
+def loss_quantity(data: Aggregate) -> tuple[str, str, float]:
+    """Return name, label and unit of the loss in figures: W~ where it is set beside the paper's."""
+    if paper.are_its_cells(data.cells):
+        return "loss_dimensionless", r"loss $\tilde W$", 1.0
+    return "loss", "loss (mJ/m²)", 1e-3
+
+
 def loss_against_hurst(data: Aggregate) -> Figure:
-    """Table 1 as a figure: W~ of each H with intervals, a panel for each γ, the paper's beside."""
-    shown = shown_gammas(data)
+    """Table 1 as a figure: loss of each H with intervals and the paper's, a panel for each γ."""
+    shown, (name, label, unit) = shown_gammas(data), loss_quantity(data)
     columns = min(len(shown), _MOST_BESIDE)
     rows = -(-len(shown) // columns)
     height = (20 + 42 * rows) * MM
@@ -62,7 +69,7 @@ def loss_against_hurst(data: Aggregate) -> Figure:
     for axes, (k, gamma) in zip(figure.axes, shown, strict=False):
         cells = _of_gamma(data, gamma)
         x = np.array([cell.hurst for cell in cells])
-        errorbar(axes, x, [cell.estimates["loss_dimensionless"] for cell in cells], k, "_")
+        errorbar(axes, x, [cell.estimates[name] for cell in cells], k, "_", unit=unit)
         _stars(axes, [(cell.hurst + aside, papers_loss(cell), look(k).colour) for cell in cells])
         axes.set_title(gamma_label(gamma), loc="left", pad=3)
     for axes in figure.axes[len(shown) :]:
@@ -70,7 +77,7 @@ def loss_against_hurst(data: Aggregate) -> Figure:
     for axes in figure.axes[-columns:]:
         axes.set_xlabel("Hurst exponent $H$")
     for row in panels(figure, rows, columns):
-        row[0].set_ylabel(r"loss $\tilde W = \oint\tilde\sigma\,\mathrm{d}\tilde\Delta$")
+        row[0].set_ylabel(label)
     first = figure.axes[0]
     first.set_ylim(bottom=0)
     if len(hursts) <= _MOST_TICKS:
@@ -81,19 +88,19 @@ def loss_against_hurst(data: Aggregate) -> Figure:
 
 
 def loss_against_slope(data: Aggregate) -> Figure:
-    """W~ against the mean square slope m2 with intervals, a panel for each γ."""
-    shown = shown_gammas(data)
+    """Loss against the mean square slope m2 with intervals, a panel for each γ."""
+    shown, (name, label, unit) = shown_gammas(data), loss_quantity(data)
     figure = new_figure(len(shown), 1, ONE_COLUMN, (20 + 33 * len(shown)) * MM, sharex=True)
     hursts = spread_out(data.hursts, MOST_CURVES)
     for axes, (_, gamma) in zip(figure.axes, shown, strict=True):
         for k, hurst in enumerate(hursts):
             cells = [cell for cell in _of_gamma(data, gamma) if cell.hurst == hurst]
             m2 = np.array([cell.estimates["m2"].mean for cell in cells])
-            found = [cell.estimates["loss_dimensionless"] for cell in cells]
-            errorbar(axes, m2, found, k, f"H = {hurst:g}")
+            found = [cell.estimates[name] for cell in cells]
+            errorbar(axes, m2, found, k, f"H = {hurst:g}", unit=unit)
             colour = look(k).colour
             _stars(axes, [(paper.m2(c.hurst), papers_loss(c), colour) for c in cells])
-        axes.set_ylabel(r"loss $\tilde W$")
+        axes.set_ylabel(label)
         axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
         label_panel(axes, gamma_label(gamma))
     figure.axes[-1].set_xlabel("mean square slope $m_2$")
@@ -138,12 +145,12 @@ def of_penetration(data: Aggregate) -> list[Companion]:
 
 
 def loss_against_penetration(data: Aggregate) -> Figure:
-    """W~ against the largest penetration with intervals, from the realisations that all share.
+    """Loss against the largest penetration with intervals, from the realisations that all share.
 
     One curve for each γ at the middle H; or for each H, if the campaigns have one γ in common.
     """
     figure = new_figure(1, 1, ONE_COLUMN, 65 * MM)
-    axes = figure.axes[0]
+    axes, (_, quantity, unit) = figure.axes[0], loss_quantity(data)
     typical = typical_cell(data)
     assert typical is not None  # an aggregate has finished tasks
     curves = [
@@ -175,9 +182,10 @@ def loss_against_penetration(data: Aggregate) -> Figure:
             k,
             label,
             offset=(place - (len(curves) - 1) / 2) * apart,
+            unit=unit,
         )
     axes.set_xlabel(r"largest penetration $\Delta_\mathrm{max}/h_\mathrm{max}$")
-    axes.set_ylabel(r"loss $\tilde W$")
+    axes.set_ylabel(quantity)
     axes.set_ylim(bottom=0)
     label_panel(axes, title)
     legend_above(figure, axes.get_legend_handles_labels()[0], len(curves) or 1)
@@ -185,7 +193,7 @@ def loss_against_penetration(data: Aggregate) -> Figure:
 
 
 def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, Estimate]:
-    """W~ of a cell by largest penetration, ascending, over the realisations of all campaigns."""
+    """Loss of a cell by largest penetration, ascending, over the realisations of all campaigns."""
     here = data.cell(hurst, gamma)
     if here is None:
         return {}
@@ -199,7 +207,7 @@ def _by_penetration(data: Aggregate, hurst: float, gamma: float) -> dict[float, 
     if not shared:
         return {}
     losses = [
-        cell.values["loss_dimensionless"][np.isin(cell.seed, list(shared))]
+        cell.values[loss_quantity(data)[0]][np.isin(cell.seed, list(shared))]
         for cell in there.values()
     ]
     return dict(zip(there, estimates(np.array(losses)), strict=True))

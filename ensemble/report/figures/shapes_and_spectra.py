@@ -49,10 +49,24 @@ _COLOUR_OF_BRANCH = {"loading": "#0072B2", "unloading": "#D55E00"}
 
 
 def shapes(data: Aggregate) -> Figure:
-    """Fig. 3: rigid profile and deformed surface of one realisation on both branches."""
-    cell = cells_of(data, paper.FIGURE_3)[0]
+    """Fig. 3: rigid profile and elastic surface above it of one realisation on both branches.
+
+    Heights are those of the profile: on a machine or under a load the two branches have different
+    separations at one prescribed value.
+
+    Raises
+    ------
+    ValueError
+        If no cell has kept its fields.
+    """
     fields = data.fields
+    kept = [cell for cell in data.cells if fields.shapes[data.cells.index(cell)] is not None]
+    wished = [cell for cell in cells_of(data, paper.FIGURE_3) if cell in kept]
+    if not kept:
+        raise ValueError("no loop has kept its fields")
+    cell = (wished or kept)[0]
     shape = fields.shapes[data.cells.index(cell)]
+    assert shape is not None
     chosen = shown_penetrations(fields, 3)
     figure = new_figure(
         len(chosen),
@@ -62,34 +76,29 @@ def shapes(data: Aggregate) -> Figure:
         sharex="col",
         gridspec_kw={"width_ratios": [2, 1]},
     )
-    if shape is None:
-        return figure
     everywhere = np.arange(cell.plan.position.size)
     window = _window(cell, shape)
     for (whole, detail), k in zip(panels(figure, len(chosen), 2), chosen, strict=True):
-        penetration = cell.plan.penetration[k]
-        separation = shape.h_max * (1 - penetration)
         for axes, part in ((whole, everywhere), (detail, window)):
-            _draw_shape(axes, cell.plan.position, shape, k, separation, part)
+            _draw_shape(axes, cell.plan.position, shape, k, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
         label_panel(
             whole,
-            rf"{_cell_label(cell)}, $\Delta/h_\mathrm{{max}}$ = {penetration:.2f}, "
-            f"$s$ = {1e6 * separation:.2f} µm",
+            f"{_cell_label(cell)}, {_depth(data, cell, k)}, $s$ = {_separations(shape, k)}",
         )
         label_panel(detail, "detail")
         whole.set_ylabel("height (µm)")
     for axes in panels(figure, len(chosen), 2)[-1]:
         axes.set_xlabel("position $x$ (mm)")
-    handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h - s$")]
+    handles: list[Artist] = [Patch(facecolor="0.8", edgecolor="0.4", label="rigid profile $h$")]
     handles += [
         Line2D(
             [],
             [],
             color=_COLOUR_OF_BRANCH[branch],
             linestyle=LINE_OF_BRANCH[branch],
-            label=f"elastic surface $v$, {branch}",
+            label=f"elastic surface $v + s$, {branch}",
         )
         for branch in BRANCHES
     ]
@@ -288,17 +297,16 @@ def _draw_shape(
     position: Array,
     shape: DeformedShape,
     k: int,
-    separation: float,
     part: NDArray[np.intp],
 ) -> None:
     """Draw the nodes ``part``, counted on beyond the period where they exceed it."""
     factor = -(-_FEWEST_NODES // position.size)
     x = 1e3 * _between(part, factor) * (position[1] - position[0])
-    rigid = 1e6 * (_refined(CubicSpline, shape.height, part, factor) - separation)
+    rigid = 1e6 * _refined(CubicSpline, shape.height, part, factor)
     axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
     axes.plot(x, rigid, color="0.4", linewidth=0.5, label="rigid")
     for b, branch in enumerate(BRANCHES):
-        gap = shape.displacement[b, k] - (shape.height - separation)
+        gap = shape.displacement[b, k] - shape.height + _separation(shape, b, k)
         if np.all(np.isfinite(gap)):
             # monotone between nodes: contact stays contact, and nothing overlaps
             axes.plot(
@@ -310,6 +318,18 @@ def _draw_shape(
                 label=branch,
             )
     axes.set_xlim(x[0], x[-1])
+
+
+def _separation(shape: DeformedShape, b: int, k: int) -> float:
+    """Return the separation s in m of a state in contact: there v = h - s, elsewhere v > h - s."""
+    return float(np.max(shape.height - shape.displacement[b, k]))
+
+
+def _separations(shape: DeformedShape, k: int) -> str:
+    """Return the separation of both branches, once if they are alike: "0.45 µm"."""
+    found = [_separation(shape, b, k) for b in range(len(BRANCHES))]
+    texts = [f"{1e6 * s:.2f}" for s in found if np.isfinite(s)]
+    return f"{' and '.join(dict.fromkeys(texts))} µm"
 
 
 def _between(part: NDArray[np.intp], factor: int) -> Array:
@@ -361,7 +381,10 @@ def _penetration_handles(
 
 
 def _penetration_sign(data: Aggregate) -> str:
-    return r"\bar p/\bar p" if data.campaign.cycle.under_load else r"\Delta/h"
+    cycle = data.campaign.cycle
+    if cycle.under_load:
+        return r"\bar p/\bar p"
+    return r"\Delta/h" if cycle.stiffness is None else r"u_\mathrm{tot}/h"
 
 
 def _depth(data: Aggregate, cell: Cell, k: int) -> str:

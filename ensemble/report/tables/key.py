@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.quantities import AXIS_UNITS
+from adhesis.ensemble.quantities import AXIS_UNITS, shown_unit
 from adhesis.ensemble.report.tables.table import KEY, TableColumn, Value
 
 _CSV_UNITS = {"1": "", "m": " [m]", "m2": " [m^2]", "Pa": " [Pa]", "Pa m-1": " [Pa/m]"}
@@ -20,13 +21,22 @@ def key_columns(data: Aggregate) -> tuple[TableColumn, ...]:
 
 def axis_columns(axes: Iterable[Axis]) -> tuple[TableColumn, ...]:
     """One column for each axis."""
-    return tuple(
-        TableColumn(
-            f"{axis.name}{_CSV_UNITS[axis.unit]}",
-            axis.name if axis.unit == "1" else f"{axis.name} ({AXIS_UNITS[axis.unit]})",
+    columns = []
+    for axis in axes:
+        unit, size = shown_unit(axis.name, max(axis.values))
+        unit = unit or AXIS_UNITS.get(axis.unit, "")
+        columns.append(
+            TableColumn(
+                f"{axis.name}{_CSV_UNITS[axis.unit]}",
+                f"{axis.name} ({unit})" if unit else axis.name,
+                partial(_in_unit, size),
+            )
         )
-        for axis in axes
-    )
+    return tuple(columns)
+
+
+def _in_unit(size: float, value: float) -> str:
+    return f"{value / size:g}"
 
 
 def key(cell: Cell) -> list[Value]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from adhesis.ensemble.report.tables.table import (
     Table,
     TableColumn,
     Value,
+    at_least_0,
     fixed,
     make_table,
     number,
@@ -35,20 +37,20 @@ def losses(data: Aggregate) -> Table:
         TableColumn("n", "n"),
         TableColumn("failed", "failed", only_if_any=True),
         TableColumn("pending", "pending", only_if_any=True),
-        TableColumn("loss_dimensionless_mean", "W~", number()),
+        TableColumn("loss_dimensionless_mean", "W~", number(), last=True),
         TableColumn("loss_dimensionless_std"),
-        TableColumn("loss_dimensionless_sem", "s.e.", number(2)),
-        TableColumn("loss_dimensionless_ci_low", "95 % from", number()),
-        TableColumn("loss_dimensionless_ci_high", "to", number()),
-        TableColumn("loss_dimensionless_error_numerical", "± loop", number(1), only_if_any=True),
-        TableColumn("loss_dimensionless_error_load_steps", "± steps", number(1)),
-        TableColumn("loss_dimensionless_error_resolution", "± method", number(1), only_if_any=True),
-        TableColumn("loss_dimensionless_paper", "paper", fixed(2), only_if_any=True),
+        TableColumn("loss_dimensionless_sem", "s.e.", number(2), last=True),
+        TableColumn("loss_dimensionless_ci_low", "95 % from", at_least_0, last=True),
+        TableColumn("loss_dimensionless_ci_high", "to", number(), last=True),
+        TableColumn("loss_dimensionless_error_numerical", "± loop", number(1), True, True),
+        TableColumn("loss_dimensionless_error_load_steps", "± steps", number(1), last=True),
+        TableColumn("loss_dimensionless_error_resolution", "± method", number(1), True, True),
+        TableColumn("loss_dimensionless_paper", "paper", fixed(2), True, True),
         TableColumn("loss_mean [J/m^2]", "loss (mJ/m²)", number(unit=1e-3)),
         TableColumn("loss_std [J/m^2]"),
-        TableColumn("loss_sem [J/m^2]"),
-        TableColumn("loss_ci_low [J/m^2]"),
-        TableColumn("loss_ci_high [J/m^2]"),
+        TableColumn("loss_sem [J/m^2]", "s.e.", number(2, unit=1e-3)),
+        TableColumn("loss_ci_low [J/m^2]", "95 % from", partial(at_least_0, unit=1e-3)),
+        TableColumn("loss_ci_high [J/m^2]", "to", number(unit=1e-3)),
         TableColumn("loss_over_work_of_adhesion", "W/γ", number(3), only_if_any=True),
         TableColumn("interval"),
         TableColumn("loss_from_drops_mean [J/m^2]"),

@@ -26,6 +26,11 @@ def number(digits: int = 4, unit: float = 1.0) -> Format:
     return show
 
 
+def at_least_0(value: Any, unit: float = 1.0) -> str:
+    """Show the lower end of an interval of what is never negative, as a loss."""
+    return number(unit=unit)(value) if value > 0 else "0"
+
+
 def plain(value: Any) -> str:
     """Show a value as it is."""
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -60,12 +65,15 @@ class TableColumn:
         Turns a value into text.
     only_if_any : bool
         For people only if a row has a value that is not zero.
+    last : bool
+        For people behind the others.
     """
 
     name: str
     heading: str = ""
     show: Format = plain
     only_if_any: bool = False
+    last: bool = False
 
 
 # What a row is about.
@@ -121,6 +129,7 @@ class Table:
             if column.heading
             and not (column.only_if_any and all(_missing(r[k]) or not r[k] for r in self.rows))
         ]
+        kept.sort(key=lambda entry: entry[1].last)
         body = [
             [BLANK if _missing(row[k]) else column.show(row[k]) for k, column in kept]
             for row in self.rows

@@ -1,18 +1,29 @@
-"""Find units of length in headers of texts, and parse the parameter ``unit``."""
+"""Find units of length and the step in headers of texts, and parse the parameter ``unit``."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import unicodedata
+from collections.abc import Iterator, Sequence
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.lengths import METRES, OTHER_NAMES, unit_named
+from adhesis.ensemble.lengths import METRES, OTHER_NAMES, length_text, unit_named
 
-# Units that are recognised in running text; "m", "in" and "A" are ambiguous and need brackets.
-_UNAMBIGUOUS = [n for n in (*METRES, *OTHER_NAMES) if n.lower() not in ("m", "in", "a")]
-_WORD = "|".join(sorted(map(re.escape, _UNAMBIGUOUS), key=len, reverse=True))
+# Units that are words or parts of names, too, need brackets.
+_AMBIGUOUS = ("m", "in", "a", "å", "mil", "mils", "thou")
+_UNAMBIGUOUS = [name for name in (*METRES, *OTHER_NAMES) if name.lower() not in _AMBIGUOUS]
+_ANY = [*_UNAMBIGUOUS, *_AMBIGUOUS]
+
+
+def _one_of(names: Sequence[str]) -> str:
+    return "|".join(sorted(map(re.escape, names), key=len, reverse=True))
+
+
+_WORD = _one_of(_UNAMBIGUOUS)
 _IN_TEXT = re.compile(rf"(?<![^\W\d_])({_WORD})(?![^\W_])(?!\s*[/^²])", re.IGNORECASE)
-_IN_BRACKETS = re.compile(r"(?:[(\[<{/=:]|\bin\s)\s*(m|in|a)\s*(?=[)\]>}]|$)", re.IGNORECASE)
+_IN_BRACKETS = re.compile(
+    rf"(?:[(\[<{{/=:]|\bin\s)\s*({_one_of(_AMBIGUOUS)})\s*(?=[)\]>}}]|$)", re.IGNORECASE
+)
 
 _X = re.compile(
     r"\b(x|pos(ition)?s?|lateral|horizontal|distances?|length|lengths|weg|abstand|länge)\b", re.I
@@ -22,16 +33,38 @@ _Z = re.compile(
 )
 _BOTH = re.compile(r"\b(units?|einheit(en)?|unité?s?)\b", re.I)
 
+# A number that stands for itself: not that of "X1" or "Ra2".
+_NUMBER = r"(?<![^\W_])[+\-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:e[+\-]?\d+)?"
+# A field with a value names no column: "0.5 µm", "Cut-off (mm): 0.8". "Channel 1 (µm)" names one.
 _VALUE = re.compile(
-    rf"\d\s*[(\[]?\s*({_WORD})(?![^\W_])", re.IGNORECASE
-)  # "0.5 µm" names no column
-
-_STEP = re.compile(
-    r"\b(step|step ?size|spacing|increment|interval|sampling|pitch|dx|delta ?x|pixel ?size|"
-    r"schrittweite|punktabstand|x[- ]?scale)\b[^\d+\-.]*([+\-]?[\d.,]+(?:e[+\-]?\d+)?)"
-    r"\s*[(\[]?\s*(\w+)?",
+    rf"(?<![^\W_])(?:\d+|\d*[.,]\d+\s*[(\[]?)\s*({_WORD})(?![^\W_])"
+    rf"|[:=]\s*[+\-]?[.,]?\d|(?:^|[\s;,]){_NUMBER}\s*$",
     re.IGNORECASE,
 )
+_HAS_NUMBER = re.compile(r"(?<![^\W_])\d|[:=]")
+
+# The step is named by words for the distance of two points, and by nothing else: a "step height" or
+# a "sampling length" is another length.
+_STEP = frozenset(
+    ("step", "stepsize", "spacing", "increment", "pitch", "dx", "δx", "deltax",
+     "xstep", "xspacing", "xpitch", "xincrement", "xscale", "pixelsize", "schrittweite",
+     "punktabstand", "messpunktabstand", "samplinginterval", "sampleinterval",
+     "pointinterval", "datainterval")
+)  # fmt: skip
+_STEP_IN_WORDS = (
+    *(("interval",), ("sampling", "interval"), ("sample", "interval"), ("point", "interval")),
+    *(("sample", "spacing"), ("sample", "distance")),
+    *(("pixel", "size"), ("delta", "x"), ("x", "scale"), ("point", "distance")),
+    *(("sampling", "distance"), ("data", "interval")),
+)
+_PHRASES = (*((word,) for word in _STEP), *_STEP_IN_WORDS)
+_BESIDE_STEP = frozenset(
+    ("x", "in", "of", "the", "size", "sampling", "measuring", "measurement",
+     "lateral", "horizontal", "point", "points", "data", "between", "scan", "axis", "direction")
+)  # fmt: skip
+_FIRST_NUMBER = re.compile(_NUMBER, re.IGNORECASE)
+_LENGTH = re.compile(r"[\s,;:=()\[\]<>{}/]*([^\W\d]*)[\s)\]>},;.]*")
+_PER_POINT = re.compile(r"\s*/\s*(px|pixel|pt|pts|point|points|sample|step)\b", re.IGNORECASE)
 
 
 def parse_units(text: str) -> tuple[str, str]:
@@ -45,11 +78,11 @@ def parse_units(text: str) -> tuple[str, str]:
 
 
 def _units_in(text: str) -> list[str]:
-    plain = text.replace("_", " ")
-    if plain.strip().lower() in ("m", "in"):
+    plain = unicodedata.normalize("NFKC", text).replace("_", " ")
+    if plain.strip() != "a" and plain.strip().lower() in _ANY:
         return [unit_named(plain)]
     names = [match[1] for match in _IN_TEXT.finditer(plain)]
-    names += [match[1] for match in _IN_BRACKETS.finditer(plain)]
+    names += [match[1] for match in _IN_BRACKETS.finditer(plain) if match[1] != "a"]
     return [unit_named(name) for name in names]
 
 
@@ -64,18 +97,23 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
         Fields of those of its lines that have as many fields as the data.
     """
     names = [row for row in fields if not any(_VALUE.search(field) for field in row)]
-    for row in reversed(names):
+    if fields and len(fields[0]) == 1:
+        names = [row for row in names if _names_heights(row[0], row is fields[-1])]
+    whole = set()
+    for row in names:
         found = [_units_in(field) for field in row]
         if all(len(set(units)) == 1 for units in found):
-            return [units[0] for units in found]
+            whole.add(tuple(units[0] for units in found))
+    if whole:  # of two that differ it is not known which
+        return [units[0] if len(set(units)) == 1 else None for units in zip(*whole, strict=True)]
     for row in reversed(names):
         found = [_units_in(field) for field in row]
-        if any(found) and not any(re.search(r"[\d:=]", field) for field in row):
+        if any(found) and not any(_HAS_NUMBER.search(field) for field in row):
             return [units[0] if len(set(units)) == 1 else None for units in found]
     columns = len(fields[0]) if fields else 2
     known: list[set[str]] = [set(), set()]
     for line in header:
-        if re.search(r"[=:]\s*[-+]?[\d.,]+\s*\S*\s*$", line):
+        if re.search(_NUMBER + r"(?![^\W_])", line, re.IGNORECASE):
             continue  # a length with its value ("Length: 2 mm") is not about the columns
         units = set(_units_in(line))
         if len(units) != 1:
@@ -92,16 +130,77 @@ def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> l
     return picked if columns > 1 else [picked[1], picked[1]]
 
 
-def step_of_header(header: Sequence[str], decimal: str) -> float | None:
-    """Find a step with its unit in a header; return it in m, None if there is none."""
+def _names_heights(line: str, is_last: bool) -> bool:
+    """Return whether a line above one column names it, and not another length."""
+    plain = line.replace("_", " ")
+    if _Z.search(plain) or _BOTH.search(plain):
+        return True
+    return is_last and not _X.search(plain)
+
+
+def step_of_header(name: str, header: Sequence[str], decimal: str) -> float | None:
+    """Find the step, the distance of two points, in a header; return it in m, or None.
+
+    Raises
+    ------
+    InputError
+        If it states several.
+    """
+    steps: list[float] = []
     for line in header:
-        found = _STEP.search(line.replace("_", " "))
-        if found and found[3]:
-            try:
-                unit = unit_named(found[3])
-                value = float(found[2].replace(",", ".") if decimal == "," else found[2])
-            except (InputError, ValueError):
-                continue
-            if value > 0:
-                return value * METRES[unit]
-    return None
+        step = next(filter(None, (_step(part, decimal) for part in _parts(line, decimal))), None)
+        if step is not None and all(abs(step / known - 1) > 1e-9 for known in steps):
+            steps.append(step)
+    if len(steps) > 1:
+        stated = " and ".join(length_text(step, 6) for step in steps)
+        raise InputError(
+            f"the header of {name} states the steps {stated}: give {parameter('step')}, the "
+            "distance of two points"
+        )
+    return steps[0] if steps else None
+
+
+def _parts(line: str, decimal: str) -> Iterator[str]:
+    """Return statements of a line: between its delimiters, and all of it."""
+    line = line.replace('"', "")
+    yield from re.split(r"[;\t]|,\s|\s{2,}", line)
+    yield re.sub(r"[;\t]" if decimal == "," else r"[;\t,]", " ", line)
+
+
+def _step(text: str, decimal: str) -> float | None:
+    """Return the step that a statement such as "Pitch X: 0.5 µm" or "dx (µm) = 0.5" gives."""
+    number = _FIRST_NUMBER.search(text)
+    if number is None:
+        return None
+    label, rest = text[: number.start()], _PER_POINT.sub("", text[number.end() :])
+    unit = _LENGTH.fullmatch(rest)
+    if unit is None:
+        return None
+    within = _units_in(label.strip(" :=\t"))
+    units = [unit[1]] if unit[1] else within
+    words = _words(label, within)
+    if len(set(units)) != 1 or not any(_names_step(words, phrase) for phrase in _PHRASES):
+        return None
+    try:
+        metres = METRES[unit_named(units[0])]
+        value = float(number[0].replace(",", ".") if decimal == "," else number[0])
+    except (InputError, ValueError):
+        return None
+    return value * metres if value > 0 else None
+
+
+def _words(label: str, units: Sequence[str]) -> list[str]:
+    """Return the words of a label in lower case, without its unit."""
+    apart = re.sub(r"[_\-.]|(?<=[a-z])(?=[A-Z][a-z])", " ", label.replace("∆", "Δ"))
+    words = re.findall(r"[^\W\d_]+", apart.lower())
+    names = {word for word in words if word in _ANY} if units else set()
+    return [word for word in words if word not in names]
+
+
+def _names_step(words: Sequence[str], phrase: tuple[str, ...]) -> bool:
+    """Return whether a label holds this phrase, and nothing that gives it another meaning."""
+    n = len(phrase)
+    return any(
+        tuple(words[k : k + n]) == phrase and {*words[:k], *words[k + n :]} <= _BESIDE_STEP
+        for k in range(len(words) - n + 1)
+    )

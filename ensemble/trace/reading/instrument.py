@@ -23,6 +23,10 @@ from adhesis.solver.model.profile import Array
 HINT = f"{sys.executable} -m pip install 'SurfaceTopography>=1.27'"
 
 
+# Formats of the package that any file of some size, or any text, is taken for.
+_TAKE_ANYTHING = ("asc", "xyz", "hgt")
+
+
 class UnknownFormatError(InputError):
     """Raised if no reader of instrument files finds heights in the file."""
 
@@ -64,10 +68,15 @@ def read_scan(source: Source, row: int | None = None, channel: int | None = None
             reader = io.open_topography(source.name if source.content is None else source.open())
             channels = list(reader.channels)
         except Exception as error:  # each reader raises exceptions of its own
-            raise UnknownFormatError(
-                f"{source} is no instrument format that can be read: {_one_line(error)}"
-            ) from None
+            raise UnknownFormatError(_unknown(source, error)) from None
         chosen = _channel(source, channels, channel)
+        if chosen.physical_sizes is None or chosen.unit is None:
+            if reader.format() in _TAKE_ANYTHING:
+                raise UnknownFormatError(_neither(source))
+            raise UnknownFormatError(
+                f"{source} states no lengths or no unit of its heights ({_name(reader)}): export "
+                f"them as text, and give {parameter('step')} and {parameter('unit')}"
+            )
         try:
             topography = reader.topography(channel_index=chosen.index)
             heights: Array = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan)
@@ -78,15 +87,13 @@ def read_scan(source: Source, row: int | None = None, channel: int | None = None
             raise UnknownFormatError(
                 f"{source} cannot be read as heights: {_one_line(error)}"
             ) from None
-    if topography.unit is None or topography.physical_sizes is None:
-        raise InputError(
-            f"{source} states no unit of its lengths: export it as text and give "
-            f"{parameter('unit')}"
-        )
     metres = METRES[unit_named(str(topography.unit))]
-    name = getattr(type(reader), "_name", None) or reader.format()
-    label = f"{name}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
+    label = f"{_name(reader)}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
     return Scan(positions * metres, heights * metres, label, _tip_radius(topography))
+
+
+def _name(reader: Any) -> str:
+    return str(getattr(type(reader), "_name", None) or reader.format())
 
 
 def _library() -> ModuleType:
@@ -118,7 +125,10 @@ def _channel(source: Source, channels: list[Any], wanted: int | None) -> Any:
     heights = [c for c in channels if "height" in str(getattr(c, "data_kind", "height")).lower()]
     if not heights:
         names = ", ".join(f"{c.index} {c.name}" for c in channels) or "none"
-        raise InputError(f"{source} holds no channel of heights (its channels: {names})")
+        raise InputError(
+            f"{source} holds no channel of heights (its channels: {names}): export the trace as "
+            "text"
+        )
     return heights[0]
 
 
@@ -152,8 +162,21 @@ def _tip_radius(topography: Any) -> float | None:
         return None
 
 
+def _unknown(source: Source, error: Exception) -> str:
+    reason = _one_line(error)
+    if reason.startswith("tried "):  # and then lists every reader
+        return _neither(source)
+    return f"{source} is no instrument format that can be read: {reason}"
+
+
+def _neither(source: Source) -> str:
+    return (
+        f"{source} is neither text nor an instrument format that can be read: it holds zero bytes "
+        "(UTF-16 without a mark is to be saved as UTF-8), and no reader of instruments' files "
+        "knows it"
+    )
+
+
 def _one_line(error: Exception) -> str:
     text = " ".join(str(error).split()) or type(error).__name__
-    if text.startswith("tried "):
-        return "none of the readers knows it"
     return text if len(text) < 160 else text[:157] + "..."

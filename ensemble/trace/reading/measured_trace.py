@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,12 +11,14 @@ import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
+from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
     parse_units,
     step_of_header,
     units_of_header,
 )
 from adhesis.ensemble.trace.reading.instrument import HINT, UnknownFormatError, available, read_scan
+from adhesis.ensemble.trace.reading.missing_heights import invalid_rows, without_codes
 from adhesis.ensemble.trace.reading.source import Source, source_of
 from adhesis.ensemble.trace.reading.text_table import Table, read_table
 from adhesis.solver import checks
@@ -25,21 +28,22 @@ from adhesis.solver.values import ByValue
 
 MIN_POINTS = 32
 _COLUMN = checks.Bounds(1, 1_000_000, whole=True)
+_ROW = checks.Bounds(0, 1_000_000, whole=True)
 _TIP_RADIUS = checks.Bounds(0.0, checks.LENGTH.high, unit="m")
 MAX_POINTS = 5_000_000
-TEXT = frozenset(("txt", "csv", "tsv", "dat", "asc", "prn", "xy", "xyz", "tab", "text", "prf"))
 
-# Positions may scatter about equal steps by this share of a step; heights are then interpolated.
-_UNEVEN = 0.10
 # Without a unit, numbers are taken as metres only up to these lengths and steps (m).
 _LONGEST_IN_METRES, _WIDEST_STEP_IN_METRES = 0.02, 2e-5
 # Beyond these limits (m, m, median slope) the unit is wrong.
 _LONGEST, _SHORTEST, _STEEPEST = 1.0, 1e-8, 1.0
-# A repeated height that lies this many ranges of the other heights outside them stands for a
-# missing one. For numbers that instruments write for missing heights the second value holds, and
-# once is enough.
-_BEYOND, _BEYOND_KNOWN = 5.0, 0.2
-_SENTINELS = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
+# Numbers that differ by less than this share of them are one, but for the last bits.
+_SAME = 1e-9
+# Names of a column that counts the points.
+_COUNTS = re.compile(
+    r"\W*(no|nr|number|n|i|idx|index|point|points|punkt|sample|row|#)?\W*"
+    r"|.*[(\[]\s*(px|pixels?|pts?|points?|samples?|#|-|1)\s*[)\]]\W*",
+    re.I,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,10 +182,12 @@ def read_trace(
         must have them, or the numbers can only be metres.
     step : float, optional
         Step in m, for heights without positions.
-    columns : sequence of two int or str, optional
-        Columns of positions and heights, shape (2,): counted from 1, or names of a DataFrame.
+    columns : sequence of int or str, optional
+        Columns of positions and heights, shape (2,), or of heights alone, shape (1,): counted from
+        1, or names of a DataFrame.
     row, channel : int, optional
-        Row of a map and channel of an instrument file, counted from 0.
+        Row of a map (of an instrument file or a text) and channel of an instrument file, counted
+        from 0.
     delimiter, decimal : str, optional
         Delimiter and decimal sign, where a text can be read in two ways.
 
@@ -207,29 +213,27 @@ def read_trace(
     with refused_as_input():
         if step is not None:
             step = checks.real(parameter("step"), step, checks.LENGTH)
-        named = hasattr(source, "to_numpy") and _are_names(columns)
+        named = hasattr(source, "iloc") and _are_names(columns)
         if columns is not None and not named:
             columns = [checks.whole(parameter("columns"), k, _COLUMN) for k in columns]
+        row = None if row is None else checks.whole(parameter("row"), row, _ROW)
+        channel = None if channel is None else checks.whole(parameter("channel"), channel, _ROW)
     in_memory = _table_of(source, columns if named else None)
     if in_memory is not None:
         _refuse_options("files", row=row, channel=channel, delimiter=delimiter, decimal=decimal)
         name, table = in_memory
         form = f"columns {', '.join(table.header)}" if table.header else name
-        return _from_table(name, table, unit, step, None if named else columns, form)
+        return _from_table(name, table, unit, step, None if named else columns, None, form)
     source = source_of(source)
     is_text = holds_numbers(source)
-    for name, number in ((parameter("row"), row), (parameter("channel"), channel)):
-        if is_text and number is not None:
-            raise InputError(
-                f"{name} is {number}: {source} holds columns of numbers, no map and no channels "
-                f"({parameter('columns')} chooses columns)"
-            )
+    if is_text and channel is not None:
+        raise InputError(_no_map("channel", channel, source.name))
     if is_text and source.is_npy:
         table = _columns_of(source.name, load_array(source))
-        return _from_table(source.name, table, unit, step, columns, "npy")
+        return _from_table(source.name, table, unit, step, columns, row, "npy")
     if is_text:
         table = read_table(source, delimiter, decimal)
-        return _from_table(source.name, table, unit, step, columns, f"text, {table.form}")
+        return _from_table(source.name, table, unit, step, columns, row, f"text, {table.form}")
     _refuse_options(
         "texts: an instrument's file states its own lengths", unit=unit, step=step, columns=columns
     )
@@ -237,20 +241,34 @@ def read_trace(
         # Without the extra it is not known whether this is a file of an instrument.
         raise InputError(
             source.container()
-            or f"{source} is no text: export the trace as text, or, if it is an instrument's file, "
-            f"install the optional package SurfaceTopography, {HINT}"
+            or f"{source} is no text (UTF-16 without a mark is to be saved as UTF-8): export the "
+            "trace as text, or, if it is an instrument's file, install the optional package "
+            f"SurfaceTopography, {HINT}"
         )
     try:
         scan = read_scan(source, row, channel)
     except UnknownFormatError as error:
         raise InputError(source.container() or str(error)) from None
-    heights, step, notes = _even(source.name, scan.positions, scan.heights, None)
+    heights, step, notes = equal_steps(source.name, scan.positions, 1.0, scan.heights, None)
+    length, slope = (heights.size - 1) * step, _slope(heights, step)
+    if not _SHORTEST <= length <= _LONGEST or slope > _STEEPEST:
+        raise InputError(
+            f"{source} would be {length_text(length)} long, and rise by {slope:.3g} times its step "
+            "from point to point: its lengths are wrong or damaged, so export it as text with units"
+        )
     notes = [scan.description, *notes]
-    return _in_metres(Trace(heights, step, source.name, tuple(notes), scan.tip_radius))
+    return Trace(heights, step, source.name, tuple(notes), scan.tip_radius)
 
 
 def _are_names(columns: Sequence[int | str] | None) -> bool:
     return columns is not None and all(isinstance(name, str) for name in columns)
+
+
+def _no_map(option: str, number: int, name: str) -> str:
+    return (
+        f"{parameter(option)} is {number}: {name} holds columns of numbers, no map and no channels "
+        f"({parameter('columns')} chooses columns)"
+    )
 
 
 def _refuse_options(to_what: str, **options: object) -> None:
@@ -267,18 +285,15 @@ def holds_numbers(source: Source) -> bool:
     InputError
         If it cannot be read, or has to be unpacked or exported first.
     """
-    begin, suffix = source.beginning(), source.suffix
-    if source.is_npy or begin[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if source.is_npy:
         return True
-    # Text formats of instruments, whose numbers are not two columns.
-    if begin[:8] in (b"aISO-1.0", b"aBCR-1.0", b"aISO-2.0") or begin[:7] in (
-        b"fileFor",
-        b"bISO-1.",
-    ):
-        return False
-    if suffix.lstrip(".") in TEXT:
-        return True
-    return b"\0" not in begin and not begin.startswith((b"PK\x03\x04", b"\x89HDF", b"CDF"))
+    format_name = source.text_format()
+    if format_name is not None:
+        raise InputError(
+            f"{source} is {format_name}, whose numbers are no plain columns: export the trace as "
+            "text"
+        )
+    return not source.is_instrument_text and (source.is_utf16 or not source.holds_zero_bytes())
 
 
 def load_array(source: Source) -> Array:
@@ -317,7 +332,7 @@ def _table_of(source: Any, names: Sequence[int | str] | None) -> tuple[str, Tabl
     """Return name and columns of an array or a DataFrame; None for any other source."""
     if isinstance(source, np.ndarray | list | tuple):
         return "array", _columns_of("array", _numbers("array", source))
-    if not hasattr(source, "to_numpy"):
+    if not hasattr(source, "iloc"):  # which a DataFrame and a Series have
         return None
     if hasattr(source, "to_frame"):  # a Series is a column
         source = source.to_frame()
@@ -349,7 +364,8 @@ def _columns_of(name: str, values: Array, header: tuple[str, ...] = ()) -> Table
         shape = " × ".join(map(str, values.shape))
         raise InputError(f"{name} holds {shape} numbers: a trace has one column or two")
     lines = np.arange(1, columns.shape[1] + 1)
-    return Table(columns, header, (header,) if header else (), lines, " ", ".")
+    filled = tuple(range(len(columns)))
+    return Table(columns, filled, header, (header,) if header else (), lines, " ", ".")
 
 
 def _from_table(
@@ -358,31 +374,33 @@ def _from_table(
     unit: str | None,
     step: float | None,
     wanted: Sequence[Any] | None,
+    row: int | None,
     form: str,
 ) -> Trace:
-    columns, fields = table.columns, list(table.fields)
-    if wanted is not None:
-        if len(wanted) != 2 or not all(1 <= w <= len(columns) for w in wanted):
-            raise InputError(
-                f"{parameter('columns')} is {','.join(map(str, wanted))}: it must name two of the "
-                f"{len(columns)} columns of {name}, those of positions and heights, as in 1,2"
-            )
-        columns = columns[[w - 1 for w in wanted]]
-        fields = [tuple(row[w - 1] for w in wanted) for row in fields]
-    elif len(columns) > 2:
-        raise InputError(
-            f"{name} has {len(columns)} columns: give {parameter('columns')} X,Z, those of "
-            "positions and heights"
-        )
+    notes = [form]
+    if row is not None and wanted is None and len(table.filled) > 2:
+        columns = _row_of_map(name, table, row, notes)
+        fields: list[tuple[str, ...]] = []
+        lines = None
+    else:
+        columns, fields, lines = _chosen(name, table, wanted, notes)
+        columns, lines = _scan_line(name, columns, lines, row, notes)
     if columns.shape[1] < MIN_POINTS:
         raise InputError(f"{name} holds {columns.shape[1]} rows of numbers: at least {MIN_POINTS}")
     if columns.shape[1] > MAX_POINTS:
         raise InputError(f"{name} holds {columns.shape[1]} rows of numbers: at most {MAX_POINTS}")
-    notes = [form]
-    heights, gaps = _without_sentinels(columns[-1])
+    heights, gaps = without_codes(columns[-1])
     columns = np.vstack([columns[:-1], heights])
-    (x_unit, z_unit), given_by = _units(name, table, fields, unit, columns, step)
-    heights = heights * METRES[z_unit]
+    found = units_of_header(table.header, fields)
+    if len(columns) == 2 and found[0] is None and _counts_points(columns[0]):
+        first = [row[0] for row in fields]
+        step = _step_beside_count(name, table, first, unit, step)
+        if step is not None:
+            columns = columns[1:]
+            notes.append("the first column counts the points")
+    named = units_of_header((), fields)  # by the names of the columns, not by other lines
+    (x_unit, z_unit), given_by = _units(name, found, named, unit, columns, step)
+    column, heights = heights, heights * METRES[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
     if gaps:
@@ -392,17 +410,136 @@ def _from_table(
             raise InputError(
                 f"{parameter('step')} belongs to heights without positions: {name} has positions"
             )
-        heights, step, more = _even(name, columns[0] * METRES[x_unit], heights, table.lines)
+        heights, step, more = equal_steps(name, columns[0], METRES[x_unit], heights, lines)
         notes.extend(more)
-    elif step is None:
-        step = step_of_header(table.header, table.decimal)
+    else:
         if step is None:
-            raise InputError(
-                f"{name} has heights without positions, and its header states no step: "
-                f"give {parameter('step')}, as in 0.5um"
-            )
-        notes.append(f"step {length_text(step, 6)} (header)")
+            step = step_of_header(name, table.header, table.decimal)
+            if step is None:
+                raise InputError(
+                    f"{name} has heights without positions, and its header states no step with its "
+                    f"unit: give {parameter('step')}, as in 0.5um"
+                )
+            notes.append(f"step {length_text(step, 6)} (header)")
+        _refuse_length_on_top(name, column, step, lines)
     return _in_metres(Trace(heights, float(step), name, tuple(notes)))
+
+
+# ---------------------------------------------------------------------- columns and rows
+
+
+def _chosen(
+    name: str, table: Table, wanted: Sequence[Any] | None, notes: list[str]
+) -> tuple[Array, list[tuple[str, ...]], Array]:
+    """Return the columns of positions and heights, or of heights, their names, their lines."""
+    picked = list(table.filled)
+    if wanted is not None:
+        count = len(table.columns)
+        if len(wanted) not in (1, 2) or not all(1 <= w <= count for w in wanted):
+            raise InputError(
+                f"{parameter('columns')} is {','.join(map(str, wanted))}: it must name two of the "
+                f"{counted(count, 'column')} of {name}, those of positions and heights, as in 1,2, "
+                "or that of the heights alone"
+            )
+        picked = [w - 1 for w in wanted]
+    elif len(picked) > 2:
+        rows = f", or {parameter('row')} K, a row of a map" if len(picked) >= MIN_POINTS else ""
+        raise InputError(
+            f"{name} has {len(picked)} columns: give {parameter('columns')} X,Z, those of "
+            f"positions and heights{rows}"
+        )
+    columns = table.columns[picked]
+    if wanted is not None:
+        marked, told = invalid_rows(table.columns, table.fields, picked)
+        columns[-1, marked] = np.nan
+        notes.extend(told)
+    # Of columns of unequal length, those chosen end where they do.
+    kept = np.arange(columns.shape[1])
+    there = np.flatnonzero(np.isfinite(columns).any(axis=0))
+    if len(columns) == 2:
+        kept = there
+    elif wanted is not None and there.size:
+        kept = kept[there[0] : there[-1] + 1]
+    fields = [tuple(row[k] for k in picked) for row in table.fields]
+    return columns[:, kept], fields, table.lines[kept]
+
+
+def _row_of_map(name: str, table: Table, row: int, notes: list[str]) -> Array:
+    """Return a row of a text whose rows are those of a map."""
+    rows = table.columns.shape[1]
+    if not 0 <= row < rows:
+        raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {rows - 1}")
+    notes.append(f"row {row} of {rows}, of {len(table.filled)} heights each")
+    return table.columns[list(table.filled), row].reshape(1, -1)
+
+
+def _scan_line(
+    name: str, columns: Array, lines: Array, row: int | None, notes: list[str]
+) -> tuple[Array, Array]:
+    """Return one scan line, where the positions of a raster begin anew on each line."""
+    x = columns[0]
+    again = np.flatnonzero((x[1:] == x[0]) & (x[:-1] != x[0])) + 1
+    points = int(again[0]) if again.size and len(columns) == 2 else x.size
+    count = -(-x.size // points) if points else 1
+    is_raster = count > 1 and np.array_equal(x, np.tile(x[:points], count)[: x.size])
+    if row is None and is_raster:
+        raise InputError(
+            f"the positions of {name} begin anew on line {lines[points]}: it is a raster of "
+            f"{count} lines of {points} points, of which {parameter('row')} K takes one, 0 to "
+            f"{count - 1}"
+        )
+    if row is None:
+        return columns, lines
+    if not is_raster:
+        raise InputError(_no_map("row", row, name))
+    if not 0 <= row < count:
+        raise InputError(f"{parameter('row')} is {row}: {name} has the rows 0 to {count - 1}")
+    notes.append(f"row {row} of {count}, of {points} points each")
+    part = slice(row * points, (row + 1) * points)
+    return columns[:, part], lines[part]
+
+
+def _counts_points(x: Array) -> bool:
+    """Return whether a column is 0, 1, 2 … or 1, 2, 3 … in order."""
+    return bool(x.size and x[0] in (0, 1) and np.all(np.diff(x) == 1))
+
+
+def _step_beside_count(
+    name: str, table: Table, names: Sequence[str], unit: str | None, step: float | None
+) -> float | None:
+    """Return the step of heights beside a column that may count the points; None if it does not.
+
+    It does if it is named so, or a step is given by the option or the header.
+    """
+    if step is not None:
+        return step
+    stated = step_of_header(name, table.header, table.decimal)
+    is_named = any(field and _COUNTS.fullmatch(field) for field in names)
+    if stated is None and is_named:
+        raise InputError(
+            f"the first column of {name} counts the points: give {parameter('step')}, as in 0.5um"
+        )
+    if stated is not None and unit is not None and not is_named:
+        counted_as = METRES[parse_units(unit)[0]]
+        if abs(stated / counted_as - 1) > _SAME:
+            raise InputError(
+                f"the positions of {name} would have steps of {length_text(counted_as)}, and its "
+                f"header states {length_text(stated)}: give {parameter('step')}"
+            )
+    return stated
+
+
+def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | None) -> None:
+    """Refuse a step or a length that stands among the first heights, in whatever unit."""
+    for k, number in enumerate(column[:3]):
+        below = column.size - k - 1
+        for length in (step, below * step, (below - 1) * step):
+            if any(abs(number * size / length - 1) < _SAME for size in METRES.values()):
+                where = f"point {k + 1}" if lines is None else f"line {lines[k]}"
+                raise InputError(
+                    f"{where} of {name} is {number:g}, and the step or the length of the trace is "
+                    f"{length_text(length, 6)}: remove it from the heights"
+                )
 
 
 # ---------------------------------------------------------------------- units
@@ -410,23 +547,26 @@ def _from_table(
 
 def _units(
     name: str,
-    table: Table,
-    fields: Sequence[Sequence[str]],
+    found: list[str | None],
+    named: list[str | None],
     unit: str | None,
     columns: Array,
     step: float | None,
 ) -> tuple[tuple[str, str], str]:
-    found = units_of_header(table.header, fields)
-    found = [*found, *found][:2] if len(columns) == 1 else found
+    if len(columns) == 1:
+        found, named = [found[-1]] * 2, [named[-1]] * 2
     if unit is not None:
         given = parse_units(unit)
-        for kind, known, wanted in zip(("positions", "heights"), found, given, strict=True):
-            if known not in (None, wanted) and not (len(columns) == 1 and kind == "positions"):
+        told = parameter("unit")
+        for kind in range(2 - len(columns), 2):
+            if named[kind] not in (None, given[kind]):
                 raise InputError(
-                    f"{parameter('unit')} is {wanted} for the {kind}, and the header of {name} "
-                    f"has {known}: correct the wrong one"
+                    f"{parameter('unit')} is {given[kind]} for the {('positions', 'heights')[kind]}"
+                    f", and the header of {name} has {named[kind]}: correct the wrong one"
                 )
-        return given, parameter("unit")
+            if found[kind] not in (None, given[kind]):
+                told += f", against {found[kind]} in a line of the header"
+        return given, told
     if found[0] is not None and found[1] is not None:
         return (found[0], found[1]), "header"
     if found[0] is not None or found[1] is not None:
@@ -464,91 +604,16 @@ def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     return length <= _LONGEST_IN_METRES and length / (x.size - 1) <= _WIDEST_STEP_IN_METRES
 
 
-# ---------------------------------------------------------------------- gaps and steps
-
-
-def _without_sentinels(heights: Array) -> tuple[Array, str]:
-    """Replace numbers that stand for missing heights by NaN; return heights and a description."""
-    good = heights[np.isfinite(heights)]
-    for value in (good.min(), good.max()) if good.size else ():
-        others = good[good != value]
-        if others.size < 2:
-            continue
-        width = max(float(np.ptp(others)), 1e-300)
-        away = min(abs(value - others.min()), abs(value - others.max()))
-        times = int(np.sum(good == value))
-        known = _is_sentinel(float(value))
-        if away > (_BEYOND_KNOWN if known else _BEYOND) * width and (times >= 3 or known):
-            found = np.where(heights == value, np.nan, heights)
-            return (
-                found,
-                f"{counted(times, 'height')} of {value:g} taken as drop-outs: far out of the range",
-            )
-    return np.where(np.isfinite(heights), heights, np.nan), ""
-
-
-def _is_sentinel(value: float) -> bool:
-    return abs(value) >= 1e20 or any(abs(abs(value) - s) <= 1.0 for s in _SENTINELS)
-
-
-def _even(
-    name: str, x: Array, heights: Array, lines: Array | None
-) -> tuple[Array, float, list[str]]:
-    """Return heights at equal steps, the step in m, and a description of what was done."""
-    notes: list[str] = []
-    where = "point {} of {}" if lines is None else "line {} of {}"
-
-    def place(k: int) -> str:
-        return where.format(k if lines is None else int(lines[k]), name)
-
-    if not np.all(np.isfinite(x)):
-        raise InputError(f"{place(int(np.argmin(np.isfinite(x))))} has no position")
-    steps = np.diff(x)
-    if np.all(steps < 0):
-        x, heights, steps = x[::-1], heights[::-1], -steps[::-1]
-        notes.append("positions ran backwards: turned round")
-    elif np.any(steps <= 0):
-        back = int(np.argmax(steps <= 0)) + 1
-        word = "stand still" if steps[back - 1] == 0 else "turn back"
-        raise InputError(
-            f"the positions {word} at {place(back)}: they must rise or fall throughout"
-        )
-    middle = float(np.median(steps))
-    apart = np.rint(steps / middle).astype(int)
-    if apart.sum() > 4 * heights.size or apart.min() < 1:
-        far = int(np.argmax(np.abs(steps - middle)))
-        raise InputError(
-            f"the steps of the positions are unequal: {middle:.4g} m mostly, {steps[far]:.4g} m at "
-            f"{place(far + 1)}"
-        )
-    index = np.concatenate([[0], np.cumsum(apart)])
-    step = float((x[-1] - x[0]) / index[-1])
-    off = np.abs(x - x[0] - index * step)
-    if off.max() > _UNEVEN * step:
-        # Drift of the scanner: the number of steps is right, the positions are not.
-        if np.all(apart == 1) and np.abs(steps / step - 1).max() <= _UNEVEN:
-            even = np.linspace(x[0], x[-1], x.size)
-            notes.append(
-                f"unequal steps ({100 * np.abs(steps / step - 1).max():.1f} %) put on equal "
-                "ones, linearly"
-            )
-            return np.interp(even, x, heights), step, notes
-        far = int(np.argmax(off))
-        raise InputError(
-            f"the steps of the positions are unequal: {step:.4g} m on average, and "
-            f"{place(far)} is {off[far] / step:.2g} steps away from where it should be"
-        )
-    if index[-1] + 1 > x.size:
-        whole = np.full(index[-1] + 1, np.nan)
-        whole[index] = heights
-        notes.append(f"{counted(whole.size - x.size, 'position')} left out: taken as drop-outs")
-        heights = whole
-    return heights, step, notes
+def _slope(heights: Array, step: float) -> float:
+    """Return the median slope from point to point; 0 if no two neighbours are known."""
+    rises = np.abs(np.diff(heights))
+    known = rises[np.isfinite(rises)]
+    return float(np.median(known)) / step if known.size else 0.0
 
 
 def _in_metres(trace: Trace) -> Trace:
     """Refuse a trace so steep that the unit of one of its columns must be another."""
-    slope = float(np.nanmedian(np.abs(np.diff(trace.heights))) / trace.step)
+    slope = _slope(trace.heights, trace.step)
     if slope > _STEEPEST:
         raise InputError(
             f"{trace.source} would rise by {slope:.3g} times its step from point to point: are "

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import io
 import os
+import re
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -32,8 +34,19 @@ _DOCUMENTS = {
     b"GIF8": "a picture (GIF)",
 }
 _ZIP, _COMPOUND = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+_BOOK = "Workbook".encode("utf-16-le")
 _WORKBOOKS = frozenset((".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"))
 _BEGIN = 4096
+_BLOCK = 1 << 20
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+# Texts of instruments that the reader of their files knows, by their first signs.
+_INSTRUMENT_TEXT = re.compile(rb"[ab]ISO-1\.0|fileformat", re.IGNORECASE)
+# Those that no reader here knows.
+_OTHER_TEXTS = {
+    re.compile(rb"\s*ISO ?5436"): "a profile in the form of ISO 5436-2 (SMD)",
+    re.compile(rb"[ab](ISO|BCR)\s*-\s*\d"): "a variant of SDF (ISO 25178-71)",
+    re.compile(rb"DSAA\s"): "a grid of Surfer (DSAA)",
+}
 
 
 @dataclass(frozen=True)
@@ -63,6 +76,40 @@ class Source:
     def is_npy(self) -> bool:
         """Whether it is an array of NumPy, by its name or its first bytes."""
         return self.suffix == ".npy" or self.beginning().startswith(b"\x93NUMPY")
+
+    @property
+    def is_utf16(self) -> bool:
+        """Whether it begins with the mark of a text in UTF-16 or UTF-32."""
+        return self.beginning().startswith(_UTF16)
+
+    @property
+    def is_instrument_text(self) -> bool:
+        """Whether it is a text that the reader of instruments' files knows."""
+        begin = self.beginning()
+        if begin.startswith(_UTF16):
+            begin = begin[2:].replace(b"\0", b"")
+        return bool(_INSTRUMENT_TEXT.match(begin))
+
+    def text_format(self) -> str | None:
+        """Return the name of a text format that cannot be read, or None."""
+        begin = self.beginning().removeprefix(b"\xef\xbb\xbf")
+        if self.is_instrument_text:
+            return None
+        return next((name for known, name in _OTHER_TEXTS.items() if known.match(begin)), None)
+
+    def holds_zero_bytes(self) -> bool:
+        """Return whether there is a zero byte anywhere: a text has none.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read.
+        """
+        try:
+            with self.open() as stream:
+                return any(b"\0" in block for block in iter(lambda: stream.read(_BLOCK), b""))
+        except OSError as error:
+            raise InputError(f"cannot read {self}: {error.strerror or error}") from None
 
     def open(self) -> BinaryIO:
         """Open it to read (OSError)."""
@@ -120,15 +167,28 @@ class Source:
 
     def container(self) -> str | None:
         """Return a message for a workbook or an archive that is no instrument's file, else None."""
-        with self.open() as stream:
-            begin = stream.read(_BEGIN)
-        if begin.startswith((_ZIP, _COMPOUND)) and self.suffix in _WORKBOOKS:
-            return f"{self} is a workbook: save its columns as text (CSV)"
-        if begin.startswith(_ZIP) and self.suffix == ".npz":
+        begin = self.beginning()
+        if begin.startswith(_COMPOUND) and (self.suffix in _WORKBOOKS or _BOOK in self.read()):
+            return _of_workbook(self)
+        if not begin.startswith(_ZIP):
+            return None
+        try:
+            with self.open() as stream, zipfile.ZipFile(stream) as file:
+                names = file.namelist()
+        except (OSError, zipfile.BadZipFile):
+            names = []
+        if self.suffix in _WORKBOOKS or any(re.match(r"xl/|content\.xml", n) for n in names):
+            return _of_workbook(self)
+        if names and all(name.endswith(".npy") for name in names):
             return f"{self} is an archive of arrays: save the one of the heights as .npy"
-        if begin.startswith(_ZIP) and self.suffix == ".zip":
+        # Instruments write archives, too.
+        if self.suffix == ".zip" or (names and all(n.endswith((".csv", ".txt")) for n in names)):
             return f"{self} is an archive (zip): unpack it first (unzip {self})"
         return None
+
+
+def _of_workbook(source: Source) -> str:
+    return f"{source} is a workbook: save its columns as text (CSV)"
 
 
 def source_of(given: Any) -> Source:

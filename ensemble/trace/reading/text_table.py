@@ -1,35 +1,58 @@
-"""A text of one or two columns: its delimiter, its decimal sign, its header, its gaps."""
+"""Read a text of numbers in columns: its header, and one block of rows.
+
+A line of anything but numbers ends the block, and so does a comment. Numbers outside the block are
+refused: where they belong to cannot be known.
+"""
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from math import isfinite, isnan, nan
+from typing import NoReturn
 
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.trace.reading.missing_heights import may_be_code
+from adhesis.ensemble.trace.reading.printed_numbers import (
+    COMMENT,
+    DELIMITERS,
+    find_delimiter,
+    find_form,
+    flaw_of,
+    has_signs_of_thousands,
+    is_grouped,
+    is_missing,
+    looks_like_numbers,
+    printed_form,
+    shown_line,
+    split,
+    value,
+)
 from adhesis.ensemble.trace.reading.source import Source
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
 
-_ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with
+_ROWS_TO_BEGIN = 3  # rows of numbers that the numbers begin with, or one that is as long as a trace
+_LONG_ROW = 32
 _SAMPLE = 400  # lines that the form of a file is judged by
 _LONGEST_HEADER_LINE = 1000  # signs; names and units stand within, and searching more takes long
-_SHOWN = 60  # signs of a line that a message quotes
+# Numbers at each end that are held to all others; others that it needs; share of one printed form.
+_ENDS, _TO_JUDGE, _ONE_FORM = 3, 8, 0.95
 
-DELIMITERS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces", "|": "bars"}
-_COMMENT = "#%!*"
-_MISSING = frozenset(
-    ("", "nan", "-nan", "nan(ind)", "-1.#ind", "1.#qnan", "inf", "-inf", "+inf",
-     "bad", "n/a", "na", "#n/a", "null", "none", "nil", "invalid",
-     "missing", "nd", "overflow", "underflow", "x", "?")
-)  # fmt: skip
-_STARS = re.compile(r"[-*]+|#{2,}")  # as wide as the number that is missing
-_FIRST = re.compile(r"[+\-]?[.,]?\d[\d.,eEdD+\-]*")  # of a line: perhaps several, with commas
-_NUMBER = re.compile(r"[+\-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+\-]?\d+)?")
+_DIGIT = re.compile(r"[+\-]?[.,]?\d")
+# What people and programs write for the minus sign.
+_MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
+# Blanks that do not break a line mark thousands between digits.
+_THOUSANDS = re.compile(r"(?<=\d)[\u00a0\u2007\u2009\u202f](?=\d{3}(?!\d))")
+# Bytes that are no UTF-8. One between ASCII is a sign of Western Europe (µ, Å, ö); several in a row
+# may be a sign of any other code, and are none that is known.
+_FOREIGN = re.compile(rb"[\x80-\xff]{2,}")
+_UNKNOWN = b"\x81"  # which the code page leaves open
 # A name and its unit, in brackets or behind a stroke or "in"; what follows is the next name.
 _NAME_AND_UNIT = re.compile(
     r"[^(\[<{/]*?(?:\([^)]*\)|\[[^\]]*\]|<[^>]*>|\{[^}]*\}|\s*/\s*[^\W\d]+|\sin\s+[^\W\d]+)(?=[\s,]|$)[\s,]*"
@@ -44,6 +67,8 @@ class Table:
     ----------
     columns : array, shape (k, n)
         NaN where a number is missing.
+    filled : tuple of int
+        Columns that are not empty from top to bottom.
     header : tuple of str
         Lines before the numbers, without their comment signs.
     fields : tuple of tuple of str
@@ -54,6 +79,7 @@ class Table:
     """
 
     columns: Array
+    filled: tuple[int, ...]
     header: tuple[str, ...]
     fields: tuple[tuple[str, ...], ...]
     lines: Array
@@ -63,7 +89,7 @@ class Table:
     @property
     def form(self) -> str:
         """Description of how the numbers are written."""
-        count = len(self.columns)
+        count = len(self.filled)
         form = "one column" if count == 1 else f"{count} columns, {DELIMITERS[self.delimiter]}"
         return form + (", decimal commas" if self.decimal == "," else "")
 
@@ -74,8 +100,8 @@ def read_table(source: Source, delimiter: str | None = None, decimal: str | None
     Raises
     ------
     InputError
-        If the file cannot be read, is no text, holds no columns of numbers, or can be read in two
-        ways; the sentence says which line, and which option would settle it.
+        If the file cannot be read, is no text, holds no columns of numbers or several blocks of
+        them, or can be read in two ways; the sentence says which line, and what would settle it.
     """
     return _table(source, _lines(source), delimiter, decimal)
 
@@ -86,58 +112,17 @@ def read_column(source: Source, delimiter: str | None = None, decimal: str | Non
     Raises
     ------
     InputError
-        As :func:`read_table`, and if a number stands among the lines of the header.
+        As :func:`read_table`.
     """
     lines = _lines(source)
-    rows = [place for place, line in enumerate(lines) if _looks_like_numbers(line)]
+    rows = [place for place, line in enumerate(lines) if looks_like_numbers(line)]
     if len(rows) == 1:
         row = lines[rows[0]]
-        sign = delimiter or _delimiter(source, [row], decimal)
-        words = _split(row, sign)
+        words = split(row, delimiter or find_delimiter(source, [row], decimal))
         if len(words) > 1:
             lines[rows[0] : rows[0] + 1] = words
             delimiter = "|"  # none is left
-    table = _table(source, lines, delimiter, decimal)
-    for place, line in enumerate(lines[: int(table.lines[0]) - 1]):
-        if _looks_like_numbers(line) and _value(line, table.decimal) is not None:
-            raise InputError(
-                f"line {place + 1} of {source} is {_quoted(line)}, above the numbers that begin on "
-                f"line {table.lines[0]}: mark it with # if it is none of them"
-            )
-    return table
-
-
-def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
-    """Find header and columns in the lines of a file."""
-    sample = [line for line in lines if _looks_like_numbers(line)]
-    if not sample:
-        raise InputError(f"{source} holds no line of numbers")
-    spread = sample[:: max(1, len(sample) // _SAMPLE)]
-    delimiter, decimal = _form(source, spread, delimiter, decimal)
-    split = [_split(line, delimiter) if _looks_like_numbers(line) else None for line in lines]
-    count = Counter(len(row) for row in split if row is not None).most_common(1)[0][0]
-    start = _first_row(split, count, decimal)
-    if start is None and len(sample) < _ROWS_TO_BEGIN:
-        raise InputError(
-            f"{source} holds {counted(len(sample), 'row')} of numbers: at least {_ROWS_TO_BEGIN} "
-            "are needed"
-        )
-    if start is None:
-        raise InputError(f"{source} holds no rows of numbers of one length")
-    header = [
-        line[:_LONGEST_HEADER_LINE].strip().lstrip(_COMMENT).strip() for line in lines[:start]
-    ]
-    rows, places = _rows(source, lines, start, count, delimiter, decimal)
-    # Of one column, a line of the header is a name as a whole.
-    fields = [(line,) if count == 1 else _names(line, delimiter, count) for line in header]
-    return Table(
-        columns=np.array(rows).T.reshape(count, -1),
-        header=tuple(line for line in header if line),
-        fields=tuple(row for row in fields if len(row) == count),
-        lines=np.array(places),
-        delimiter=delimiter,
-        decimal=decimal,
-    )
+    return _table(source, lines, delimiter, decimal)
 
 
 def _lines(source: Source) -> list[str]:
@@ -149,195 +134,295 @@ def _lines(source: Source) -> list[str]:
     elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text = data.decode("utf-16", errors="replace")
     else:
-        if b"\0" in data:
-            raise InputError(
-                f"{source} is neither text nor an instrument format that can be read: it holds "
-                "zero bytes (UTF-16 without a mark is to be saved as UTF-8)"
-            )
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
-            text = data.decode("latin-1")  # one byte a sign: µ and Å are where they should be
-    return text.splitlines()
+            known = _FOREIGN.sub(lambda found: _UNKNOWN * len(found[0]), data)
+            text = known.decode("cp1252", errors="replace")
+    if not text.isascii():
+        # One sign for a unit (㎛) is written out, wide digits and blanks become plain ones.
+        text = _THOUSANDS.sub("’", text)
+        text = unicodedata.normalize("NFKC", text).translate(_MINUS)
+    return text.replace("\r\r\n", "\n").splitlines()
 
 
-def _quoted(line: str) -> str:
-    """A line of the file as a message shows it."""
-    line = line.strip()
-    return repr(line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…")
+# ---------------------------------------------------------------------- block
 
 
-# ---------------------------------------------------------------------- form
+@dataclass
+class _Row:
+    """A row of numbers; of a row of empty fields ``values`` holds NaN alone."""
+
+    fields: list[str]
+    values: list[float]
+
+    @property
+    def is_empty(self) -> bool:
+        return all(map(isnan, self.values))
 
 
-def _looks_like_numbers(line: str) -> bool:
-    """Whether a line begins as a row of numbers, or of numbers and gaps, does."""
-    begin = line.strip()
-    if not begin or begin[0] in _COMMENT:
-        return False
-    return bool(_FIRST.fullmatch(re.split(r"[;\t |]", begin, maxsplit=1)[0].strip('"')))
+@dataclass(frozen=True)
+class _Reader:
+    """What a line of a file holds, once delimiter and decimal sign are known."""
 
+    source: Source
+    lines: Sequence[str]
+    delimiter: str
+    decimal: str
+    count: int
 
-def _form(
-    source: Source, sample: Sequence[str], delimiter: str | None, decimal: str | None
-) -> tuple[str, str]:
-    """Delimiter and decimal sign, given or found out."""
-    if delimiter is None:
-        delimiter = _delimiter(source, sample, decimal)
-    if decimal is None:
-        rows = [field for line in sample for field in _split(line, delimiter)]
-        comma, point = any("," in f for f in rows), any("." in f for f in rows)
-        if comma and point:
-            raise InputError(
-                f"{source} has commas and points within its numbers: give "
-                f"{parameter('decimal')} and {parameter('delimiter')}, "
-                "and take signs of thousands out"
-            )
-        decimal = "," if comma else "."
-    return delimiter, decimal
-
-
-def _delimiter(source: Source, sample: Sequence[str], decimal: str | None) -> str:
-    def everywhere(sign: str) -> bool:
-        return sum(sign in line.strip() for line in sample) >= 0.8 * len(sample)
-
-    for sign in (";", "\t", "|"):
-        if everywhere(sign):
-            return sign
-    spaced = everywhere(" ")
-    if not everywhere(","):
-        return " "
-    if decimal == ",":
-        return " "
-    if any("." in line for line in sample) or any(re.search(r",\s", line) for line in sample):
-        return ","
-    if spaced:
-        return " "
-    commas = Counter(line.count(",") for line in sample).most_common(1)[0][0]
-    if commas == 1:
-        if any(re.search(r"[eE][+\-]?\d+\s*,", line) for line in sample):
-            return ","
-        return _one_comma(source, sample)
-    if commas == 3:
-        raise InputError(
-            f"{source} has rows such as {_quoted(sample[0])}, which can be two numbers or four: "
-            f"give {parameter('decimal')}"
+    def row(self, place: int) -> _Row | None:
+        """Return the row that a line holds; None for words, a comment, or too many fields."""
+        line = self.lines[place]
+        begin = line.strip()[:1]
+        if begin and begin in COMMENT and (begin == "#" or not is_missing(line.strip())):
+            return None
+        fields = split(line, self.delimiter) or [""]
+        while len(fields) > self.count and not fields[-1]:
+            fields.pop()
+        values = [value(field, self.decimal) for field in fields]
+        if len(fields) > self.count or None in values:
+            return None
+        lacking = self.count - len(fields)
+        return _Row(
+            fields + [""] * lacking, [nan if v is None else v for v in values] + [nan] * lacking
         )
-    return ","
+
+    def is_whole(self, place: int) -> bool:
+        """Return whether a line holds as many fields as there are columns."""
+        return len(split(self.lines[place], self.delimiter)) >= self.count
+
+    def may_be_row(self, place: int) -> bool:
+        """Return whether a line holds a row of numbers, or what may be a damaged one."""
+        row = self.row(place)
+        if row is not None:
+            return not row.is_empty
+        line = self.lines[place].strip()
+        if not line or line[0] in COMMENT:
+            return False
+        if self.count == 1:
+            return is_grouped(line) or (" " not in line and _DIGIT.match(line) is not None)
+        first = split(line, self.delimiter)[0]
+        number = value(first, self.decimal)
+        return (number is not None and not isnan(number)) or is_grouped(first)
 
 
-def _one_comma(source: Source, sample: Sequence[str]) -> str:
-    """Tell "12,345" as a decimal number from two whole ones."""
-    halves = [line.strip().split(",") for line in sample if line.count(",") == 1]
-    whole = [int(left) if re.fullmatch(r"[+\-]?\d+", left) else None for left, _ in halves]
-    steps = {b - a for a, b in pairwise(whole) if a is not None and b is not None}
-    if len(whole) > 3 and len(steps) == 1 and steps != {0}:
-        return ","
-    decimals = [right for _, right in halves]
-    if len({len(d) for d in decimals}) == 1 and len(decimals[0]) > 1:
-        return " "
-    if any(len(d) > 1 and d[0] == "0" for d in decimals):
-        return " "
-    raise InputError(
-        f"{source} has rows such as {_quoted(sample[0])}, which can be one number with a decimal "
-        f"comma or two: give {parameter('decimal')}"
+def _table(source: Source, lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
+    """Find header and columns in the lines of a file."""
+    sample = [line for line in lines if looks_like_numbers(line)]
+    if not sample:
+        raise InputError(f"{source} holds no line of numbers")
+    spread = sample[:: max(1, len(sample) // _SAMPLE)]
+    is_given = decimal is not None
+    delimiter, decimal = find_form(source, spread, delimiter, decimal)
+    count = Counter(len(split(line, delimiter)) for line in spread).most_common(1)[0][0]
+    reader = _Reader(source, lines, delimiter, decimal, count)
+    start = _first_row(reader)
+    if start is None:
+        _refuse_no_rows(reader, len(sample))
+    rows, places = _rows(reader, start)
+    _refuse_numbers_outside(reader, start, places[-1])
+    filled = tuple(k for k in range(count) if any(row.fields[k] for row in rows))
+    rows, places = _without_empty_rows(reader, rows, places, len(filled))
+    for k in filled:
+        column = [row.fields[k] for row in rows]
+        if not is_given and has_signs_of_thousands(column, decimal):
+            example = next(field for field in column if decimal in field)
+            raise InputError(
+                f"{source} has numbers such as {example!r} beside whole ones below 1000: take the "
+                f"signs of thousands out, or give {parameter('decimal')}"
+            )
+        if len(filled) == 1:
+            _refuse_odd_ends(source, column, [row.values[k] for row in rows], places)
+    header = [line[:_LONGEST_HEADER_LINE].strip().lstrip(COMMENT).strip() for line in lines[:start]]
+    # Of one column, a line of the header is a name as a whole.
+    names = [(line,) if count == 1 else _names(line, delimiter, count, filled) for line in header]
+    return Table(
+        columns=np.array([row.values for row in rows]).T.reshape(count, -1),
+        filled=filled,
+        header=tuple(line for line in header if line),
+        fields=tuple(row for row in names if len(row) == count and any(row)),
+        lines=np.array(places) + 1,
+        delimiter=delimiter,
+        decimal=decimal,
     )
 
 
-def _names(line: str, delimiter: str, count: int) -> tuple[str, ...]:
-    """Fields of a line of the header, which need not be set apart as the numbers are."""
-    fields = _split(line, delimiter, True)
-    for sign in DELIMITERS:
-        if len(fields) == count:
-            break
-        fields = _split(line, sign, True)
-    if len(fields) != count:
-        # "x (mm) h (um)": a name ends where its unit does.
-        named = _NAME_AND_UNIT.findall(line)
-        if "".join(named).split() == line.split():
-            fields = [field.strip(" ,") for field in named]
-    return tuple(fields)
-
-
-def _split(line: str, delimiter: str, header: bool = False) -> list[str]:
-    line = line.strip("\r\n ") if delimiter == "\t" else line.strip()
-    if delimiter == " ":
-        return (
-            re.split(r"\s{2,}|\t", line)
-            if header and re.search(r"\s{2}|\t", line)
-            else line.split()
-        )
-    fields = [field.strip() for field in line.split(delimiter)]
-    if len(fields) > 1 and fields[-1] == "" and not header and len(fields) > 2:
-        fields.pop()  # a delimiter at the end of each row
-    return fields
-
-
-# ---------------------------------------------------------------------- numbers
-
-
-def _is_missing(field: str) -> bool:
-    return field.lower() in _MISSING or bool(_STARS.fullmatch(field))
-
-
-def _value(field: str, decimal: str) -> float | None:
-    """Number of a field: NaN for a gap, None for a word."""
-    plain = field.strip().strip('"').strip()
-    if _is_missing(plain):
-        return float("nan")
-    if not _NUMBER.fullmatch(plain) or (decimal == "," and "." in plain):
-        return None
-    if decimal == "." and "," in plain:
-        return None
-    try:
-        return float(plain.replace(",", ".").replace("D", "e").replace("d", "e"))
-    except ValueError:
-        return None
-
-
-def _first_row(split: Sequence[list[str] | None], count: int, decimal: str) -> int | None:
-    """Line on which the rows begin: the first of three that hold so many numbers."""
-    found = []
-    for place, row in enumerate(split):
-        good = row is not None and len(row) == count
-        if good and row is not None and all(_value(field, decimal) is not None for field in row):
-            found.append(place)
-            if len(found) == _ROWS_TO_BEGIN:
-                return found[0]
-        elif row is not None or found:
+def _first_row(reader: _Reader) -> int | None:
+    """Return the line on which the rows begin: the first of three that are whole."""
+    found: list[int] = []
+    needed = 1 if reader.count >= _LONG_ROW else _ROWS_TO_BEGIN
+    for place in range(len(reader.lines)):
+        row = reader.row(place)
+        if row is None or (not row.is_empty and not reader.is_whole(place)):
             found = []
+        elif not row.is_empty or (found and reader.count == 1):
+            found.append(place)
+        if len(found) == needed:
+            return found[0]
     return None
 
 
-def _rows(
-    source: Source, lines: Sequence[str], start: int, count: int, delimiter: str, decimal: str
-) -> tuple[list[list[float]], list[int]]:
-    rows: list[list[float]] = []
+def _refuse_no_rows(reader: _Reader, numbers: int) -> NoReturn:
+    source = reader.source
+    for place, line in enumerate(reader.lines):
+        fields = split(line, reader.delimiter)
+        flaw = flaw_of(fields) if looks_like_numbers(line) and reader.row(place) is None else None
+        if flaw is not None:
+            raise InputError(f"line {place + 1} of {source} has {flaw}")
+    if numbers < _ROWS_TO_BEGIN:
+        raise InputError(
+            f"{source} holds {counted(numbers, 'row')} of numbers: at least {_ROWS_TO_BEGIN} are "
+            "needed"
+        )
+    example = next(place for place, line in enumerate(reader.lines) if looks_like_numbers(line))
+    raise InputError(
+        f"{source} holds no rows of numbers of one length: line {example + 1} is "
+        f"{shown_line(reader.lines[example])}"
+    )
+
+
+def _rows(reader: _Reader, start: int) -> tuple[list[_Row], list[int]]:
+    """Return the rows of the block, empty ones too, and their lines from 0."""
+    rows: list[_Row] = []
     places: list[int] = []
-    foreign: int | None = None
-    for place in range(start, len(lines)):
-        line = lines[place]
-        begin = line.strip()[:1]
-        if begin and begin in _COMMENT and (begin == "#" or not _is_missing(line.strip())):
-            continue
-        if not line.strip() and count > 1:
-            continue  # of one column, an empty line is a gap: it has its place
-        fields = _split(line, delimiter) or [""]
-        if len(fields) < count and _looks_like_numbers(line):
-            fields = fields + [""] * (count - len(fields))
-        values = [_value(field, decimal) for field in fields]
-        if len(fields) != count or None in values:
-            foreign = place if foreign is None else foreign
-            continue
-        if foreign is not None:
-            held = "one number" if count == 1 else f"{count} numbers"
+    is_blank = [not line.strip() for line in reader.lines]
+    for place in range(start, len(reader.lines)):
+        row = reader.row(place)
+        if row is None:
+            break
+        if reader.count == 1 and place > start and is_blank[place - 1] and is_blank[place]:
+            break  # one empty line is a missing height, two are the end of a block
+        lacks = not row.is_empty and not reader.is_whole(place)
+        if lacks and reader.delimiter == " " and reader.count > 2:
             raise InputError(
-                f"line {foreign + 1} of {source} is {_quoted(lines[foreign])}: it must hold "
-                f"{held}; remove the line or begin it with #"
+                f"line {place + 1} of {reader.source} is {shown_line(reader.lines[place])}: which "
+                f"of the {reader.count} columns are missing cannot be seen between spaces, so save "
+                "it with another delimiter"
             )
-        rows.append([float("nan") if v is None else v for v in values])
-        places.append(place + 1)
-    while count == 1 and rows and not lines[places[-1] - 1].strip():
+        rows.append(row)
+        places.append(place)
+    while rows[-1].is_empty:
         rows.pop()
         places.pop()
     return rows, places
+
+
+def _without_empty_rows(
+    reader: _Reader, rows: list[_Row], places: list[int], columns: int
+) -> tuple[list[_Row], list[int]]:
+    """Leave out empty rows; of one column they are gaps, which have their places."""
+    if columns > 1:
+        whole = [not row.is_empty for row in rows]
+    else:
+        blank = [not reader.lines[place].strip() for place in places]
+        # A text with double line ends has no gaps.
+        is_double = len(rows) > _TO_JUDGE and all(blank[1::2]) and not any(blank[::2])
+        whole = [not (is_double and k % 2) for k in range(len(rows))]
+    return (
+        [row for row, kept in zip(rows, whole, strict=True) if kept],
+        [place for place, kept in zip(places, whole, strict=True) if kept],
+    )
+
+
+def _refuse_numbers_outside(reader: _Reader, start: int, last: int) -> None:
+    """Refuse rows of numbers above the block and below it."""
+    source, lines = reader.source, reader.lines
+    touches = True  # nothing but empty rows has come in between
+    for place in range(start - 1, -1, -1):
+        row = reader.row(place)
+        if row is not None and row.is_empty:
+            continue
+        if reader.may_be_row(place) and (touches or (row is not None and reader.is_whole(place))):
+            raise InputError(
+                f"line {place + 1} of {source} is {shown_line(lines[place])}, above the numbers "
+                f"that begin on line {start + 1}: remove it if it is none of them, and correct it "
+                "if it is"
+            )
+        touches = False
+    for place in range(last + 1, len(lines)):
+        if reader.may_be_row(place):
+            words = (k for k in range(last + 1, place + 1) if reader.row(k) is None)
+            end = next(words, last + 1)
+            flaw = flaw_of(split(lines[end], reader.delimiter))
+            if flaw is not None and reader.may_be_row(end):
+                raise InputError(f"line {end + 1} of {source} has {flaw}")
+            held = "one number" if reader.count == 1 else f"{reader.count} numbers"
+            if end == last + 1 and reader.may_be_row(end):
+                raise InputError(
+                    f"line {end + 1} of {source} is {shown_line(lines[end])}: it must hold {held}, "
+                    "with an empty field for one that is missing"
+                )
+            raise InputError(
+                f"line {end + 1} of {source} is {shown_line(lines[end])}: it ends the rows of "
+                f"{held} on lines {start + 1} to {last + 1}, and more numbers follow on line "
+                f"{place + 1}; keep the rows of one trace in a file"
+            )
+
+
+def _refuse_odd_ends(
+    source: Source, column: Sequence[str], numbers: Sequence[float], places: Sequence[int]
+) -> None:
+    """Refuse counts, steps and checksums at the ends of a column of heights.
+
+    They are printed otherwise than all heights between, or the first one counts the others.
+    """
+
+    def judged(k: int) -> bool:  # noughts and codes of missing heights are written as they please
+        return isfinite(numbers[k]) and numbers[k] != 0 and not may_be_code(numbers[k])
+
+    n = len(column)
+    forms = [printed_form(column[k]) for k in range(_ENDS, n - _ENDS) if judged(k)]
+    usual, times = Counter(forms).most_common(1)[0] if forms else ((0, False), 0)
+    has_one_form = times >= _ONE_FORM * len(forms)
+    fewest = min((decimals for decimals, _ in forms), default=0)
+    for k in (*range(min(_ENDS, n)), *range(max(_ENDS, n - _ENDS), n)):
+        if len(forms) < _TO_JUDGE or not judged(k):
+            continue
+        form = printed_form(column[k])
+        # Of numbers whose trailing noughts are left out one has two decimals less by chance.
+        is_odd = form != usual if has_one_form else form[0] <= fewest - 2 and not form[1]
+        if is_odd or (k < _ENDS and numbers[k] == n - k - 1):
+            raise InputError(
+                f"line {places[k] + 1} of {source} is {column[k]!r}, at the end of a column of "
+                "heights: remove it if it is a count, a length, a step or a checksum; a height has "
+                "as many decimals as the others"
+            )
+
+
+# ---------------------------------------------------------------------- header
+
+
+def _names(line: str, delimiter: str, count: int, filled: Sequence[int]) -> tuple[str, ...]:
+    """Fields of a line of the header, which need not be set apart as the numbers are.
+
+    Parameters
+    ----------
+    line : str
+    delimiter : str
+        That of the numbers.
+    count : int
+        Number of columns, with those that are empty.
+    filled : sequence of int
+        Columns that are not empty.
+    """
+    fields = _split_names(line, delimiter)
+    while fields and not fields[-1]:
+        fields.pop()
+    if filled[-1] < len(fields) <= count:
+        return tuple(fields + [""] * (count - len(fields)))
+    for sign in DELIMITERS:
+        fields = _split_names(line, sign)
+        if len(fields) == count:
+            return tuple(fields)
+    # "x (mm) h (um)": a name ends where its unit does.
+    named = _NAME_AND_UNIT.findall(line)
+    if "".join(named).split() == line.split():
+        return tuple(field.strip(" ,") for field in named)
+    return ()
+
+
+def _split_names(line: str, delimiter: str) -> list[str]:
+    if delimiter == " " and '"' not in line and re.search(r"\s{2}|\t", line):
+        return re.split(r"\s{2,}|\t", line)
+    return split(line, delimiter)

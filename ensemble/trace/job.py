@@ -1,40 +1,19 @@
-"""Run loops for a parent process: jobs on stdin, messages on stdout, pickled.
-
-Started as ``python -m adhesis.ensemble.trace.worker``. It neither forks nor imports the caller's
-script, so it works from a notebook as well as from the command line.
-"""
+"""Compute one loop of a trace: a function of its job, returning its numbers."""
 
 from __future__ import annotations
 
 import math
-import os
-import pickle
-import signal
-import sys
-import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.ensemble.run.launch import end_with_parent
 from adhesis.solver.values import ByValue
 
 if TYPE_CHECKING:
     from adhesis.solver.registry import MethodName
-
-_SECONDS_BETWEEN_REPORTS = 1.0
-
-# Errors with which a loop may fail; any other is a fault of the program and ends the process.
-FAILURES = (RuntimeError, ValueError, ArithmeticError, MemoryError)
-
-
-def failure(error: Exception) -> str:
-    """Return the message of an error; where it is not written for users, with its class."""
-    from adhesis.solver.method import PathError
-
-    return str(error) if isinstance(error, PathError) else f"{type(error).__name__}: {error}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,29 +34,15 @@ class Job(ByValue):
     strength: float = math.inf
 
 
-def main() -> None:
-    """Run jobs until the parent closes the pipe."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at Ctrl-C the parent ends its workers
-    jobs, messages = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # prints go to stderr: stdout carries messages alone
+def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> dict[str, Any]:
+    """Run one loop and return its numbers, and its states as lists.
 
-    def send(kind: str, content: Any) -> None:
-        pickle.dump((kind, content), messages)
-        messages.flush()
-
-    while True:
-        try:
-            job: Job = pickle.load(jobs)
-        except EOFError:
-            return
-        try:
-            send("done", run(job, lambda branch, where: send("progress", (branch, where))))
-        except FAILURES as error:
-            send("failed", failure(error))
-
-
-def run(job: Job, report: Any = None) -> dict[str, Any]:
-    """Run one loop and return its numbers, and its states as lists."""
+    Parameters
+    ----------
+    job : Job
+    report : callable, optional
+        Called after each load step with the branch and the prescribed value that is reached.
+    """
     from adhesis.solver.loading.loop import run_loop
     from adhesis.solver.loading.loop_result import strain_warnings
     from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
@@ -88,13 +53,9 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     from adhesis.solver.model.profile import Profile
     from adhesis.solver.registry import make_method
 
-    last = time.monotonic()
-
     def progress(branch: Branch, penetration: float, state: ContactState) -> None:
-        nonlocal last
-        if report is not None and time.monotonic() - last > _SECONDS_BETWEEN_REPORTS:
-            last = time.monotonic()
-            report(branch, penetration)
+        if report is not None:
+            report((branch, penetration))
 
     profile = Profile(job.period, job.coefficients)
     half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
@@ -119,8 +80,3 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
         "waves": profile.highest_harmonic,
         "states": {name: values.tolist() for name, values in loop.columns().items()},
     }
-
-
-if __name__ == "__main__":
-    end_with_parent()
-    main()

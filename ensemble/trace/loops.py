@@ -1,0 +1,117 @@
+"""Run the loops of a trace side by side, by the hand-out that campaigns have."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+from adhesis.ensemble.run.attempt import Outcome, StopCheck
+from adhesis.ensemble.run.dispatch import Channel, Limits, Master, OwnWorker
+from adhesis.ensemble.run.processes import Processes, Work
+from adhesis.ensemble.run.schedule import Schedule
+from adhesis.ensemble.trace.job import Job, run
+
+Result = dict[str, Any]
+Watch = Callable[["Loops"], None]
+
+_REPORT_INTERVAL = 1.0  # s
+
+
+@dataclass(frozen=True)
+class _Computing:
+    """``compute`` of :mod:`adhesis.ensemble.run.dispatch`, for jobs."""
+
+    jobs: tuple[Job, ...]
+
+    def __call__(self, task: int, check: StopCheck) -> Result:
+        started = time.monotonic()
+        return run(
+            self.jobs[task],
+            lambda place: check((time.monotonic() - started, *place)),
+        )
+
+
+class Loops:
+    """Loops of a plan, begun in the order of their jobs.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    processes : int
+        Number of processes; 0 runs the jobs one after the other in this process.
+
+    Attributes
+    ----------
+    done : dict
+        Result by job name; the error text of a failed loop.
+    took : dict
+        Wall seconds by name of the finished jobs.
+    pids : list of int
+        Ids of the processes.
+    """
+
+    def __init__(self, jobs: Sequence[Job], processes: int) -> None:
+        self._jobs = tuple(jobs)
+        self.processes = min(processes, len(self._jobs))
+        self.done: dict[str, Result | str] = {}
+        self.took: dict[str, float] = {}
+        self.pids: list[int] = []
+        self._master: Master | None = None
+
+    @property
+    def running(self) -> dict[str, tuple[float, str, float]]:
+        """By job name: seconds so far, and the branch and prescribed value reached."""
+        if self._master is None:
+            return {}
+        notes = self._master.notes
+        return {self._jobs[k].name: note or (0.0, "loading", 0.0) for k, note in notes.items()}
+
+    @property
+    def waiting(self) -> list[str]:
+        """Names of the jobs that are not begun."""
+        running = self.running
+        return [j.name for j in self._jobs if j.name not in self.done and j.name not in running]
+
+    def run(
+        self, watch: Watch | None = None, every: float = _REPORT_INTERVAL
+    ) -> dict[str, Result | str]:
+        """Run all jobs; ``watch`` is called at this interval (s), and when a loop is done."""
+        computing, last = _Computing(self._jobs), -math.inf
+
+        def tick() -> None:
+            nonlocal last
+            if watch is not None and time.monotonic() - last >= every:
+                last = time.monotonic()
+                watch(self)
+
+        def collect(outcome: Outcome) -> None:
+            nonlocal last
+            name = self._jobs[outcome.task].name
+            self.took[name] = outcome.seconds
+            # the solver's own errors are written for users, without their class
+            failure = (outcome.error or "").removeprefix("PathError: ")
+            self.done[name] = failure or outcome.result
+            last = -math.inf
+            tick()
+
+        limits = Limits(report_interval=every)
+        with ExitStack() as stack:
+            channel: Channel
+            if self.processes == 0:
+                channel = OwnWorker(computing, lambda outcome: outcome, limits)
+            else:
+                channel = started = Processes(
+                    self.processes, Work(computing, report_interval=every)
+                )
+                stack.enter_context(started)
+                self.pids = started.pids
+            tasks = range(len(self._jobs))
+            groups = {task: task for task in tasks}
+            schedule = Schedule(tasks, groups, dict.fromkeys(tasks, 1.0), round_of=groups)
+            self._master = Master(channel, schedule, groups, collect, limits, tick)
+            self._master.run()
+        return self.done

@@ -1,0 +1,204 @@
+"""Put heights at given positions on equal steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.lengths import length_text
+from adhesis.solver.checks import counted
+from adhesis.solver.model.profile import Array
+
+# Positions may scatter about equal steps by this share of a step; heights are then interpolated.
+_UNEVEN = 0.10
+# Positions that are printed in whole multiples of a digit may be rounded: at least so many of their
+# steps differ from the others (one or two are rows left out), the step is at least this share of a
+# digit, and its bounds lie within this share of it.
+_IRREGULAR, _FINEST, _SURE = 3, 0.1, 0.02
+_DIGITS = range(-6, 16)  # decimals that are looked for
+
+
+def equal_steps(
+    name: str, x: Array, metres: float, heights: Array, lines: Array | None
+) -> tuple[Array, float, list[str]]:
+    """Return heights at equal steps, the step in m, and a description of what was done.
+
+    Parameters
+    ----------
+    name : str
+        Of the source, in messages.
+    x : array, shape (n,)
+        Positions, in their unit.
+    metres : float
+        Size of that unit in m.
+    heights : array, shape (n,)
+        In m.
+    lines : int array, shape (n,), or None
+        Line of the file that each row stands on.
+
+    Raises
+    ------
+    InputError
+        If a position is missing, or they turn back, stand still or have unequal steps.
+    """
+    notes: list[str] = []
+
+    def place(k: int) -> str:
+        return f"point {k} of {name}" if lines is None else f"line {int(lines[k])} of {name}"
+
+    if not np.all(np.isfinite(x)):
+        raise InputError(f"{place(int(np.argmin(np.isfinite(x))))} has no position")
+    if np.all(np.diff(x) <= 0):
+        x, heights = x[::-1], heights[::-1]
+        lines = None if lines is None else lines[::-1]
+        notes.append("positions ran backwards: turned round")
+    rounded = _step_of_rounded(x)
+    if rounded is not None:
+        step, digit = rounded
+        notes.append(
+            f"positions rounded to {length_text(digit * metres)}: equal steps of "
+            f"{length_text(step * metres, 5)}"
+        )
+        return heights, step * metres, notes
+    _refuse_turns(x, place)
+    return _on_grid(x * metres, heights, place, notes)
+
+
+def _refuse_turns(x: Array, place: Callable[[int], str]) -> None:
+    steps = np.diff(x)
+    if np.any(steps <= 0):
+        back = int(np.argmax(steps <= 0)) + 1
+        word = "stand still" if steps[back - 1] == 0 else "turn back"
+        raise InputError(
+            f"the positions {word} at {place(back)}: they must rise or fall throughout"
+        )
+
+
+def _on_grid(
+    x: Array, heights: Array, place: Callable[[int], str], notes: list[str]
+) -> tuple[Array, float, list[str]]:
+    """Return heights on the grid that their positions in m lie on, some of them left out."""
+    steps = np.diff(x)
+    middle = float(np.median(steps))
+    apart = np.rint(steps / middle).astype(int)
+    if apart.sum() > 4 * heights.size or apart.min() < 1:
+        far = int(np.argmax(np.abs(steps - middle)))
+        raise InputError(
+            f"the steps of the positions are unequal: {middle:.4g} m mostly, {steps[far]:.4g} m at "
+            f"{place(far + 1)}"
+        )
+    index = np.concatenate([[0], np.cumsum(apart)])
+    step = float((x[-1] - x[0]) / index[-1])
+    off = np.abs(x - x[0] - index * step)
+    if off.max() > _UNEVEN * step:
+        # Drift of the scanner: the number of steps is right, the positions are not.
+        if np.all(apart == 1) and np.abs(steps / step - 1).max() <= _UNEVEN:
+            even = np.linspace(x[0], x[-1], x.size)
+            notes.append(
+                f"unequal steps ({100 * np.abs(steps / step - 1).max():.1f} %) put on equal "
+                "ones, linearly"
+            )
+            return np.interp(even, x, heights), step, notes
+        far = int(np.argmax(off))
+        raise InputError(
+            f"the steps of the positions are unequal: {step:.4g} m on average, and "
+            f"{place(far)} is {off[far] / step:.2g} steps away from where it should be"
+        )
+    if index[-1] + 1 > x.size:
+        whole = np.full(index[-1] + 1, np.nan)
+        whole[index] = heights
+        notes.append(f"{counted(whole.size - x.size, 'position')} left out: taken as drop-outs")
+        heights = whole
+    return heights, step, notes
+
+
+# ---------------------------------------------------------------------- positions rounded in print
+
+
+def _step_of_rounded(x: Array) -> tuple[float, float] | None:
+    """Return step and digit of equal steps that are rounded in print; None for other positions.
+
+    Every position lies within half a digit of a grid of as many points, and the steps alternate in
+    a way that this explains.
+    """
+    digit = _printed_digit(x)
+    steps = np.diff(x)
+    if digit is None or np.any(steps < 0):
+        return None
+    middle = float(np.median(steps))
+    if np.sum(np.abs(steps - middle) > max(digit / 2, _UNEVEN * middle)) < _IRREGULAR:
+        return None
+    k = np.arange(x.size)
+    allowed = digit * (1 + 1e-6)
+
+    def spread(step: float) -> float:
+        return float(np.ptp(x - step * k))
+
+    low, high = (float(x[-1] - x[0] + sign * digit) / k[-1] for sign in (-1, 1))
+    best = _lowest(spread, low, high)
+    if spread(best) > allowed:
+        return None
+    first = _edge(spread, allowed, best, low)
+    last = _edge(spread, allowed, best, high)
+    step = _roundest(first, last)
+    if step < _FINEST * digit:
+        return None
+    if last - first > _SURE * step:
+        raise InputError(
+            f"the positions are rounded to steps of {digit:g}, which leaves their distance open "
+            f"between {first:.4g} and {last:.4g}: give {parameter('columns')} Z, that of the "
+            f"heights alone, and {parameter('step')}"
+        )
+    return step, digit
+
+
+def _printed_digit(x: Array) -> float | None:
+    """Return the largest power of ten that all numbers are whole multiples of."""
+    for decimals in _DIGITS:
+        multiples = x * 10.0**decimals
+        whole = np.rint(multiples)
+        if whole.any() and np.all(np.abs(multiples - whole) <= 1e-6):
+            return float(10.0**-decimals)
+    return None
+
+
+def _lowest(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a convex function is lowest, by a golden section."""
+    ratio = (np.sqrt(5) - 1) / 2
+    left, right = high - ratio * (high - low), low + ratio * (high - low)
+    at_left, at_right = function(left), function(right)
+    for _ in range(60):
+        if at_left < at_right:
+            high, right, at_right = right, left, at_left
+            left = high - ratio * (high - low)
+            at_left = function(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + ratio * (high - low)
+            at_right = function(right)
+    return float(left if at_left < at_right else right)
+
+
+def _edge(function: Callable[[float], float], allowed: float, inside: float, end: float) -> float:
+    """Return how far from a value inside towards an end a convex function is allowed."""
+    if function(end) <= allowed:
+        return end
+    for _ in range(50):
+        middle = (inside + end) / 2
+        if function(middle) <= allowed:
+            inside = middle
+        else:
+            end = middle
+    return inside
+
+
+def _roundest(low: float, high: float) -> float:
+    """Return the number between two that has the fewest decimals."""
+    for decimals in _DIGITS:
+        whole = np.rint((low + high) / 2 * 10.0**decimals)
+        for number in (whole, np.ceil(low * 10.0**decimals)):
+            if low * 10.0**decimals <= number <= high * 10.0**decimals:
+                return float(f"{number * 10.0**-decimals:.15g}")
+    return (low + high) / 2

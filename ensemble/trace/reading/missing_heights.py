@@ -1,0 +1,98 @@
+"""Find missing heights: numbers that instruments write for them, and rows that a column marks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from adhesis.solver.checks import counted
+from adhesis.solver.model.profile import Array
+
+# A height that lies this many ranges of all usual heights outside them, and is repeated, stands for
+# a missing one. For numbers that instruments are known to write the second value holds, and once is
+# enough.
+_BEYOND, _BEYOND_KNOWN = 5.0, 0.2
+_REPEATED = 3
+_CODES = (9999, 99999, 999999, 9999999, 32767, 32768, 65535, 2147483647, 2147483648)
+_ENORMOUS = 1e20
+_NINES = re.compile(r"-?9{2,}\.?9+")
+_VALID = re.compile(r"\W*(valid|validity|is[ _]?valid|gültig)\b", re.IGNORECASE)
+
+
+def may_be_code(value: float) -> bool:
+    """Return whether a number may stand for a missing height: a known code, or nines alone."""
+    return is_known_code(value) or bool(_NINES.fullmatch(f"{value:g}"))
+
+
+def is_known_code(value: float) -> bool:
+    """Return whether instruments write this number for a missing height."""
+    return abs(value) >= _ENORMOUS or any(abs(abs(value) - code) <= 1.0 for code in _CODES)
+
+
+def without_codes(heights: Array) -> tuple[Array, str]:
+    """Replace numbers that stand for missing heights by NaN; return heights and a description."""
+    heights = np.where(np.isfinite(heights), heights, np.nan)
+    values, times = np.unique(heights[np.isfinite(heights)], return_counts=True)
+    known = np.array([is_known_code(value) for value in values], dtype=bool)
+    nines = np.array([bool(_NINES.fullmatch(f"{value:g}")) for value in values], dtype=bool)
+    repeated = times >= _REPEATED
+    on_both_sides = np.isin(-values, values)
+    likely = known | (nines & (repeated | on_both_sides))
+    if (~likely).sum() < 2:
+        return heights, ""
+    low, high = _usual(values[~likely])
+    away = np.maximum(low - values, values - high)
+    far = (away > _BEYOND * (high - low)) & (repeated | nines | on_both_sides)
+    # Where hardly a height occurs twice, nines that do stand for no height even within the range.
+    are_single = float(np.median(times)) == 1.0
+    codes = far | (likely & (away > _BEYOND_KNOWN * (high - low)))
+    codes |= nines & repeated & are_single
+    codes |= nines & np.isin(-values, values[codes])
+    if not codes.any():
+        return heights, ""
+    shown = ", ".join(f"{value:.10g}" for value in values[codes][:4])
+    return (
+        np.where(np.isin(heights, values[codes]), np.nan, heights),
+        f"{counted(int(times[codes].sum()), 'height')} of {shown} taken as drop-outs",
+    )
+
+
+def _usual(values: Array) -> tuple[float, float]:
+    """Return the range of the usual ones of different heights, in ascending order.
+
+    It grows from the middle half of them, as long as more lie within _BEYOND times its width.
+    """
+    low, high = (float(values[int(part * (values.size - 1))]) for part in (0.25, 0.75))
+    if low == high:
+        return float(values[0]), float(values[-1])
+    while True:
+        reach = _BEYOND * (high - low)
+        inside = values[(values >= low - reach) & (values <= high + reach)]
+        if inside[0] == low and inside[-1] == high:
+            return low, high
+        low, high = float(inside[0]), float(inside[-1])
+
+
+def invalid_rows(
+    columns: Array, fields: Sequence[Sequence[str]], chosen: Sequence[int]
+) -> tuple[Array, list[str]]:
+    """Return which rows a column named "valid" marks with nought, and descriptions.
+
+    Other columns beside the chosen ones that hold noughts and ones are described.
+    """
+    marked = np.zeros(columns.shape[1], dtype=bool)
+    notes = []
+    for k, column in enumerate(columns):
+        if k in chosen or set(np.unique(column)) != {0.0, 1.0}:
+            continue
+        names = [row[k] for row in fields if row[k]]
+        name = f"column {k + 1} ({names[0]})" if names else f"column {k + 1}"
+        if any(_VALID.match(text) for text in names):
+            marked |= column == 0
+            count = counted(int((column == 0).sum()), "height")
+            notes.append(f"{count} marked 0 in {name} taken as drop-outs")
+        else:
+            notes.append(f"{name} holds 0 and 1 alone: it is not used")
+    return marked, notes

@@ -1,0 +1,455 @@
+"""Texts as instruments, spreadsheets and people write them: read as meant, or refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.heights import read_heights
+from adhesis.ensemble.trace.prepare import prepare_trace
+from adhesis.ensemble.trace.reading import instrument
+from adhesis.ensemble.trace.reading.header_units import step_of_header
+from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
+from adhesis.solver import checks
+from adhesis.solver.model.problem import Problem
+from tests.support.campaign_support import campaign_text
+
+N, STEP = 400, 0.5e-6
+PLACE = np.arange(N)
+XS = [f"{0.5 * k:.3f}" for k in PLACE]
+ZS = [f"{z:.6f}" for z in 0.5 * np.sin(PLACE / 9) + 0.2 * np.cos(PLACE / 2.3)]
+Z = 1e-6 * np.array(ZS, dtype=float)
+PAIRS = list(zip(XS, ZS, strict=True))
+UM = "x (um),z (um)"
+TWO = [f"{x},{z}" for x, z in PAIRS]
+
+
+def with_codes(codes: dict[int, str]) -> list[str]:
+    """Rows of two columns, with other heights at some points."""
+    return [f"{x},{codes.get(k, z)}" for k, (x, z) in enumerate(PAIRS)]
+
+
+def commas(lines: Iterable[str]) -> list[str]:
+    return [line.replace(",", ";").replace(".", ",") for line in lines]
+
+
+def grouped(sign: str) -> list[str]:
+    """Rows in nm whose positions have signs of thousands."""
+    return [f"{500 * k:,};{1e3 * float(z):.3f}".replace(",", sign) for k, z in enumerate(ZS)]
+
+
+def put(path: Path, text: str | Iterable[str] | bytes, encoding: str = "utf-8") -> Path:
+    if not isinstance(text, str | bytes):
+        text = "\n".join([*text, ""])
+    path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+    return path
+
+
+Options = dict[str, object]
+READ: dict[str, tuple[str | list[str] | bytes, Options]] = {
+    "a sampling length above the step": (
+        ["Sampling length: 0.8 mm", "Pitch: 0.5 um", "Z (um)", *ZS],
+        {},
+    ),
+    "a height of a step": (["Step height: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}),
+    "a mean spacing": (["RSm (mean spacing): 21.4 um", "dx = 0.5 um", "Z (um)", *ZS], {}),
+    "a pitch of the rows": (["Pitch Y: 5 um", "Pitch X: 0.5 um", "Z (um)", *ZS], {}),
+    "a cut-off": (["Z (um)", "Cut-off (mm): 0.8", "Step (um): 0.5", *ZS], {}),
+    "quoted": (['"x (um)","z (um)"', *(f'"{x}","{z}"' for x, z in PAIRS)], {}),
+    "a quoted column": ([UM, *(f'"{x}",{z}' for x, z in PAIRS)], {}),
+    "quoted, decimal commas": (
+        [UM, *(f'"{x}","{z}"'.replace(".", ",") for x, z in PAIRS)],
+        {},
+    ),
+    "quoted names with delimiters": (['"x, along (um)","z, up (um)"', *TWO], {}),
+    "CR CR LF": ("\r\r\n".join([UM, *TWO, ""]), {}),
+    "a blank line after each row": ([UM, "", *(f"{row}\n" for row in TWO)], {}),
+    "a blank line after each height": (["dx: 0.5 um", "z (um)", "", *(f"{z}\n" for z in ZS)], {}),
+    "a blank line after two rows": ([UM, *(r + k % 2 * "\n" for k, r in enumerate(TWO))], {}),
+    "rows of empty fields between": (["x (um)\tz (um)", *(f"\t\n{x}\t{z}" for x, z in PAIRS)], {}),
+    "rows of empty fields below": ([UM, *TWO, *[","] * 5], {}),
+    "rows of empty fields within": ([UM, *TWO[:50], ",", ",", *TWO[50:]], {}),
+    "empty columns": (["Lateral um,Height um,", *(f"{row},," for row in TWO)], {}),
+    "an empty column before": ([f",{UM}", *(f",{row}" for row in TWO)], {}),
+    "a first column that counts": (
+        ["Pitch: 0.5 um", "No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
+        {},
+    ),
+    "a count and an interval in quotes": (
+        [
+            '"Measurement data interval","0.5","um"',
+            '"No.","Height (um)"',
+            *(f'"{k}","{z}"' for k, z in enumerate(ZS, 1)),
+        ],
+        {},
+    ),
+    "a lone column": (
+        ["No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
+        {"columns": [2], "step": STEP},
+    ),
+    "signs for units": (["x (㎛),z (㎛)", *TWO], {}),
+    "signs for other units": (
+        ["x (㎜);z (㎚)", *(f"{float(x) / 1e3:.6f};{1e3 * float(z):.3f}" for x, z in PAIRS)],
+        {},
+    ),
+    "names with numbers": (["X1 (um),Z1 (um)", *TWO], {}),
+    "names with a delimiter behind": (["x [um],z [um],", *(f"{row}," for row in TWO)], {}),
+    "a minus sign of typesetters": ([UM, *(row.replace("-", "\u2212") for row in TWO)], {}),
+    "a column that marks": (
+        ["X;Z;valid", "[um];[um];[1/0]", *(f"{row.replace(',', ';')};1" for row in TWO)],
+        {"columns": [1, 2]},
+    ),
+    "a row of a map": (
+        ["# Value units: um", "\t".join(ZS[::-1]), "\t".join(ZS), "\t".join(ZS[::-1])],
+        {"row": 1, "step": STEP},
+    ),
+    "a line of a raster": (
+        [f"{XS[k]},{y},{zs[k]}" for y, zs in enumerate((ZS[::-1], ZS)) for k in range(N)],
+        {"unit": "um", "columns": [1, 3], "row": 1},
+    ),
+    "Korean, with a unit": ("\n".join(["위(㎛),높이(㎛)", *TWO]).encode("cp949"), {"unit": "um"}),
+    "an option against a line that names no column": (
+        ["Evaluation length in mm", *TWO],
+        {"unit": "um"},
+    ),
+    "Latin-1": ("\n".join(["Höhe x [µm],z [µm]", *TWO]).encode("latin-1"), {}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_what_is_meant_is_read(kind: str, tmp_path: Path) -> None:
+    text, options = READ[kind]
+    trace = read_trace(put(tmp_path / "t.txt", text), **options)  # type: ignore[arg-type]
+    assert trace.points == N
+    assert trace.step == pytest.approx(STEP, rel=1e-9)
+    np.testing.assert_allclose(trace.heights, Z, rtol=0, atol=1e-15)
+
+
+def test_inches_and_their_parts_are_units(tmp_path: Path) -> None:
+    for names, per_x, per_z in (
+        ("X (in),Z (uin)", 25.4e-3, 25.4e-9),
+        ("x (mil),z (µin)", 25.4e-6, 25.4e-9),
+    ):
+        rows = [f"{STEP * k / per_x:.9f},{z / per_z:.6f}" for k, z in enumerate(Z)]
+        trace = read_trace(put(tmp_path / "t.csv", [names, *rows]))
+        assert trace.step == pytest.approx(STEP, rel=1e-5)
+        np.testing.assert_allclose(trace.heights, Z, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("codes", "missing"),
+    [
+        ({50: "-99.99", 51: "-99.99", 52: "-99.99", 200: "99.99", 201: "99.99", 202: "99.99"}, 6),
+        ({50: "-99999.9999", 90: "-99999.9998", 130: "-99999.9997", 131: "-99999.9996"}, 4),
+        ({50: "-9999", 51: "-9999", 200: "9999", 201: "9999"}, 4),
+        ({50: "-32768", 200: "32767"}, 2),
+        ({50: "12.5", 51: "12.5", 52: "12.5", 200: "-13.5", 201: "-13.5", 202: "-13.5"}, 6),
+        ({50: "-9.99", 200: "9.99"}, 2),
+        ({50: "12.5", 200: "-13.5"}, 0),  # two grains of dust are no codes
+    ],
+)
+def test_all_codes_of_missing_heights_are_drop_outs(
+    codes: dict[int, str], missing: int, tmp_path: Path
+) -> None:
+    trace = read_trace(put(tmp_path / "t.csv", [UM, *with_codes(codes)]))
+    gaps = np.flatnonzero(np.isnan(trace.heights)).tolist()
+    assert gaps == (list(codes) if missing else [])
+    assert any(f"{missing} heights of" in note for note in trace.notes) == (missing > 0)
+
+
+def test_rows_that_a_column_marks_are_drop_outs_and_a_refusal_says_so(tmp_path: Path) -> None:
+    def rows(marked: range) -> list[str]:
+        return [
+            "x (um),z (um),valid",
+            *(f"{row},{int(k not in marked)}" for k, row in enumerate(TWO)),
+        ]
+
+    trace = read_trace(put(tmp_path / "t.csv", rows(range(40, 43))), columns=[1, 2])
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [40, 41, 42]
+    other = [row.replace("valid", "flag") for row in rows(range(40, 43))]
+    trace = read_trace(put(tmp_path / "t.csv", other), columns=[1, 2])
+    assert "column 3 (flag) holds 0 and 1 alone: it is not used" in trace.notes
+    long = read_trace(put(tmp_path / "t.csv", rows(range(40, 100))), columns=[1, 2])
+    with pytest.raises(
+        InputError, match=r"gap of 30\.5 µm .*; 60 heights marked 0 in column 3 \(va"
+    ):
+        prepare_trace(long)
+
+
+@pytest.mark.parametrize(
+    ("step", "decimals"), [(0.156, 1), (0.25, 0), (1.08, 0), (0.37, 0), (3.3, 0)]
+)
+def test_positions_that_are_rounded_in_print_have_equal_steps(
+    step: float, decimals: int, tmp_path: Path
+) -> None:
+    rows = [f"{step * k:.{decimals}f},{z}" for k, z in enumerate(ZS)]
+    for lines in (rows, rows[::-1]):
+        trace = read_trace(put(tmp_path / "t.csv", [UM, *lines]))
+        assert trace.points == N
+        assert trace.step == pytest.approx(1e-6 * step, rel=1e-9)
+        assert any("positions rounded to" in note for note in trace.notes)
+        assert trace.drop_outs == 0
+
+
+def test_a_row_left_out_between_whole_positions_is_a_gap(tmp_path: Path) -> None:
+    """One longer step is a row that is left out; a step of 1.0025 would explain it as well."""
+    rows = [f"{k},{z}" for k, z in enumerate(ZS)]
+    trace = read_trace(put(tmp_path / "t.csv", [UM, *rows[:200], *rows[201:]]))
+    assert np.flatnonzero(np.isnan(trace.heights)).tolist() == [200]
+    assert trace.step == pytest.approx(1e-6)
+
+
+SMD = [
+    "ISO 5436-2:2012 s1", "PRF 1 ISO5436", "CX I 400 mm 1.0e0 D 5.00000e-04",
+    "CZ A 400 um 1.0e0 D", "\x03", "DATE: 01-Feb-2020", "\x03", *ZS, "\x03", "34582", "\x03",
+]  # fmt: skip
+SDF = ["NumPoints = 400", "Xscale = 5e-07", "Zscale = 1e-6", "*", *ZS, "*", "UserComment = x", "*"]
+BLOCK = ["Roughness profile (um)", *ZS]
+Z_UM: Options = {"unit": "um", "step": STEP}
+REFUSED: dict[str, tuple[str | list[str] | bytes, Options, str]] = {
+    "two steps": (["Step: 9 nm", "Spacing: 0.5 um", "Z (um)", *ZS], {}, "9 nm and 500 nm: give"),
+    "a sampling length": (["Sampling length: 0.8 mm", "Z (um)", *ZS], {}, "states no step with"),
+    "names of two tables": ([UM, "Lc (mm),Ls (um)", *TWO], {}, "unit of the heights alone"),
+    "another unit": (["Stylus travel in mm", "Data", *ZS], {"step": STEP}, "states no unit"),
+    "a speed": (["Step: 0.5 mm/s", "Z (um)", *ZS], {}, "states no step with its unit"),
+    "a count on top": (["400", *ZS], Z_UM, "line 1 of .* is '400', at the end of a column"),
+    "a step on top": (["0.500", *ZS], Z_UM, r"line 1 of .* is '0\.500', at the end of a column"),
+    "a step on top, printed alike": (["0.500000", *ZS], Z_UM, "line 1 .* the step or the length"),
+    "a length on top, in mm": (["0.199500", *ZS], Z_UM, "line 1 .* the step or the length"),
+    "a length and a count on top": (["199.5", "400", *ZS], Z_UM, r"line 1 of .* is '199\.5'"),
+    "a checksum below": ([*ZS, "34582"], Z_UM, "line 401 of .* is '34582'"),
+    "a count on top of positions": (["400", *TWO], {"unit": "um"}, "line 1 of .* is '400', above"),
+    "two blocks": (["Step: 0.5 um", "z (um)", *ZS, *BLOCK], {}, "lines 3 to 402, .* line 404"),
+    "two blocks, marked": (["z (um)", *ZS, "# more", *ZS], Z_UM, "line 402 .* '# more': it ends"),
+    "two blocks with blank lines": (["z (um)", *ZS, "", "", *ZS], Z_UM, "line 402 .* it ends"),
+    "two blocks of two columns": ([UM, *TWO, UM, *TWO], {}, "line 402 .* it ends the rows of 2"),
+    "a damaged row": ([UM, *TWO[:9], "4.500,-0.1.5", *TWO[10:]], {}, "line 11 .* must hold 2 num"),
+    "a damaged last height": ([*ZS[:-1], "0.5l"], Z_UM, r"line 400 .* has '0\.5l'"),
+    "a damaged first row": ([UM, "0.000,-0.5l", *TWO[1:]], {}, "line 2 of .* above the numbers"),
+    "SMD": ("\r\n".join(SMD), {}, r"ISO 5436-2 \(SMD\).* export the trace as text"),
+    "SMD, marked": ("\n".join(SMD).replace("\x03", "#\x03"), Z_UM, r"ISO 5436-2 \(SMD\)"),
+    "SMD with zero bytes": ("\0\n".join(SMD).encode(), Z_UM, r"ISO 5436-2 \(SMD\)"),
+    "its heights and checksum": ([*ZS, "#\x03", "34582"], Z_UM, "line 401 .* it ends the rows"),
+    "SDF, spaced": (["aBCR - 1.0", *SDF], {}, r"a variant of SDF \(ISO 25178-71\)"),
+    "SDF of another version": (["aBCR-1.0", *SDF], {}, r"a variant of SDF \(ISO 25178-71\)"),
+    "Korean": ("\n".join(["위치(㎛),높이(㎛)", *TWO]).encode("cp949"), {}, "states no unit"),
+    "Chinese": ("\n".join(["位置(μm),高度(μm)", *TWO]).encode("gbk"), {}, "states no unit"),
+    "Russian": ("\n".join(["Ось (мкм),Высота (мкм)", *TWO]).encode("cp1251"), {}, "states no unit"),
+    "thousands by blanks": (["x (nm);z (nm)", *grouped("\u202f")], {}, "line 4 .* of thousands"),
+    "thousands by apostrophes": (["x (nm);z (nm)", *grouped("'")], {}, "line 4 .* of thousands"),
+    "thousands by points": (
+        [f"{500 * k:,};{1e3 * float(z):.0f}".replace(",", ".") for k, z in enumerate(ZS)],
+        {"unit": "nm"},
+        r"numbers such as '1\.000' beside whole ones below 1000: take the signs of thousands out",
+    ),
+    "units within the cells": (
+        ["x;z", *(f"{x} um;{z} um" for x, z in PAIRS)],
+        {},
+        r"line 2 of .* has '0\.000 um', a unit or word within the cell",
+    ),
+    "a shorter trace between spaces": (
+        [*(f"{x} {z} {x} {z}" for x, z in PAIRS), "      200.0 0.1"],
+        {"unit": "um", "columns": [1, 2]},
+        "line 401 .* which of the 4 columns are missing cannot be seen",
+    ),
+    "a raster": (
+        [f"{x},{y},{z}" for y in range(3) for x, z in PAIRS],
+        {"unit": "um", "columns": [1, 3]},
+        "line 401: it is a raster of 3 lines of 400 points, of which row K takes one",
+    ),
+    "another row": (["\t".join(ZS)] * 3, {"row": 3}, "row is 3: .* has the rows 0 to 2"),
+    "a map": (["\t".join(ZS)] * 3, {}, "has 400 columns: give columns X,Z, .* or row K, a row"),
+    "a count for positions": (
+        ["No.,Height (um)", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
+        {"unit": "um"},
+        "the first column of .* counts the points: give step",
+    ),
+    "pixels for positions": (
+        ["x (px),z (um)", *(f"{k},{z}" for k, z in enumerate(ZS))],
+        {"unit": "um"},
+        "the first column of .* counts the points: give step",
+    ),
+    "a count against a step": (
+        ["Pitch: 0.5 um", "a,b", *(f"{k},{z}" for k, z in enumerate(ZS, 1))],
+        {"unit": "um"},
+        "would have steps of 1 µm, and its header states 500 nm: give step",
+    ),
+    "positions rounded beyond use": (
+        [f"{0.137 * k:.0f},{z}" for k, z in enumerate(ZS[:40])],
+        {"unit": "um"},
+        "which leaves their distance open between .*: give columns Z",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_may_be_something_else_is_refused_by_name(kind: str, tmp_path: Path) -> None:
+    text, options, words = REFUSED[kind]
+    with pytest.raises(InputError, match=words) as refusal:
+        read_trace(put(tmp_path / "t.txt", text), **options)  # type: ignore[arg-type]
+    assert "\n" not in str(refusal.value)
+    assert "begin it with #" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("gap", ["---", "-", ""])
+def test_the_shorter_one_of_two_traces_ends_where_it_does(gap: str, tmp_path: Path) -> None:
+    rows = [
+        f"{gap};{gap};{x};{z}" if k >= 300 else f"{x};{z};{x};{z}" for k, (x, z) in enumerate(PAIRS)
+    ]
+    path = put(tmp_path / "t.csv", ["A (um);B (um);C (um);D (um)", *rows])
+    for columns, points in ([1, 2], 300), ([3, 4], 400):
+        trace = read_trace(path, columns=columns)
+        assert (trace.points, trace.drop_outs) == (points, 0)
+        np.testing.assert_allclose(trace.heights, Z[:points], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("first", [["400"], ["0.500"], ["199.5", "400"]])
+def test_heights_of_a_period_do_not_begin_with_a_count_or_a_length(
+    first: list[str], tmp_path: Path
+) -> None:
+    with pytest.raises(
+        InputError, match=r"line 1 of .*, at the end of a column of heights: remove it"
+    ):
+        read_heights(put(tmp_path / "h.csv", [*first, *ZS]), unit="um")
+    assert read_heights(put(tmp_path / "h.csv", ["0", *ZS]), unit="um").size == N + 1
+
+
+NAMED = [
+    "Scan step: 0.5 um", "X-Pitch (um)\t0.5", "Spacing,0.5,um", "Data spacing 0.5 um", "dx=0.5um",
+    "Sampling interval=0.5um", "Delta X: 0.5 um", "X Step: 500 nm", "Step size: 0.5 µm/pt",
+    "StepSize=0.5um", "Pitch X;0.5;[um]", "dx_um = 0.5", "Step in um: 0.5",
+    "Sample spacing: 5e-7 m", "points: 400; step: 0.5 um", "Punktabstand [µm]: 0.5",
+    "Pixel size: 0.5 um", "Step: .5 um",
+]  # fmt: skip
+OTHERS = [
+    "Traverse length: 5.6 mm", "Groove spacing: 3 um", "Mean spacing of profile elements: 21 um",
+    "Spacing (mean): 21 um", "Pitch of thread: 3 mm", "Line pitch: 5 um", "Y step: 5 um",
+    "Z step: 1 nm", "Sm spacing 20 um", "Step (height): 98 nm", "Sampling: 0.8 mm", "dy = 5 um",
+    "Interval between lines: 5 um", "Pitch in Y: 5 um", "Step width: 8 um", "Step: 0.5 um/s",
+    "Sampling rate: 500 nm", "Step 2 of 3: 0.5 mm", "Vertical increment: 1 nm", "Steps: 400",
+    "Spacing parameter S: 4 um", "Average pitch: 3 um", "Interval: 5 s", "Sampling length 0.8 mm",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", [*NAMED, *OTHERS])
+def test_only_the_distance_of_two_points_is_a_step(line: str) -> None:
+    found = step_of_header("t.txt", ["Profile", line], ".")
+    assert found == (pytest.approx(STEP, rel=1e-12) if line in NAMED else None)
+
+
+# ---------------------------------------------------------------------- instruments
+
+
+def wsxm(path: Path, comments: int) -> Path:
+    """A map of WSxM, 64 × 48 heights in nm: a header in words, and numbers of eight bytes."""
+    heights = np.add.outer(np.arange(48.0), 10 * np.sin(np.arange(64) / 5))
+    words = [
+        "WSxM file copyright Nanotec Electronica", "SxM Image file", "Image header size: 0", "",
+        "[Control]", "", "    X Amplitude: 3 um", "    Y Amplitude: 2 um", "", "[General Info]", "",
+        "    Image Data Type: double", "    Number of columns: 64", "    Number of rows: 48",
+        f"    Z Amplitude: {np.ptp(heights)} nm", "", "[Miscellaneous]", "",
+        *(f"    Comments {k:02d}: a sample on a stage" for k in range(comments)),
+        f"    Maximum: {heights.max()}", f"    Minimum: {heights.min()}", "", "[Header end]", "",
+    ]  # fmt: skip
+    path.write_bytes("\r\n".join(words).encode() + heights.astype("<f8").tobytes())
+    return path
+
+
+@pytest.mark.skipif(not instrument.available(), reason="SurfaceTopography is not installed")
+@pytest.mark.parametrize("name", ["a.stp", "a.dat", "a.txt", "a.csv", "a.001", "a"])
+@pytest.mark.parametrize("comments", [1, 400])
+def test_a_file_of_an_instrument_is_known_by_its_content(
+    name: str, comments: int, tmp_path: Path
+) -> None:
+    trace = read_trace(wsxm(tmp_path / name, comments), row=3)
+    assert trace.points == 64
+    assert trace.step == pytest.approx(3e-6 / 64)
+    reference = read_trace(wsxm(tmp_path / "b.stp", 1), row=3)
+    np.testing.assert_array_equal(trace.heights, reference.heights)
+
+
+@pytest.mark.skipif(not instrument.available(), reason="SurfaceTopography is not installed")
+def test_heights_without_lengths_are_not_asked_of_the_reader(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["surface"] = np.outer(Z, Z)
+    with pytest.raises(
+        InputError, match=r"a\.h5 states no lengths or no unit .* give step and unit"
+    ):
+        read_trace(tmp_path / "a.h5")
+
+
+# ---------------------------------------------------------------------- options and objects
+
+LOOP = ["loop", "--hurst", "0.8", "--ratio", "4"]
+TRACE = ["trace", "none.csv", "--young", "1e6", "--poisson", "0.5", "--plan"]
+LISTS: dict[str, list[str]] = {
+    "γ": [*TRACE, "--work-of-adhesion", "0,04"],
+    "several γ": [*TRACE, "--work-of-adhesion", "0.02,0,04"],
+    "γ with a unit": [*TRACE, "--work-of-adhesion", "2,5mJ/m2"],
+    "turning point": [*LOOP, "--max-penetration", "0,5"],
+    "turning points": [*LOOP, "--max-penetration", "0,3,0,6"],
+    "beyond one": [*LOOP, "--stiffness", "1e9", "--max-penetration", "1,5"],
+    "stress": [*LOOP, "--stiffness", "0", "--max-stress", "2,5kPa"],
+    "path": [*LOOP, "--path", "0,5,0,2,out"],
+    "of a trace": [*TRACE, "--work-of-adhesion", "0.04", "--max-penetration", "0,5"],
+}
+
+
+@pytest.mark.parametrize("kind", LISTS)
+def test_no_list_takes_a_decimal_comma(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(LISTS[kind]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{LISTS[kind][-2]} is '{LISTS[kind][-1]}': numbers have a decimal point, as in" in line
+
+
+@pytest.mark.parametrize("words", [["--field-penetrations", "0,5"], ["--adhesion-range", "0,3nm"]])
+def test_no_number_takes_a_decimal_comma(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*LOOP, "--fields", "f.npz", *words]) == 2
+    assert f"{words[0]} is '{words[1]}': it must be a" in capsys.readouterr().err
+
+
+def array_of_xarray() -> object:
+    return xr.DataArray(Z, dims="x", coords={"x": PLACE})
+
+
+@pytest.mark.parametrize("make", [array_of_xarray, lambda: xr.Dataset({"z": ("x", Z)})])
+def test_objects_of_other_libraries_are_refused_with_what_can_be_read(
+    make: Callable[[], object],
+) -> None:
+    with pytest.raises(TypeError, match=r"it must be a path, .* an array or list of heights"):
+        read_trace(make(), step=STEP)
+
+
+def test_an_object_from_before_a_reload_is_named_as_that() -> None:
+    again = type("Problem", (), {"__module__": Problem.__module__})
+    with pytest.raises(TypeError, match="problem is a Problem made before a reload of adhesis"):
+        checks.instance("problem", again(), Problem, "Problem(…)")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("1e6", "“1 MPa”", 'holds “ \\(U\\+201C\\), where TOML has "'),
+        ("1e6", "−1e6", "holds − \\(U\\+2212\\), where TOML has -"),
+        ("= ", "=\u3000", "holds a blank \\(U\\+3000\\), where TOML has a plain blank"),
+    ],
+)
+def test_a_sign_that_is_not_of_toml_is_named_with_its_place(old: str, new: str, words: str) -> None:
+    text = campaign_text(young="1e6").replace(old, new, 1)
+    with pytest.raises(InputError, match=rf"not valid TOML: line \d+, column \d+ {words}"):
+        parse_campaign(text)
+
+
+def test_a_trace_says_how_it_was_read() -> None:
+    assert isinstance(read_trace(np.column_stack([PLACE, 1e6 * Z]), unit="um"), Trace)
