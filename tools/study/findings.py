@@ -12,7 +12,7 @@ from adhesis.ensemble.interval import interval
 from adhesis.ensemble.report.paper import TABLE_1
 from tools.study import amplitude, monotone
 from tools.study.data import Study
-from tools.study.table1 import best_of, complete, every_reading
+from tools.study.table1 import best_of, complete, drawn_text, every_reading
 from tools.study.tables import (
     LOSSES,
     MACHINES,
@@ -60,8 +60,8 @@ def _readings(study: Study) -> list[str]:
         "some readings are compatible with all values of Table 1",
         f"of {len(whole)} readings with all eight values {verdicts['compatible']} are compatible, "
         f"{verdicts['doubtful']} doubtful, {verdicts['excluded']} excluded; the best, {best.name}, "
-        f"has p {p_text(best.p)}{partly}; over all {len(every)} the largest means are {means}",
-        "holds" if verdicts["compatible"] else "wrong",
+        f"has p {drawn_text(best.p)}{partly}; over all {len(every)} the largest means are {means}",
+        f"holds for the best of {len(whole)} that were tried" if verdicts["compatible"] else "wrong",
     ]
 
 
@@ -234,7 +234,7 @@ def amplitude_findings(study: Study) -> Table:
     rows = [
         [
             "1. through the amplitude, the loss in J/m² rises and then falls, p < 1e-3",
-            f"{_counted(row.verdict for row in losses)}; largest p {p_text(worst, 1e-99)}",
+            f"{_counted(row.verdict for row in losses)}; largest p {p_text(worst)}",
             "holds"
             if len(sure) == len(losses)
             else "wrong"
@@ -244,7 +244,7 @@ def amplitude_findings(study: Study) -> Table:
         [
             "2. W~ falls with the amplitude",
             f"{_counted(row.verdict for row in scaled)}; largest p "
-            f"{p_text(max(row.p_monotone for row in scaled), 1e-99)}",
+            f"{p_text(max(row.p_monotone for row in scaled))}",
             "holds" if all(row.verdict == "falls" for row in scaled) else "open",
         ],
         [
@@ -278,18 +278,9 @@ def amplitude_findings(study: Study) -> Table:
     return ["expected", "came out", ""], rows
 
 
-def answer_text(study: Study) -> str:
-    """The answer to the paper's question, in two sentences."""
-    rows = [row for _, row in amplitude.rows(study, "loss")]
-    sure = [row for row in rows if row.verdict == "not monotone"]
-    worst = max(row.p_not_monotone for row in sure)
-    spans = []
-    for turn in amplitude.TURNS:
-        peaks = [amplitude.maximum(study, hurst, turn) for hurst in amplitude.HURSTS]
-        found = [peak for peak in peaks if peak is not None]
-        low, high = min(peak.low for peak in found), max(peak.high for peak in found)
-        spans.append(f"{low:.2g} to {high:.2g} µm at Δ~max = {turn:g}")
-    across = at_paper_gammas(study)
+def _across(study: Study, name: str) -> str:
+    """Verdicts on a loss along H at the paper's three γ, by turning point."""
+    across = at_paper_gammas(study, name)
     verdicts = {
         turn: Counter(row.verdict for (_, there), row in across.items() if there == turn)
         for turn in amplitude.TURNS
@@ -300,11 +291,31 @@ def answer_text(study: Study) -> str:
             for v, n in c.items())
         for turn, c in verdicts.items()
     )  # fmt: skip
+    turns_back = any(counts["not monotone"] for counts in verdicts.values())
+    return reported if turns_back else f"no rise beside a fall is certain: {reported}"
+
+
+def answer_text(study: Study) -> str:
+    """The answer to the paper's question: of the quantity that it has, and of the loss in J/m²."""
+    scaled = [row for _, row in amplitude.rows(study, "loss_dimensionless")]
+    falls = [row for row in scaled if row.verdict == "falls"]
+    rows = [row for _, row in amplitude.rows(study, "loss")]
+    sure = [row for row in rows if row.verdict == "not monotone"]
+    spans = []
+    for turn in amplitude.TURNS:
+        peaks = [amplitude.maximum(study, hurst, turn) for hurst in amplitude.HURSTS]
+        found = [peak for peak in peaks if peak is not None]
+        low, high = min(peak.low for peak in found), max(peak.high for peak in found)
+        spans.append(f"{low:.2g} to {high:.2g} µm at Δ~max = {turn:g}")
     others = "" if len(sure) == len(rows) else f", and is open in {len(rows) - len(sure)}"
     return (
-        "**Through the amplitude it is not: at fixed γ and H the loss in J/m² rises and then "
-        f"falls in {len(sure)} of {len(rows)} cases (three H at three turning points; p ≤ "
-        f"{p_text(worst, 1e-99)}){others}, with its maximum at h_rms of {'; '.join(spans)} "
-        "(γ = 0.04 J/m², intervals of the three H together).**\n**Through H at h_rms = 1 µm, at "
-        f"the paper's three γ, no fall after a rise is certain: {reported}.**"
+        "**W~, which is the paper's quantity. Through H at h_rms = 1 µm, as in the paper, at its "
+        f"three γ, {_across(study, 'loss_dimensionless')}. Through the amplitude, at fixed γ and "
+        f"H, it falls in {len(falls)} of {len(scaled)} cases (three H at three turning points; "
+        f"p ≤ {p_text(max(row.p_monotone for row in falls))}).**\n\n"
+        "**The loss in J/m², which is W~ times h_max² and a constant. Through H at h_rms = 1 µm, "
+        f"{_across(study, 'loss')}. Through the amplitude it is not monotone: it rises and then "
+        f"falls in {len(sure)} of {len(rows)} cases (p ≤ "
+        f"{p_text(max(row.p_not_monotone for row in sure))}){others}, with its maximum at h_rms of "
+        f"{'; '.join(spans)} (γ = 0.04 J/m², intervals of the three H together).**"
     )

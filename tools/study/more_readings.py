@@ -8,6 +8,7 @@ import numpy as np
 
 from adhesis.ensemble.report.paper import TABLE_1
 from tools.study.data import Study, aligned, by_realisation
+from tools.study.measure import Reading
 from tools.study.readings import (
     CURVES,
     FAR_SIDES_COMPUTED,
@@ -16,12 +17,11 @@ from tools.study.readings import (
     STIFFNESSES,
     TURNS,
     Losses,
-    Reading,
     Series,
     along_far_side,
 )
-from tools.study.table1 import best_of, complete, every_reading
-from tools.study.text import Table, p_text
+from tools.study.table1 import best_of, complete, drawn_text, every_reading
+from tools.study.text import Table
 
 KINDS = {
     "detached ones left out": "detached ones left out",
@@ -63,8 +63,8 @@ def _compatible(study: Study) -> list[str]:
         best = best_of(complete(found) or found)
         hurst, gamma = best.worst
         reported.append(
-            f"{name}: {counted}; best {best.name}, largest \\|z\\| {np.abs(best.z).max():.1f} at "
-            f"{hurst:g}, {gamma:g}, p {p_text(best.p)}"
+            f"{name}: {counted}; best {best.name}, largest \\|z\\| {best.largest:.1f} at "
+            f"{hurst:g}, {gamma:g}, p {drawn_text(best.p)}"
         )
         any_compatible |= any(r.verdict == "compatible" for r in complete(found))
     if missing:
@@ -122,7 +122,7 @@ def _machines(study: Study) -> list[str]:
     if not found or not weak or not strong:
         return [expected, MISSING, "open"]
     others = [r for r in complete(every_reading(study)) if not r.name.startswith("machine")]
-    nearest, fixed_nearest = (min(float(np.abs(r.z).max()) for r in rs) for rs in (found, others))
+    nearest, fixed_nearest = (min(r.largest for r in rs) for rs in (found, others))
     pair = [tuple(TABLE_1).index(cell) for cell in ((0.9, 0.07), (0.8, 0.07))]
     both = min(float(np.abs(r.z[pair]).max()) for r in found)
     reported = (

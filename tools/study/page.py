@@ -10,7 +10,7 @@ from pathlib import Path
 from tools.study.data import Study
 from tools.study.findings import amplitude_findings, answer_text, findings
 from tools.study.more_readings import more_findings
-from tools.study.sentences import answer_note, readings_note, scaling_note
+from tools.study.sentences import answer_note, coverage_note, readings_note, scaling_note
 from tools.study.table1 import all_readings
 from tools.study.tables import TABLES
 from tools.study.text import Table
@@ -18,6 +18,7 @@ from tools.study.text import Table
 ALL: dict[str, Callable[[Study], Table | str]] = {
     "answer_text": answer_text,
     "answer_note": answer_note,
+    "coverage_note": coverage_note,
     "scaling_note": scaling_note,
     "readings_note": readings_note,
     "findings": findings,

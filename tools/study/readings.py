@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 
 from adhesis.ensemble.report.paper import M2, TABLE_1
-from tools.study.data import Array, Study, by_realisation
+from tools.study.data import Study, by_realisation
+from tools.study.measure import OF_PAPER, Reading, Sample
 
 TURNS = (0.6, 0.7, 0.8, 0.9)
 C0 = 1e-13
-DRAWS, SEED, OFF_DIAGONAL, OF_PAPER = 200_000, 2016, 0.8, 10
-FAR = 6.0
 FEWEST = 6  # realisations of a cell that is held against the paper
-LEAST = 1e-3  # eigenvalue of a correlation matrix from cells of different realisations
 BEYOND = 1.5  # works of adhesion are extrapolated by no larger factor
-COMPATIBLE, EXCLUDED = 0.05, 0.001
 AT_100 = {0.01: ("weak", "cells001"), 0.025: ("between",)}
 AT_200 = ("waves", "waves001")
 RAYLEIGH = ("rayleigh", "rayleigh001")
@@ -27,141 +23,7 @@ STIFF = ("stiff", "stiff001")
 STIFFNESSES, FAR_SIDES = (1e9, 3e9, 1e10), (0.4, 0.5, 0.6, 0.7, 0.8)
 FAR_SIDES_COMPUTED = (0.4, 0.6, 0.8)
 NANOMETRES = 0.993  # Δ~ of a separation of 20 nm
-Cell = tuple[float, float]
 Series = dict[int, float]
-
-
-# Table 1 with its two largest values exchanged (a hint that was found afterwards).
-TRANSPOSED = {**TABLE_1, (0.7, 0.07): TABLE_1[0.8, 0.07], (0.8, 0.07): TABLE_1[0.7, 0.07]}
-FACTORS = ("none", "one", "one a row")
-
-
-@cache
-def _normals(values: int, draws: int) -> Array:
-    """Draws that all readings of as many values share."""
-    return np.random.default_rng(SEED).standard_normal((values, draws))
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """One reading, compared with the paper.
-
-    Attributes
-    ----------
-    name : str
-    cells : tuple of (H, γ)
-        Of the paper's, those that were computed.
-    losses : array, shape (cells, realisations)
-        W~; NaN where a cell lacks a realisation.
-    paper : dict
-        Loss of each (H, γ).
-    factors : str
-        Free factors of the unit of the loss, one of FACTORS; fitted by generalised least squares.
-    shared : float
-        Share of the covariance between cells that is kept: the paper may have used one set of
-        profiles for all cells, or another set for each (0).
-    """
-
-    name: str
-    cells: tuple[Cell, ...]
-    losses: Array
-    paper: dict[Cell, float] = field(default_factory=lambda: TABLE_1)
-    factors: str = "none"
-    shared: float = OFF_DIAGONAL
-
-    @property
-    def realisations(self) -> int:
-        """Number of profiles of the cell that has fewest."""
-        return int(np.isfinite(self.losses).sum(axis=1).min())
-
-    @cached_property
-    def means(self) -> Array:
-        """Mean W~ of each cell."""
-        return np.asarray(np.nanmean(self.losses, axis=1))
-
-    @cached_property
-    def deviation(self) -> Array:
-        """ln(paper/mean) of each cell."""
-        paper = np.array([self.paper[cell] for cell in self.cells])
-        return np.asarray(np.log(paper / self.means))
-
-    @cached_property
-    def covariance(self) -> Array:
-        """Covariance of the deviation of a right reading."""
-        away = self.losses / self.means[:, None] - 1
-        there = np.isfinite(away)
-        filled = np.where(there, away, 0.0)
-        count = there.astype(float)
-        shared = count @ count.T
-        # over the realisations that two cells share, about the means of all that each has
-        relative = (filled @ filled.T) / np.maximum(shared - 1, 1)
-        shrunk = self.shared * relative + (1 - self.shared) * np.diag(np.diag(relative))
-        own = np.diag(shared)
-        found = shrunk * (1 / OF_PAPER + shared / np.outer(own, own))
-        spread = np.sqrt(np.diag(found))
-        values, vectors = np.linalg.eigh(found / np.outer(spread, spread))
-        sound = (vectors * np.maximum(values, LEAST)) @ vectors.T
-        sound /= np.sqrt(np.outer(np.diag(sound), np.diag(sound)))
-        return np.asarray(sound * np.outer(spread, spread))
-
-    @cached_property
-    def _design(self) -> Array:
-        """Which logarithm of a factor each cell has, shape (cells, factors)."""
-        if self.factors == "one":
-            return np.ones((len(self.cells), 1))
-        if self.factors == "one a row":
-            hursts = sorted({hurst for hurst, _ in self.cells})
-            return np.array([[float(hurst == h) for h in hursts] for hurst, _ in self.cells])
-        return np.zeros((len(self.cells), 0))
-
-    @cached_property
-    def _fit(self) -> Array:
-        """Matrix from deviations to logarithms of the factors."""
-        weighted = np.linalg.solve(self.covariance, self._design).T
-        return np.asarray(np.linalg.solve(weighted @ self._design, weighted))
-
-    @cached_property
-    def fitted(self) -> Array:
-        """Factors of the computed losses, in the order of their H."""
-        return np.asarray(np.exp(self._fit @ self.deviation))
-
-    @cached_property
-    def _left(self) -> Array:
-        """Matrix from deviations to those that the factors leave."""
-        return np.asarray(np.eye(len(self.cells)) - self._design @ self._fit)
-
-    @cached_property
-    def _spread(self) -> Array:
-        """Standard deviation of what the factors leave."""
-        return np.asarray(np.sqrt(np.diag(self._left @ self.covariance @ self._left.T)))
-
-    @cached_property
-    def z(self) -> Array:
-        """Deviation over its standard deviation, fitted factors taken out."""
-        return np.asarray(self._left @ self.deviation / self._spread)
-
-    @cached_property
-    def p(self) -> float:
-        """Probability that a right reading has a largest |z| as large."""
-        if np.abs(self.z).max() > FAR:
-            return 0.0  # below one over the number of draws in any case
-        spread = np.sqrt(np.diag(self.covariance))
-        factor = np.linalg.cholesky(self.covariance / np.outer(spread, spread))
-        of_draw = (self._left * spread) @ factor / self._spread[:, None]
-        z = of_draw @ _normals(len(self.cells), DRAWS)
-        return float(np.mean(np.abs(z, out=z).max(axis=0) >= np.abs(self.z).max()))
-
-    @property
-    def worst(self) -> Cell:
-        """Cell of the largest |z|."""
-        return self.cells[int(np.argmax(np.abs(self.z)))]
-
-    @property
-    def verdict(self) -> str:
-        """compatible, doubtful or excluded."""
-        if self.p >= COMPATIBLE:
-            return "compatible"
-        return "excluded" if self.p < EXCLUDED else "doubtful"
 
 
 class Losses:
@@ -224,7 +86,7 @@ def _reading(name: str, of_cell: Callable[[float, float], Series]) -> Reading | 
         return None
     every = sorted(set().union(*found.values()))
     losses = np.array([[series.get(r, np.nan) for r in every] for series in found.values()])
-    return Reading(name, tuple(found), losses)
+    return Reading(name, Sample(tuple(found), losses))
 
 
 def _square(study: Study, normalisation: str, hurst: float, ratio: int) -> float:

@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from adhesis.ensemble.report.paper import M2, TABLE_1
 from tools.study.data import Array, Study, aligned
+from tools.study.measure import DRAWS, OF_PAPER, TRANSPOSED, Cell, Reading, verdict_of
 from tools.study.readings import (
     FAR_SIDES_COMPUTED,
-    OF_PAPER,
     STIFF,
     STIFFNESSES,
-    TRANSPOSED,
     Losses,
-    Reading,
     along_far_side,
     readings,
 )
 from tools.study.text import Table, mean_text, p_text
+
+drawn_text = partial(p_text, below=1 / DRAWS)
 
 READING_HEADER = [
     *("reading", "n", *(f"{h:g}, {g:g}" for h, g in TABLE_1)),
@@ -36,8 +36,8 @@ def _reading_row(reading: Reading) -> list[str]:
     hurst, gamma = reading.worst
     return [
         *(reading.name, f"{reading.realisations}", *reported),
-        f"{np.abs(reading.z).max():.1f} at {hurst:g}, {gamma:g}",
-        *(p_text(reading.p), p_text(replace(reading, shared=0.0).p), reading.verdict),
+        f"{reading.largest:.1f} at {hurst:g}, {gamma:g}",
+        *(drawn_text(reading.p), drawn_text(replace(reading, shared=0.0).p), reading.verdict),
     ]
 
 
@@ -54,7 +54,7 @@ def complete(every: Iterable[Reading]) -> list[Reading]:
 
 def best_of(every: Iterable[Reading]) -> Reading:
     """The reading with the largest p, of equals that with the smallest largest |z|."""
-    return max(every, key=lambda reading: (reading.p, -np.abs(reading.z).max()))
+    return max(every, key=lambda reading: (reading.p, -reading.largest))
 
 
 def is_main(reading: Reading) -> bool:
@@ -94,7 +94,7 @@ def reach(study: Study) -> Table:
 
 
 # Seen afterwards: (what is varied, paper's values, free factors, exponent of m2 in the unit)
-VARIANTS: tuple[tuple[str, dict[tuple[float, float], float], str, float], ...] = (
+VARIANTS: tuple[tuple[str, dict[Cell, float], str, float], ...] = (
     ("as decided", TABLE_1, "none", 0.0),
     ("one free factor for the unit of the loss", TABLE_1, "one", 0.0),
     ("one free factor a row of the table", TABLE_1, "one a row", 0.0),
@@ -106,13 +106,11 @@ VARIANTS: tuple[tuple[str, dict[tuple[float, float], float], str, float], ...] =
 )
 
 
-def variant(
-    reading: Reading, paper: dict[tuple[float, float], float], factors: str, power: float
-) -> Reading:
+def variant(reading: Reading, paper: dict[Cell, float], factors: str, power: float) -> Reading:
     """One reading with other values of the paper, free factors, or losses times a power of m2."""
-    scale = np.array([M2[hurst] ** power for hurst, _ in reading.cells])
-    losses = reading.losses * scale[:, None] / np.mean([m2**power for m2 in M2.values()])
-    return replace(reading, paper=paper, factors=factors, losses=losses)
+    mean = np.mean([m2**power for m2 in M2.values()])
+    of_losses = {cell: value * mean / M2[cell[0]] ** power for cell, value in paper.items()}
+    return replace(reading, paper=of_losses, factors=factors)
 
 
 def variants(study: Study) -> Table:
@@ -125,8 +123,8 @@ def variants(study: Study) -> Table:
         best = best_of(changed)
         fitted = ", ".join(f"{factor:.2f}" for factor in best.fitted)
         counts = [f"{verdicts[v]}" for v in ("compatible", "doubtful", "excluded")]
-        largest = f"{np.abs(best.z).max():.1f} at {best.worst[0]:g}, {best.worst[1]:g}"
-        rows.append([name, *counts, best.name, fitted, largest, p_text(best.p)])
+        largest = f"{best.largest:.1f} at {best.worst[0]:g}, {best.worst[1]:g}"
+        rows.append([name, *counts, best.name, fitted, largest, drawn_text(best.p)])
     header = ["changed", "compatible", "doubtful", "excluded", "best", "its factors"]
     return [*header, "its largest \\|z\\|", "its p"], rows
 
@@ -139,7 +137,7 @@ def factors_of_rows(study: Study) -> Table:
             free = replace(reading, factors="one a row")
             exchanged = replace(free, paper=TRANSPOSED)
             values = [f"{f:.2f}" for f in (*free.fitted, *exchanged.fitted)]
-            largest = [f"{np.abs(r.z).max():.1f} at {r.worst[0]:g}, {r.worst[1]:g}"
+            largest = [f"{r.largest:.1f} at {r.worst[0]:g}, {r.worst[1]:g}"
                        for r in (free, exchanged)]  # fmt: skip
             rows.append([reading.name.split(", ")[-1], *values[:3], largest[0],
                          *values[3:], largest[1]])  # fmt: skip
@@ -177,22 +175,22 @@ STRONG = tuple(cell for cell in TABLE_1 if cell[1] >= 0.04)
 def without(study: Study) -> Table:
     """Compatible readings when values of the paper are left out (seen afterwards)."""
     every = [r for r in every_reading(study) if set(STRONG) <= set(r.cells)]
-    left_out: list[tuple[tuple[float, float], ...]] = [(), *((cell,) for cell in STRONG)]
+    left_out: list[tuple[Cell, ...]] = [(), *((cell,) for cell in STRONG)]
     left_out.append(((0.8, 0.07), (0.7, 0.07)))
     rows = []
     for cells in left_out:
         kept = tuple(cell for cell in STRONG if cell not in cells)
-        cut = [Reading(r.name, kept, r.losses[[r.cells.index(c) for c in kept]]) for r in every]
-        best = best_of(cut)
-        count = sum(r.verdict == "compatible" for r in cut)
+        cut = [(r.over(kept), r) for r in every]
+        (largest, p), best = max(cut, key=lambda one: (one[0][1], -one[0][0]))
+        count = sum(verdict_of(p) == "compatible" for (_, p), _ in cut)
         rows.append(
             [
                 " and ".join(f"{TABLE_1[c]:g} (H = {c[0]:g}, γ = {c[1]:g})" for c in cells)
                 or "none of them",
                 f"{count} of {len(cut)}",
                 best.name,
-                p_text(best.p),
-                f"{np.abs(best.z).max():.1f}",
+                drawn_text(p),
+                f"{largest:.1f}",
             ]
         )
     return ["left out", "compatible", "best", "its p", "its largest \\|z\\|"], rows
@@ -285,7 +283,8 @@ def machines(study: Study) -> Table | str:
                 stress, h_max = (columns[name][far] for name in ("stress_at_turn", "h_max"))
                 reached = np.mean([far - stress[r] / (stiffness * h_max[r]) for r in losses])
                 mean = mean_text(np.array(list(losses.values())))
-                reported.append(f"{mean}, Δ~ {reached:.2f}, n = {len(losses)}")
+                some = f"{mean}, Δ~ {reached:.2f}, " if mean else ""
+                reported.append(f"{some}n = {len(losses)}")
             place = f"{stiffness:.0e}", f"{gamma:g}", f"{hurst:g}", f"{paper:g}"
             rows.append([*place, *reported])
     header = ["k (Pa/m)", "γ (J/m²)", "H", "paper"]
@@ -301,7 +300,7 @@ def under_load(study: Study) -> Table:
             done, failed = study.loops.where(**place), study.failed.where(**place)
             if len(done) + len(failed) == 0:
                 continue
-            mean = mean_text(done["loss_dimensionless"]) if len(done) > 1 else ""
+            mean = mean_text(done["loss_dimensionless"])
             contact = f"{done['largest_contact_fraction'].mean():.2f}" if len(done) else ""
             paper = TABLE_1.get((hurst, gamma))
             paper_value = "–" if paper is None else f"{paper:g}"

@@ -27,7 +27,7 @@ from tools.study.table1 import (
     variants,
     without,
 )
-from tools.study.text import Table, change_text, mean_text, p_text, ratio_text
+from tools.study.text import Table, change_text, mean_text, p_equals, p_text, ratio_text
 
 
 def campaigns(study: Study) -> Table:
@@ -80,7 +80,7 @@ def steps_text(row: monotone.Row) -> str:
     """The steps of a row."""
     return "; ".join(
         f"{step.ends[0]:.3g} → {step.ends[1]:.3g}: "
-        f"{change_text(step.difference, step.low, step.high)}, p = {p_text(step.p, 1e-99)}"
+        f"{change_text(step.difference, step.low, step.high)}, {p_equals(step.p)}"
         for step in row.steps
     )
 
@@ -164,7 +164,7 @@ def through_amplitude(study: Study) -> Table:
 
 def p_of_verdict(row: monotone.Row) -> str:
     """Error probability of a verdict; of an open row that of either."""
-    one, other = p_text(row.p_not_monotone, 1e-99), p_text(row.p_monotone, 1e-99)
+    one, other = p_text(row.p_not_monotone), p_text(row.p_monotone)
     if row.verdict == "open":
         return f"not monotone {one}, monotone {other}"
     return one if row.verdict == "not monotone" else other
@@ -186,42 +186,48 @@ def through_hurst(study: Study) -> Table:
     return [*header, "verdict", "p"], rows
 
 
-def at_paper_gammas(study: Study) -> dict[tuple[float, float], monotone.Row]:
-    """Steps of the loss in J/m² along H at h_rms = 1 µm, by γ and turning point."""
-    known = {(row.turn, height): row for height, row in amplitude.rows_along_hurst(study, "loss")}
+def at_paper_gammas(study: Study, name: str) -> dict[tuple[float, float], monotone.Row]:
+    """Steps of a loss along H at h_rms = 1 µm, by γ and turning point."""
+    known = {(row.turn, height): row for height, row in amplitude.rows_along_hurst(study, name)}
     found = {}
     for gamma, height in amplitude.OF_PAPER.items():
         for turn in amplitude.TURNS:
             if (turn, height) in known:
                 found[gamma, turn] = known[turn, height]
             else:
-                first = monotone.series(study, gamma, turn, "loss", monotone.FIRST)
-                found[gamma, turn] = monotone.row_of(gamma, turn, "loss", first)
+                first = monotone.series(study, gamma, turn, name, monotone.FIRST)
+                found[gamma, turn] = monotone.row_of(gamma, turn, name, first)
     return found
 
 
 def answer(study: Study) -> Table:
-    """Whether the loss in J/m² is monotone in m2, at the paper's γ and each turning point."""
-    along = {(row.turn, hurst): row for hurst, row in amplitude.rows(study, "loss")}
-    across = at_paper_gammas(study)
+    """Whether W~, and the loss in J/m², are monotone in m2: the paper's γ, each turning point."""
+    along = {
+        name: {(row.turn, hurst): row for hurst, row in amplitude.rows(study, name)}
+        for name in monotone.QUANTITIES
+    }
+    across = {name: at_paper_gammas(study, name) for name in monotone.QUANTITIES}
     rows = []
     for gamma in amplitude.OF_PAPER:
         for turn in amplitude.TURNS:
-            row = across[gamma, turn]
-            n = min(step.n for step in row.steps)
-            ups = [along.get((turn, hurst)) for hurst in amplitude.HURSTS]
-            verdicts = Counter(one.verdict for one in ups if one)
-            p = max(one.p_not_monotone for one in ups if one)
-            rows.append(
-                [
-                    *(f"{gamma:g}", f"{turn:g}"),
-                    ", ".join(f"{verdict} ({k} of 3 H)" for verdict, k in verdicts.items()),
-                    p_text(p, 1e-99),
-                    *(row.verdict, p_of_verdict(row), f"{n}"),
-                ]
-            )
-    header = ["γ (J/m²)", "Δ~max", "through amplitude", "p of the least certain H"]
-    return [*header, "through H at h_rms = 1 µm", "p", "n"], rows
+            reported = []
+            for name in monotone.QUANTITIES:
+                row = across[name][gamma, turn]
+                ups = [along[name].get((turn, hurst)) for hurst in amplitude.HURSTS]
+                verdicts = Counter(one.verdict for one in ups if one)
+                counted = ", ".join(f"{verdict} ({k} of 3 H)" for verdict, k in verdicts.items())
+                rises_and_falls = "not monotone" in verdicts
+                p = max(
+                    one.p_not_monotone if rises_and_falls else one.p_monotone for one in ups if one
+                )
+                reported += [row.verdict, p_of_verdict(row), counted, p_text(p)]
+            n = min(step.n for step in across["loss"][gamma, turn].steps)
+            rows.append([f"{gamma:g}", f"{turn:g}", *reported, f"{n}"])
+    header = ["γ (J/m²)", "Δ~max"]
+    for title in ("W~", "J/m²"):
+        header += [f"{title}, through H", "p", f"{title}, through amplitude"]
+        header.append("p of the least certain H")
+    return [*header, "n, through H"], rows
 
 
 def scaling(study: Study) -> Table:
