@@ -56,7 +56,7 @@ def test_every_figure_of_the_documentation_has_a_command():
     assert made == set(kept())
     for part in figures.PARTS.values():
         for command in part.commands:
-            modules = ("-m adhesis ", "-m tools.study ", "-m tools.transcripts ")
+            modules = ("-m adhesis ", "-m tools.transcripts ")
             assert command.startswith(modules) or (ROOT / command.split()[0]).exists()
 
 
