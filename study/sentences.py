@@ -41,7 +41,7 @@ def open_cases(study: Study) -> str:
     """The cases through the amplitude that are open."""
     rows = [(h, row) for h, row in amplitude.rows(study, "loss") if row.verdict == "open"]
     if not rows:
-        return "No case through the amplitude is open."
+        return "In J/m² no case through the amplitude is open."
     by_turn: dict[float, list[str]] = defaultdict(list)
     for hurst, row in rows:
         by_turn[row.turn].append(f"{hurst:g}")
@@ -59,7 +59,7 @@ def open_cases(study: Study) -> str:
         if all(falls)
         else ""
     )
-    return f"Open through the amplitude: {cases}{after}."
+    return f"Open through the amplitude, in J/m²: {cases}{after}."
 
 
 def answer_note(study: Study) -> str:
@@ -121,15 +121,21 @@ MANY = 100  # profiles of a cell whose spread is well known
 
 
 def _reach(every: Sequence[Reading], cell: Cell) -> str:
-    """The largest mean of a cell, and by how many standard errors it is off the paper's value."""
-    best = max(
-        (r for r in every if cell in r.cells), key=lambda r: float(r.means[r.cells.index(cell)])
-    )
-    place = best.cells.index(cell)
-    z = best.z[place]
+    """The largest mean of a cell, and by how many standard errors it is off the paper's value.
+
+    Also the reading that is nearest in standard errors, if that is another one.
+    """
+    found = [
+        (float(r.means[r.cells.index(cell)]), float(r.z[r.cells.index(cell)]), r.name)
+        for r in every
+        if cell in r.cells
+    ]
+    mean, z, name = max(found)
+    nearest = min(found, key=lambda one: abs(one[1]))
+    other = f"; nearest {nearest[2]}, {abs(nearest[1]):.1f}" if nearest[2] != name else ""
     return (
-        f"{best.means[place]:.3g} where the paper has {TABLE_1[cell]:g} ({best.name}: "
-        f"{abs(z):.1f} standard errors {'below' if z > 0 else 'above'})"
+        f"{mean:.3g} where the paper has {TABLE_1[cell]:g} ({name}: "
+        f"{abs(z):.1f} standard errors {'below' if z > 0 else 'above'}{other})"
     )
 
 
