@@ -46,12 +46,15 @@ class Part:
         Where that goes, below docs/.
     name : str
         Under which name, if it has another one there.
+    data : str
+        Where its CSV files go, below the checkout.
     """
 
     commands: tuple[str, ...]
     made: str
     folder: str
     name: str = ""
+    data: str = ""
 
 
 def _paper() -> tuple[str, ...]:
@@ -87,8 +90,7 @@ PARTS = {
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),
     "bench": Part(("-m adhesis bench --budget 240 --to OUT",), "benchmark.png", "figures"),
-    "study": Part(("-m tools.study figures --to OUT",), "*.png", "study"),
-    "paper": Part(_paper(), "paper/*.*", "paper"),
+    "paper": Part(_paper(), "paper/*.*", "paper", data="study/paper"),
 }
 
 
@@ -147,7 +149,8 @@ def make(name: str, ranks: int) -> None:
         for path in sorted(Path(folder).glob(part.made)):
             if path.suffix not in KEPT:
                 continue
-            to = ROOT / "docs" / part.folder / (part.name or path.name)
+            place = Path(part.data) if path.suffix == ".csv" else Path("docs", part.folder)
+            to = ROOT / place / (part.name or path.name)
             shutil.copyfile(path, to)
             if to.suffix == ".md":  # links to what is not kept
                 to.write_text(re.sub(r" \(\[PDF\]\([^)]*\)\)", "", to.read_text("utf-8")), "utf-8")
