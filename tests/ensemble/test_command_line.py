@@ -175,6 +175,17 @@ def test_an_option_that_is_given_twice_is_refused(words, capsys):
     assert not [name for name in vars(many) if name.startswith("_")]
 
 
+def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
+    """Python 3.13 raises what older ones report through ``error``."""
+
+    def parse_args(self, words, namespace):
+        raise argparse.ArgumentError(None, f"unrecognized arguments: {' '.join(words[1:])}")
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", parse_args)
+    line = refused(capsys, ["trace", "x.csv", "--speed"])
+    assert line.startswith("adhesis trace: unrecognized arguments: --speed (")
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_refuses_what_it_cannot_read(name, capsys):
     """An unknown option, a missing value, an empty one, and a text in place of a number."""
