@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import os
@@ -181,8 +180,9 @@ class Campaign:
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run.session import run_campaign
 
-        with contextlib.nullcontext() if progress else contextlib.redirect_stderr(io.StringIO()):
-            summary = run_campaign(self.tables, path, say=log)
+        say = log if progress else lambda text: None
+        stream = None if progress else io.StringIO()  # stderr is that of all threads
+        summary = run_campaign(self.tables, path, say=say, stream=stream)
         if summary.stopped:
             raise RuntimeError(
                 f"the campaign stopped early: {summary.stopped}; {summary.pending} of "
@@ -196,8 +196,9 @@ class Campaign:
         from adhesis.ensemble.run import launch
 
         mpirun, most = launch.launcher(), launch.largest_number_of_ranks()
-        if mpirun is None:
-            raise InputError(f"ranks is {ranks}: no mpirun was found, so take ranks=1")
+        lack = launch.lacking_for_ranks()
+        if lack or mpirun is None:
+            raise InputError(f"ranks is {ranks}: {lack}, so take ranks=1")
         if ranks > most:
             raise InputError(
                 f"ranks is {ranks}: at most {most} are started here, on "
@@ -206,18 +207,19 @@ class Campaign:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "campaign.toml")
             file.write_text(self.text, encoding="utf-8")
-            code, sentence = launch.run_ranks(
+            end = launch.run_ranks(
                 mpirun,
                 ranks,
                 ["run", str(file), "--out", str(path.absolute())],
                 output=log if progress else lambda line: None,
             )
-        if code == BAD_INPUT:
-            raise InputError(sentence.removeprefix("adhesis run: ") or "the ranks refused the run")
-        if code not in (DONE, SOME_FAILED):
+        sentence = "\n".join((*end.words, end.sentence.removeprefix("adhesis run: ")))
+        if end.code == BAD_INPUT:
+            raise InputError(sentence or "the ranks refused the run")
+        if end.code not in (DONE, SOME_FAILED):
             raise RuntimeError(
                 sentence
-                or f"the ranks ended with exit code {code}; what was done is kept in {path}"
+                or f"the ranks ended with exit code {end.code}; what was done is kept in {path}"
             )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, TextIO
 
 import h5py
 
@@ -196,6 +196,7 @@ def run_campaign(
     options: Options | None = None,
     say: Callable[[str], None] = lambda text: None,
     engine: Engine | None = None,
+    stream: TextIO | None = None,
 ) -> Summary:
     """Compute what is missing of a campaign in its results file.
 
@@ -212,6 +213,8 @@ def run_campaign(
         Gets a line about what was found and what will be done, on rank 0.
     engine : Engine, optional
         Loops into a results file, if not given.
+    stream : text stream, optional
+        Where progress is reported; stderr, if not given.
 
     Raises
     ------
@@ -254,7 +257,7 @@ def run_campaign(
         if own_rows or rank == 0:
             all_of_them = comm if own_rows else None
             writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
-        session = _Session(campaign, plan, writer, options, signals, engine)
+        session = _Session(campaign, plan, writer, options, signals, engine, stream)
         with engine.watch():
             if comm is None:
                 stopped = session.alone()
@@ -311,7 +314,9 @@ class _Session:
         options: Options,
         signals: StopSignals,
         engine: Engine,
+        stream: TextIO | None = None,
     ) -> None:
+        self._stream = stream
         self._campaign = campaign
         self._plan = plan
         self._writer = writer
@@ -335,7 +340,7 @@ class _Session:
 
     def alone(self) -> str | None:
         schedule = self._schedule()
-        progress = ProgressLine(self._counts, lambda: self._estimate(schedule, 0, 1))
+        progress = ProgressLine(self._counts, lambda: self._estimate(schedule, 0, 1), self._stream)
         try:
             return work_alone(
                 schedule,
@@ -361,6 +366,7 @@ class _Session:
             lambda: self._estimate(
                 schedule, master.in_flight / self._campaign.branch_loops, workers
             ),
+            self._stream,
         )
         master = Master(
             *(channel, schedule, self._groups, collect, self._limits),

@@ -20,7 +20,7 @@ from adhesis.ensemble.campaign.file import load_campaign
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.write import Writer
-from adhesis.ensemble.run import launch, session
+from adhesis.ensemble.run import session
 from adhesis.ensemble.run.interrupt import StopSignals, deadline, parse_duration
 from adhesis.ensemble.run.plan import Plan
 from adhesis.ensemble.run.session import Engine, Options, run_campaign
@@ -59,13 +59,6 @@ def test_a_run_from_nothing_to_done(tmp_path):
             assert file.attrs[name]
         assert file.attrs["campaign"] == (tmp_path / "c.toml").read_text()
         assert file.attrs["seed"] == 5
-
-
-def test_where_there_is_no_launcher_one_process_computes(tmp_path, monkeypatch):
-    monkeypatch.setattr(launch, "launcher", lambda: None)
-    process, _ = run(tmp_path, "--ranks", "2")
-    assert process.returncode == 0
-    assert "no mpirun was found, so one process computes" in process.stderr
 
 
 def test_the_version_is_told():

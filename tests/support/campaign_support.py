@@ -142,6 +142,18 @@ def start(
     )
 
 
+def start_python(*words: object) -> subprocess.Popen[str]:
+    """Start this interpreter in an environment in which it can start ranks."""
+    return subprocess.Popen(
+        [sys.executable, *map(str, words)],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
 def ranks_of(launcher: int) -> list[int]:
     """Return the process ids of the ranks that a launcher has started."""
     found = []

@@ -30,7 +30,6 @@ OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFA
 INTERRUPTED = 130  # by a second Ctrl-C: the first one stops the run in order
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
-_CODES = (DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, WRITE_FAILED, RESUME, INTERRUPTED)
 EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
@@ -151,24 +150,17 @@ def _start_ranks(args: argparse.Namespace, program: Sequence[str] | None) -> int
         raise InputError("--ranks starts ranks of its own: leave it out under mpirun or srun")
     if ranks == 1:
         return None
-    mpirun = launch.launcher()
-    if mpirun is None:
-        print(
-            "no mpirun was found, so one process computes; MPIRUN=PATH names one",
-            file=sys.stderr,
-            flush=True,
+    lack, mpirun = launch.lacking_for_ranks(), launch.launcher()
+    if lack or mpirun is None:
+        write_line(
+            f"{lack}, so one process computes: install MPI and mpi4py for more, or run parts side "
+            f"by side (--part 1/{ranks - 1} --out PART1.h5, …) and join them with adhesis merge"
         )
         return None
-    code, sentence = launch.run_ranks(mpirun, ranks, args.words, program)
-    if code not in _CODES:
-        sentence = (
-            f"adhesis run: a rank was killed ({Path(mpirun).name} ended with {code}); what was "
-            "done is kept, run the same command again to resume"
-        )
-        code = launch.KILLED
-    if sentence:
-        write_line(sentence)
-    return code
+    end = launch.run_ranks(mpirun, ranks, args.words, program)
+    for line in filter(None, (*end.words, end.sentence)):
+        write_line(line)
+    return end.code
 
 
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
@@ -186,11 +178,14 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Overdue
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
+    from adhesis.ensemble.run.launch import report_meeting
     from adhesis.ensemble.run.ranks import together
     from adhesis.ensemble.run.session import Options, OutOfReach, run_campaign
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
+    if comm is not None and comm.rank == 0:
+        report_meeting()
     path = Path(args.out or f"{Path(args.campaign).stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
