@@ -166,7 +166,7 @@ class Campaign:
         checks.flag("progress", progress)
         from adhesis.ensemble.results.layout import check_new_file
 
-        if not path.exists():
+        if not os.path.exists(path):
             check_new_file("out", path)
         if ranks == 1:
             self._run_here(path, progress)

@@ -35,7 +35,7 @@ def target_of(path: Path | str) -> Path:
     Other paths stay as they were given, for messages.
     """
     path = Path(path)
-    return Path(os.path.realpath(path)) if path.is_symlink() else path
+    return Path(os.path.realpath(path)) if os.path.islink(path) else path
 
 
 # ---------------------------------------------------------------------- before the work

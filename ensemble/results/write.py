@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -41,6 +41,10 @@ _NAMES = frozenset(d.name for d in RESULT_DATASETS)
 # What a row holds beside the task itself, its status and its checksum.
 _CONTENT = tuple(d for d in DATASETS if d not in (*TASK_DATASETS, STATUS, CHECKSUM))
 
+# Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
+_LONGEST_NAME = 200
+_DESCRIPTORS = Path("/proc/self/fd")  # of Linux
+
 
 class Writer:
     """Writes rows of a results file that exists.
@@ -66,7 +70,9 @@ class Writer:
         # HDF5's own lock would refuse readers; two writers are refused by
         # adhesis.ensemble.run.lock.
         options = {"locking": False} if comm is None else {"driver": "mpio", "comm": comm}
-        self._file = h5py.File(self.path, "r+", **options)
+        self._names = ExitStack()
+        name = self.path if comm is None else self._names.enter_context(_short_name(self.path))
+        self._file = h5py.File(name, "r+", **options)
         self._origin = origin
         self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
         self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
@@ -88,6 +94,7 @@ class Writer:
     def close(self) -> None:
         """Close the file (collectively, if it was opened so)."""
         self._file.close()
+        self._names.close()
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
         """Write the row of a task that was computed; its status last.
@@ -185,6 +192,19 @@ class Writer:
         # Parallel HDF5 keeps no data back; the serial driver does, in any order.
         if self._serial:
             self._file.flush()
+
+
+@contextmanager
+def _short_name(path: Path) -> Iterator[Path]:
+    """Give a file with a long path a short name in this process, as long as it is open."""
+    if len(os.fsencode(path)) <= _LONGEST_NAME or not os.path.isdir(_DESCRIPTORS):
+        yield path
+        return
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        yield _DESCRIPTORS / str(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 class DatasetRows:

@@ -295,7 +295,7 @@ def run_ranks(
         except OSError as error:
             reason = error.strerror or str(error)
             raise InputError(f"{launcher} cannot be started: {reason}") from error
-        launched = _Launched(process, handed_over, output)
+        launched = _Launched(Path(launcher).name, process, handed_over, output)
         stack.callback(launched.end)
         with _signals_passed_to(launched):
             launched.follow()
@@ -307,9 +307,14 @@ class _Launched:
     """A launcher that runs: what its ranks print and report, and whether it hangs."""
 
     def __init__(
-        self, process: subprocess.Popen[bytes], handed_over: Path, output: Callable[[str], None]
+        self,
+        name: str,
+        process: subprocess.Popen[bytes],
+        handed_over: Path,
+        output: Callable[[str], None],
     ) -> None:
         self.process = process
+        self._name = name
         self.handed_over = handed_over
         self.met = False
         self.signal = ""  # the name of the first one that was passed on
@@ -397,15 +402,15 @@ class _Launched:
 
     def end_without_code(self) -> RanksEnd:
         """Return the end of ranks of which none has passed on an exit code here."""
-        code, name = self.process.returncode, Path(str(self.process.args[0])).name
+        code, name = self.process.returncode, self._name
         if self._code is not None or code == 0:
             return self._code or RanksEnd(0)
         again = "what was done is kept, run the same command again to resume"
         if self.interrupted_twice:
             return RanksEnd(INTERRUPTED, f"adhesis run: interrupted; {again}")
         if self.signal:
-            name = _described(self.signal)
-            return RanksEnd(RESUME, f"adhesis run: stopped early: {name} received; {again}")
+            what = f"stopped early: {_described(self.signal)} received"
+            return RanksEnd(RESUME, f"adhesis run: {what}; {again}")
         words = tuple(map(printable, self._words))
         if self.met:
             text = f"adhesis run: a rank was killed, or MPI failed ({name} ended with {code})"

@@ -16,9 +16,11 @@ import adhesis
 from adhesis.ensemble.command import streams
 from adhesis.ensemble.run import launch
 from adhesis.ensemble.run.launch import RanksEnd
+from tests.support.campaign_support import adhesis as run_adhesis
 from tests.support.campaign_support import (
     adhesis_here,
     campaign_text,
+    differences,
     done_rows,
     start_python,
     wait_until,
@@ -196,7 +198,7 @@ def test_a_signal_before_the_ranks_have_met_ends_the_launcher(numbers, code, lau
 SITES = [
     {"OMPI_MCA_pml": "nosuch"},
     {"OMPI_MCA_orte_default_hostfile": "/none", "PRTE_MCA_prte_default_hostfile": "/none"},
-    {"OMPI_MCA_rmaps_base_mapping_policy": "ppr:1:node", "PRTE_MCA_plm": "nosuch"},
+    {"OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1"},
 ]
 
 
@@ -214,6 +216,20 @@ def test_settings_of_a_site_that_start_no_rank_are_named(site, tmp_path, monkeyp
     for name, value in site.items():
         assert f"{name}={value}" in last
     assert not out.exists()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", ["results", "n" * 240])
+def test_ranks_write_a_file_with_a_path_of_any_length(name, tmp_path):
+    """Open MPI 4.1 has buffers of 256 bytes for a path and what it adds."""
+    folder = tmp_path.joinpath("d" * 120, "e" * 200)
+    folder.mkdir(parents=True)
+    path, out, whole = write_campaign(tmp_path), folder / f"{name}.h5", tmp_path / "whole.h5"
+    assert adhesis_here("run", path, "--out", whole, fake="").returncode == 0
+    process = run_adhesis("run", path, "--out", out, "--ranks", 3, fake="")
+    assert process.returncode == 0, process.stderr
+    assert differences(out, whole) == []
+    assert [path.name for path in folder.iterdir()] == [out.name]
 
 
 UNDER_LIMIT = """

@@ -227,7 +227,7 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
     """Refuse the campaign file itself, and a new results file that does not end in .h5."""
     from adhesis.ensemble.results.layout import check_new_file
 
-    if not path.exists():
+    if not os.path.exists(path):
         check_new_file("--out", path)
     elif path.samefile(args.campaign):
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
