@@ -64,6 +64,8 @@ _TERMINATED = 5.0  # s that a launcher has to end its ranks, until it is killed
 _LOOK_EVERY = 0.5  # s
 _MOST_WORDS = 100  # lines of a launcher that are kept
 
+_AGAIN = "what was done is kept, run the same command again to resume"
+
 # Where users and sites set what a launcher does, beside its own installation.
 _SETTINGS = ("OMPI_MCA_", "PRTE_MCA_", "PMIX_MCA_", "HYDRA_", "I_MPI_", "MPICH_", "UCX_", "FI_")
 _SETTINGS_FOLDERS = (".openmpi", ".prte", ".pmix")
@@ -402,31 +404,29 @@ class _Launched:
 
     def end_without_code(self) -> RanksEnd:
         """Return the end of ranks of which none has passed on an exit code here."""
-        code, name = self.process.returncode, self._name
-        if self._code is not None or code == 0:
+        if self._code is not None or self.process.returncode == 0:
             return self._code or RanksEnd(0)
-        again = "what was done is kept, run the same command again to resume"
         if self.interrupted_twice:
-            return RanksEnd(INTERRUPTED, f"adhesis run: interrupted; {again}")
+            return RanksEnd(INTERRUPTED, f"adhesis run: interrupted; {_AGAIN}")
         if self.signal:
-            what = f"stopped early: {_described(self.signal)} received"
-            return RanksEnd(RESUME, f"adhesis run: {what}; {again}")
+            name = _described(self.signal)
+            return RanksEnd(RESUME, f"adhesis run: stopped early: {name} received; {_AGAIN}")
         words = tuple(map(printable, self._words))
         if self.met:
-            text = f"adhesis run: a rank was killed, or MPI failed ({name} ended with {code})"
-            return RanksEnd(KILLED, f"{text}; {again}", words)
-        what = (
-            f"{name} brought no ranks together within {_MEETING:g} s and was ended"
-            if self._late
-            else f"{name} brought no ranks together and ended with {code}"
-        )
-        cause = ", for the reason above" if words else ", without a reason"
+            return RanksEnd(KILLED, f"adhesis run: {self._killed()}", words)
+        return RanksEnd(BAD_INPUT, f"adhesis run: {self._apart()}", words)
+
+    def _killed(self) -> str:
+        ended = f"{self._name} ended with {self.process.returncode}"
+        return f"a rank was killed, or MPI failed ({ended}); {_AGAIN}"
+
+    def _apart(self) -> str:
+        ended = f"and ended with {self.process.returncode}"
+        how = f"within {_MEETING:g} s and was ended" if self._late else ended
+        cause = "for the reason above" if self._words else "without a reason"
         given = ", ".join(_settings())
-        remedy = (
-            f"correct the settings of MPI ({given})" if given else "adhesis doctor tries MPI out"
-        )
-        text = f"adhesis run: {what}{cause}: {remedy}, or run without --ranks"
-        return RanksEnd(BAD_INPUT, text, words)
+        remedy = f"correct the settings of MPI ({given})" if given else "adhesis doctor tests MPI"
+        return f"{self._name} brought no ranks together {how}, {cause}: {remedy}, or omit --ranks"
 
 
 def _settings() -> list[str]:

@@ -114,7 +114,7 @@ def test_a_launcher_that_starts_no_rank_is_bad_input_whatever_its_code(code, lau
     )
     assert end.sentence.startswith(sentence)
     assert "OMPI_MCA_btl=self\\x1b, " in end.sentence
-    assert f"{folder}/mca-params.conf), or run without --ranks" in end.sentence
+    assert f"{folder}/mca-params.conf), or omit --ranks" in end.sentence
 
 
 def test_a_launcher_that_says_nothing_leaves_a_hint(launcher, monkeypatch, tmp_path):
@@ -122,7 +122,7 @@ def test_a_launcher_that_says_nothing_leaves_a_hint(launcher, monkeypatch, tmp_p
         monkeypatch.delenv(name)
     end, _ = launcher("exit 1", HOME=str(tmp_path))
     assert end.sentence.endswith(
-        "ended with 1, without a reason: adhesis doctor tries MPI out, or run without --ranks"
+        "ended with 1, without a reason: adhesis doctor tests MPI, or omit --ranks"
     )
 
 

@@ -28,6 +28,7 @@ INTERNAL = {
 PARTS = {"truncated", "head"}
 # Functions that make the sentences of errors and warnings.
 SENTENCES = {
+    "ensemble/run/launch.py": ("lacking_for_ranks", "_killed", "_apart"),
     "solver/model/problem.py": ("full_contact",),
     "solver/loading/loop_result.py": ("warnings", "strain_warnings"),
     "solver/loading/zero_range.py": ("range_warnings",),

@@ -3,7 +3,8 @@
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
 itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime): run the
-same command again to resume. 137: a rank that --ranks started was killed; the same holds.
+same command again to resume. Of --ranks, 137: a rank was killed, and the same holds; and 2: the
+launcher brought no ranks together.
 """
 
 from __future__ import annotations
