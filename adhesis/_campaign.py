@@ -133,6 +133,8 @@ class Campaign:
     ) -> CampaignResults:
         """Compute what is missing in the results file, and open it.
 
+        It runs in any thread; signals stop it in order in the main thread alone.
+
         Parameters
         ----------
         out : path

@@ -14,6 +14,7 @@ import pytest
 
 import adhesis
 from adhesis.ensemble.command import streams
+from adhesis.ensemble.doctor import examine
 from adhesis.ensemble.run import launch
 from adhesis.ensemble.run.launch import RanksEnd
 from tests.support.campaign_support import adhesis as run_adhesis
@@ -216,6 +217,9 @@ def test_settings_of_a_site_that_start_no_rank_are_named(site, tmp_path, monkeyp
     for name, value in site.items():
         assert f"{name}={value}" in last
     assert not out.exists()
+    (check,) = [check for check in examine.examine().checks if check.name == "ranks"]
+    assert not check.ok
+    assert f"{name}={value}" in check.text
 
 
 @pytest.mark.mpi
