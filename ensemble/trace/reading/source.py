@@ -156,9 +156,9 @@ def source_of(given: Any) -> Source:
 
 
 def _refuse_no_file(path: Path) -> None:
-    if os.path.isdir(path):
+    if path.is_dir():
         raise InputError(f"{path} is a directory: a trace is a file")
-    if not os.path.exists(path):
+    if not path.exists():
         raise InputError(f"cannot read {path}: there is no such file")
-    if not os.path.isfile(path):
+    if not path.is_file():
         raise InputError(f"{path} is a pipe or a device: write its content to a file first")
