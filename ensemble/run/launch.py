@@ -172,7 +172,7 @@ def hand_over(code: int, sentence: str = "") -> bool:
     if not started:
         return False
     try:
-        with open(started, "r+", encoding="utf-8") as stream:
+        with open(started, "r+", encoding="utf-8", errors="backslashreplace") as stream:
             stream.write(f"{code}\n{sentence}")
     except OSError:  # on another node there is no such file
         _report(f"{code} {' '.join(sentence.split())}")
@@ -206,9 +206,11 @@ def marked(data: bytes, within: bool) -> bytes:
     within : bool
         Whether it goes on with a line.
     """
-    mark = _MARK.encode()
-    lines = data.splitlines(keepends=True)
-    return b"".join(line if within and i == 0 else mark + line for i, line in enumerate(lines))
+    line = re.compile(rb"[^\n]*\n|[^\n]+")
+    lines = line.findall(data)
+    return b"".join(
+        text if within and i == 0 else _MARK.encode() + text for i, text in enumerate(lines)
+    )
 
 
 def described_signal(name: str) -> str:
@@ -230,7 +232,8 @@ class RanksEnd(NamedTuple):
     Attributes
     ----------
     code : int
-        The exit code that a rank passed on; without one that of :func:`_end_without_code`.
+        The one that a rank passed on. Without one: 0 if the launcher ended with it, 2 if the ranks
+        have never met, 75 or 130 after a signal, and 137 otherwise.
     sentence : str
         The last message, to be printed.
     words : tuple of str
@@ -251,8 +254,8 @@ def run_ranks(
 ) -> RanksEnd:
     """Start ranks with a command of adhesis and wait for their end.
 
-    The exit code of the launcher counts only if it is 0, or no rank has passed one on: launchers
-    end with 1, and with others of adhesis, for reasons of their own.
+    Of the launcher's exit code only 0 counts: launchers end with 1, and with other codes of
+    adhesis, for reasons of their own.
 
     In the main thread, SIGTERM, SIGHUP, SIGUSR1 and Ctrl-C stop the ranks in order; a second Ctrl-C
     ends them at once. If this process is killed, the launcher ends them. A launcher whose ranks do

@@ -91,8 +91,8 @@ def test_a_rank_hands_over_what_its_starter_reads(here, tmp_path, monkeypatch, c
 def test_every_line_of_a_rank_is_marked_once(monkeypatch, capfd):
     monkeypatch.setenv(launch.STARTED, "/nowhere")
     raw = streams._Stderr(2, "w", closefd=False)
-    assert [raw.write(data) for data in (b"one\ntw", b"o\n", b"three\n")] == [6, 2, 6]
-    assert capfd.readouterr().err == "\x1eone\n\x1etwo\n\x1ethree\n"
+    assert [raw.write(data) for data in (b"one\ntw", b"o\n", b"th\rree\n\n")] == [6, 2, 8]
+    assert capfd.readouterr().err == "\x1eone\n\x1etwo\n\x1eth\rree\n\x1e\n"
     monkeypatch.delenv(launch.STARTED)
     raw.write(b"four\n")
     assert capfd.readouterr().err == "four\n"
