@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import os
@@ -135,6 +134,8 @@ class Campaign:
     ) -> CampaignResults:
         """Compute what is missing in the results file, and open it.
 
+        It runs in any thread; signals stop it in order in the main thread alone.
+
         Parameters
         ----------
         out : path
@@ -169,7 +170,7 @@ class Campaign:
         checks.flag("progress", progress)
         from adhesis.ensemble.results.layout import check_new_file
 
-        if not path.exists():
+        if not os.path.exists(path):
             check_new_file("out", path)
         from adhesis.ensemble.errors import InputError
         from adhesis.ensemble.run import launch
@@ -195,9 +196,10 @@ class Campaign:
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run.session import Options, run_campaign
 
-        with contextlib.nullcontext() if progress else contextlib.redirect_stderr(io.StringIO()):
-            options = Options(processes=processes)
-            summary = run_campaign(self.tables, path, options=options, say=log)
+        say = log if progress else lambda text: None
+        stream = None if progress else io.StringIO()  # stderr is that of all threads
+        options = Options(processes=processes)
+        summary = run_campaign(self.tables, path, options=options, say=say, stream=stream)
         if summary.stopped:
             raise RuntimeError(
                 f"the campaign stopped early: {summary.stopped}; {summary.pending} of "
@@ -213,18 +215,19 @@ class Campaign:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "campaign.toml")
             file.write_text(self.text, encoding="utf-8")
-            code, sentence = launch.run_ranks(
+            end = launch.run_ranks(
                 mpirun,
                 ranks,
                 ["run", str(file), "--out", str(path.absolute())],
                 output=log if progress else lambda line: None,
             )
-        if code == BAD_INPUT:
-            raise InputError(sentence.removeprefix("adhesis run: ") or "the ranks refused the run")
-        if code not in (DONE, SOME_FAILED):
+        sentence = "\n".join((*end.words, end.sentence.removeprefix("adhesis run: ")))
+        if end.code == BAD_INPUT:
+            raise InputError(sentence or "the ranks refused the run")
+        if end.code not in (DONE, SOME_FAILED):
             raise RuntimeError(
                 sentence
-                or f"the ranks ended with exit code {code}; what was done is kept in {path}"
+                or f"the ranks ended with exit code {end.code}; what was done is kept in {path}"
             )
 
 

@@ -35,7 +35,7 @@ def target_of(path: Path | str) -> Path:
     Other paths stay as they were given, for messages.
     """
     path = Path(path)
-    return Path(os.path.realpath(path)) if path.is_symlink() else path
+    return Path(os.path.realpath(path)) if os.path.islink(path) else path
 
 
 # ---------------------------------------------------------------------- before the work
@@ -250,8 +250,8 @@ def write_netcdf(path: Path, dataset: xr.Dataset) -> None:
     It is made in memory: HDF5 reports a full disk when the file is closed, and ends the process
     with a segmentation fault where the library closes it at exit.
     """
-    data = dataset.to_netcdf(None, engine="h5netcdf")
-    with whole_file(path) as stream:
+    # Released at once: the view of a stream that an error keeps alive is reported at the exit.
+    with memoryview(dataset.to_netcdf(None, engine="h5netcdf")) as data, whole_file(path) as stream:
         stream.write(data)
 
 

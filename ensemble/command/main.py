@@ -11,7 +11,6 @@ import importlib
 import os
 import signal
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Iterator, Sequence
@@ -21,6 +20,7 @@ from types import FrameType
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
 from adhesis.ensemble.errors import InputError, RankError, WriteError, lack, naming_options
+from adhesis.ensemble.run.interrupt import in_main_thread
 from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
 from adhesis.ensemble.run.ranks import launched
 
@@ -156,8 +156,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
 @contextmanager
 def _termination(*, enabled: bool) -> Iterator[None]:
     """Raise Terminated at SIGTERM, so that unfinished files are removed."""
-    in_main = threading.current_thread() is threading.main_thread()
-    if not (enabled and in_main and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL):
+    if not (enabled and in_main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL):
         yield
         return
 

@@ -55,6 +55,8 @@ class Parser(argparse.ArgumentParser):
             delattr(args, _GIVEN)
             return args
         except argparse.ArgumentError as error:
+            if error.argument_name is None:  # of no single option, as newer Pythons have it
+                self.error(error.message)
             link = " " if error.message.startswith("is ") else ": "
             self.error(f"{error.argument_name}{link}{error.message}")
 

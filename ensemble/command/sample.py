@@ -6,6 +6,7 @@ It is synthetic: 1 mm in steps of 1 µm, rough down to 20 µm, with tilt, bow, n
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
@@ -25,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
-    if args.file.is_file():
+    if os.path.isfile(args.file):
         raise InputError(f"FILE is {args.file}, which exists: give another name")
     check_outputs({"FILE": args.file}, {})
     writing = Writing()

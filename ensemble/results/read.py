@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -407,6 +408,8 @@ def _damage(path: Path) -> Iterator[None]:
     except PermissionError as error:
         raise InputError(f"{path} cannot be read: permission denied") from error
     except Exception as error:  # h5py raises nearly every kind over damaged bytes
+        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+            raise InputError(f"{path} cannot be read: {os.strerror(error.errno)}") from error
         raise InputError(
             f"{path} is not a results file of adhesis, or it is damaged or truncated"
         ) from error

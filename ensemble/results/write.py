@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -42,6 +42,10 @@ _NAMES = frozenset(d.name for d in RESULT_DATASETS)
 # What a row holds beside the task itself, its status and its checksum.
 _CONTENT = tuple(d for d in DATASETS if d not in (*TASK_DATASETS, STATUS, CHECKSUM))
 
+# Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
+_LONGEST_NAME = 200
+_DESCRIPTORS = Path("/proc/self/fd")  # of Linux
+
 
 class Writer:
     """Writes rows of a results file that exists.
@@ -66,11 +70,13 @@ class Writer:
         # HDF5's own lock would refuse readers; two writers are refused by
         # adhesis.ensemble.run.lock.
         self._disk = DiskFile(self.path, "r+b") if comm is None else None
+        self._names = ExitStack()
         with signals_held():
             if self._disk is not None:
                 self._file = h5py.File(self._disk, "r+")
             else:
-                self._file = h5py.File(self.path, "r+", driver="mpio", comm=comm)
+                name = self._names.enter_context(_short_name(self.path))
+                self._file = h5py.File(name, "r+", driver="mpio", comm=comm)
             self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
             self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
         self._origin = origin
@@ -95,6 +101,7 @@ class Writer:
             self._file.close()
             if self._disk is not None:
                 self._disk.close()
+        self._names.close()
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
         """Write the row of a task that was computed; its status last.
@@ -193,6 +200,19 @@ class Writer:
         if self._disk is not None:
             self._file.flush()
             self._disk.check()
+
+
+@contextmanager
+def _short_name(path: Path) -> Iterator[Path]:
+    """Give a file with a long path a short name in this process, as long as it is open."""
+    if len(os.fsencode(path)) <= _LONGEST_NAME or not os.path.isdir(_DESCRIPTORS):
+        yield path
+        return
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        yield _DESCRIPTORS / str(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 class DatasetRows:

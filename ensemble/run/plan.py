@@ -163,7 +163,7 @@ def prepare(
 
     _check_path(path)
     lock.acquire(size, patience)
-    if not path.exists():
+    if not os.path.exists(path):
         check_cells(tasks)
         create(path, campaign, part=part, versions=versions())
         batches = Batches(campaign, tasks, {}) if campaign.stop.relative_error else None
@@ -235,13 +235,13 @@ def _planned(plan: Plan) -> int:
 
 def _check_path(path: Path) -> None:
     folder = path.parent
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise InputError(f"{path} cannot be written: there is no folder {folder}")
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError(f"{path} is a directory, not a results file")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{path} cannot be written: the folder {folder} is read-only")
-    if path.exists() and not os.access(path, os.R_OK | os.W_OK):
+    if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
         raise InputError(f"{path} cannot be written: permission denied")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import resource
 import sys
 import time
@@ -193,7 +194,7 @@ def price(
     tasks = campaign.tasks(part)
     known = _Known(tasks)
     left, done = tasks, 0
-    if path is not None and path.exists():
+    if path is not None and os.path.exists(path):
         left, done = _left(campaign, path, tasks, known)
     if left:
         prepare(left)

@@ -180,6 +180,41 @@ def test_an_option_that_is_given_twice_is_refused(words, capsys):
     assert not [name for name in vars(many) if name.startswith("_")]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("run c.toml --out {}.h5", "run c.toml --out {}.h5 --ranks 2", "run {}.toml"),
+        *("new {}.toml", "sample {}.csv", "merge a.h5 --out {}.h5", "merge {}.h5 --out a.h5"),
+        *("status {}.h5", "verify {}.h5", "report {}.h5 --to x", "bench --to {}", "doctor --in {}"),
+        *("trace {}.csv --to x CONTACT", "trace c.csv --to {} CONTACT"),
+        "loop --heights {}.csv --period 2mm CONTACT",
+        *(f"loop --hurst 0.8 --{name} {{}}.{name}" for name in ("json", "csv")),
+        *("loop --hurst 0.8 --fields {}.npz", "loop --hurst 0.8 --film {}.html"),
+    ],
+)
+def test_a_name_that_is_too_long_is_one_sentence(words, capsys, tmp_path, monkeypatch):
+    """Of a file or folder, of the folder that it is in, and of the whole path."""
+    monkeypatch.chdir(tmp_path)
+    write_campaign(tmp_path)
+    assert main(["sample", "c.csv"]) == 0
+    capsys.readouterr()
+    words = words.replace("CONTACT", " ".join(CONTACT))
+    for name in ("y" * 256, "y" * 300 + "/x", "z/" * 2100 + "x"):
+        assert name in refused(capsys, words.format(name).split())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.csv", "c.toml"]
+
+
+def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
+    """Python 3.13 raises what older ones report through ``error``."""
+
+    def parse_args(self, words, namespace):
+        raise argparse.ArgumentError(None, f"unrecognized arguments: {' '.join(words[1:])}")
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", parse_args)
+    line = refused(capsys, ["trace", "x.csv", "--speed"])
+    assert line.startswith("adhesis trace: unrecognized arguments: --speed (")
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_refuses_what_it_cannot_read(name, capsys):
     """An unknown option, a missing value, an empty one, and a text in place of a number."""

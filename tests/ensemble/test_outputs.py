@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -293,7 +294,9 @@ def test_a_report_on_a_full_disk_ends_in_one_sentence(ask: Ask) -> None:
         check=False,
     )
     assert done.returncode == 74, done.stderr
-    assert done.stderr.splitlines() == [
+    lines = done.stderr.splitlines()
+    progress = re.compile(r"adhesis report: .+ \(\d+ s\)")  # on a busy machine
+    assert [line for line in lines if not progress.fullmatch(line)] == [
         "adhesis report: the report in out could not be written (File too large)"
     ]
     assert list(Path("out").iterdir()) == []

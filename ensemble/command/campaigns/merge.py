@@ -7,6 +7,7 @@ results file like any other: merge further parts into it, resume it, grow its ca
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -33,9 +34,9 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.solver.checks import counted
 
     out = Path(args.out)
-    if not out.parent.is_dir():
+    if not os.path.isdir(out.parent):
         raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
-    if not out.exists():
+    if not os.path.exists(out):
         check_new_file("--out", out)
     try:
         with RunLock(out) as lock:

@@ -4,7 +4,8 @@ A results file that exists is resumed, or extended if the campaign grew; one of 
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
 itself, 71 too little memory or too few processes, 74 the results file could not be written, 75
 stopped early (a signal, the walltime, a rank that does not answer): run the same command again to
-resume. 137: a rank that --ranks started was killed; the same holds.
+resume. Of --ranks, 137: a rank was killed, and the same holds; and 2: the launcher brought no ranks
+together.
 """
 
 from __future__ import annotations
@@ -32,10 +33,6 @@ WRITE_FAILED, RESUME = 74, 75  # EX_IOERR, EX_TEMPFAIL
 INTERRUPTED = 130  # by a second Ctrl-C: the first one stops the run in order
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
-_CODES = (
-    *(DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, TOO_FEW_RESOURCES),
-    *(WRITE_FAILED, RESUME, INTERRUPTED),
-)
 EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
@@ -169,16 +166,10 @@ def _start_ranks(
     """Start ranks and wait for them; returns the exit code."""
     from adhesis.ensemble.run import launch
 
-    code, sentence = launch.run_ranks(mpirun, ranks, args.words, program)
-    if code not in _CODES:
-        sentence = (
-            f"adhesis run: a rank was killed ({Path(mpirun).name} ended with {code}); what was "
-            "done is kept, run the same command again to resume"
-        )
-        code = launch.KILLED
-    if sentence:
-        write_line(sentence)
-    return code
+    end = launch.run_ranks(mpirun, ranks, args.words, program)
+    for line in filter(None, (*end.words, end.sentence)):
+        write_line(line)
+    return end.code
 
 
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
@@ -197,12 +188,15 @@ def _run(
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
+    from adhesis.ensemble.run.launch import report_meeting
     from adhesis.ensemble.run.ranks import together
     from adhesis.ensemble.run.session import Options, run_campaign
     from adhesis.solver.checks import counted
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
+    if comm is not None and comm.rank == 0:
+        report_meeting()
     path = Path(args.out or f"{Path(args.campaign).stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
@@ -241,7 +235,7 @@ def _check_out(args: argparse.Namespace, path: Path) -> None:
     """Refuse the campaign file itself, and a new results file that does not end in .h5."""
     from adhesis.ensemble.results.layout import check_new_file
 
-    if not path.exists():
+    if not os.path.exists(path):
         check_new_file("--out", path)
     elif path.samefile(args.campaign):
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
