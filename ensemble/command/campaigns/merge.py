@@ -21,8 +21,12 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("parts", metavar="PART.h5", nargs="+", help="results files of one campaign")
-    parser.add_argument("--out", metavar="FILE.h5", required=True, help="made, or merged into")
+    parser.add_argument(
+        "parts", type=Path, metavar="PART.h5", nargs="+", help="results files of one campaign"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.h5", required=True, help="made, or merged into"
+    )
 
 
 def execute(args: argparse.Namespace) -> int:
@@ -32,7 +36,7 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.ensemble.run.lock import RunLock
     from adhesis.solver.checks import counted
 
-    out = Path(args.out)
+    out = args.out
     if not out.parent.is_dir():
         raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
     if not out.exists():

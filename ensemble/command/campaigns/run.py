@@ -22,7 +22,7 @@ from adhesis.ensemble.errors import InputError, WriteError
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
-    from adhesis.ensemble.campaign.tasks import Task
+    from adhesis.ensemble.campaign.tasks import Task, Tasks
     from adhesis.ensemble.run.session import Engine, Options, Summary
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
@@ -39,9 +39,12 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="the campaign file")
     parser.add_argument(
-        "--out", metavar="FILE.h5", help="results file (default: the campaign's name, here)"
+        "--out",
+        type=Path,
+        metavar="FILE.h5",
+        help="results file (default: the campaign's name, here)",
     )
     parser.add_argument(
         "--ranks",
@@ -191,7 +194,7 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
-    path = Path(args.out or f"{Path(args.campaign).stem}.h5")
+    path = args.out or Path(f"{args.campaign.stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
         alone = comm is None or comm.rank == 0
@@ -292,10 +295,10 @@ def _tell_price(
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    def prepare(tasks: list[Task]) -> None:
+    def prepare(tasks: Tasks) -> None:
         from adhesis.ensemble.warm import warm_up  # loads the compiler
 
-        for task in {t.cell: t for t in reversed(tasks)}.values():
+        for task in tasks:
             engine.check(campaign, task)
         warm_up(engine.methods(campaign, tasks), say)
 
