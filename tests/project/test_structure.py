@@ -27,6 +27,7 @@ FOLDERS = (*PACKAGES.values(), "tests")
 # The only modules that import what is slow to load: MPI, the file format, the compiler, figures.
 MPI = {"adhesis.ensemble.run.ranks", "adhesis.ensemble.doctor.probe"}
 HDF5 = {
+    "adhesis.ensemble.loop.sealed_file",
     "adhesis.ensemble.results.merge",
     "adhesis.ensemble.results.head",
     "adhesis.ensemble.results.layout",
