@@ -278,10 +278,25 @@ def function(name: str, value: T) -> T:
 
 
 def path(name: str, value: object) -> Path:
-    """Return a path; TypeError for anything else."""
-    if not isinstance(value, str | os.PathLike):
+    """Return a path; TypeError for anything else.
+
+    Raises
+    ------
+    TypeError
+        If it is no path, or one of bytes.
+    ValueError
+        If no file can have this name: it is empty, or holds a NUL or half a character.
+    """
+    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise TypeError(_sentence(name, value, "a path"))
-    return Path(value)
+    text = os.fspath(value)
+    try:
+        possible = bool(text) and b"\0" not in os.fsencode(text)
+    except UnicodeEncodeError:
+        possible = False
+    if not possible:
+        raise ValueError(_sentence(name, text, "the name of a file"))
+    return Path(text)
 
 
 def row(

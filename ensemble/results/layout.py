@@ -31,12 +31,12 @@ from adhesis.ensemble.results.read import Results, stretches
 from adhesis.ensemble.results.schema import (
     DAMAGED,
     DATASETS,
-    FILE_TYPE,
-    FILE_VERSION,
     TASK_DATASETS,
     axis_datasets,
     datasets,
+    description,
     file_size,
+    fixed_attributes,
     scales,
     shape_of,
 )
@@ -51,6 +51,16 @@ def check_new_file(option: str, path: Path) -> None:
     """Refuse a results file that is to be made with another ending than .h5."""
     if path.suffix != ".h5":
         raise InputError(f"{option} is {path}: the name of a new results file must end in .h5")
+
+
+def check_space(path: Path, campaign: Campaign, part: Part = WHOLE) -> None:
+    """Refuse a file that the disk has no room for (InputError), before its tasks are made."""
+    needed = file_size(campaign, part)
+    free = shutil.disk_usage(path.parent).free
+    if needed > free:
+        raise InputError(
+            f"{path} needs {bytes_text(needed)} and the disk has {bytes_text(free)} free"
+        )
 
 
 def create(
@@ -84,14 +94,9 @@ def create(
     """
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
-    needed = file_size(campaign, part)
     with signals_held():
         try:
-            free = shutil.disk_usage(path.parent).free
-            if needed > free:
-                raise InputError(
-                    f"{path} needs {bytes_text(needed)} and the disk has {bytes_text(free)} free"
-                )
+            check_space(path, campaign, part)
             # Made anew, so that a link of that name is removed and not followed.
             unfinished.unlink(missing_ok=True)
             with h5py.File(unfinished, "x", locking=False) as file:
@@ -116,21 +121,17 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
     for scale in laid_out:
         dataset = file.create_dataset(scale.name, data=scale.values)
         dataset.make_scale(scale.name)
-        dataset.attrs["units"] = scale.unit
-        dataset.attrs["long_name"] = scale.meaning
+        _set_attributes(dataset, description(scale))
     for column in datasets(campaign):
         dataset = _allocate(file, column, shape_of(column, sizes))
-        dataset.attrs["units"] = column.unit
-        dataset.attrs["long_name"] = column.meaning
-        for name, value in column.attributes.items():
-            dataset.attrs[name] = value
+        _set_attributes(dataset, description(column))
         for axis, dim in enumerate(column.dims):
             dataset.dims[axis].attach_scale(file[dim])
     tasks = campaign.tasks(part)
     for column in TASK_DATASETS:
-        file[column.name][...] = [getattr(task, column.name) for task in tasks]
-    for i, column in enumerate(axis_datasets(campaign)):
-        file[column.name][...] = [task.others[i][1] for task in tasks]
+        file[column.name][...] = tasks.column(column.name)
+    for name, column in zip(tasks.names, axis_datasets(campaign), strict=True):
+        file[column.name][...] = tasks.column(name)
 
 
 def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.Dataset:
@@ -156,19 +157,17 @@ def _describe(
 ) -> None:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     attributes: dict[str, Any] = {
-        "file_type": FILE_TYPE,
-        "file_version": np.array(FILE_VERSION, "i4"),
-        "Conventions": "CF-1.11",
-        "title": "Loading-unloading hysteresis loops of rough adhesive contacts",
-        "campaign": campaign.text,
-        "seed": campaign.sweep.seed,
+        **fixed_attributes(campaign, part),
         "created": now if old is None else old.attributes.get("created", now),
         "laid_out": now,
-        **({} if part == WHOLE else {"part": str(part)}),
         **versions,
     }
+    _set_attributes(file, attributes)
+
+
+def _set_attributes(of: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
-        file.attrs[name] = value
+        of.attrs[name] = value
 
 
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) -> None:
