@@ -177,10 +177,9 @@ class Campaign:
         path = checks.path("out", out)
         ranks = checks.whole("ranks", ranks, _RANKS)
         checks.flag("progress", progress)
-        from adhesis.ensemble.results.layout import check_new_file
+        from adhesis.ensemble.results.layout import check_results_file
 
-        if not path.exists():
-            check_new_file("out", path)
+        check_results_file("out", path)
         if ranks == 1:
             self._run_here(path, progress)
         else:

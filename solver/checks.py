@@ -180,6 +180,8 @@ def shown(value: object) -> str:
         text = repr(value)
     except ValueError:  # an integer of thousands of digits
         text = "a number of thousands of digits"
+    except RecursionError:
+        text = f"a {type(value).__name__} that is nested too deep"
     text = "".join(c if c.isprintable() else " " for c in text)
     text = " ".join(text.split()) if "\n" in text or "  " in text else text
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"

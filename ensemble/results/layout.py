@@ -26,6 +26,7 @@ from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
+from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results, stretches
 from adhesis.ensemble.results.schema import (
@@ -47,10 +48,20 @@ from adhesis.solver.runtime.uninterrupted import signals_held
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
 
 
-def check_new_file(option: str, path: Path) -> None:
-    """Refuse a results file that is to be made with another ending than .h5."""
-    if path.suffix != ".h5":
-        raise InputError(f"{option} is {path}: the name of a new results file must end in .h5")
+def check_results_file(option: str, path: Path) -> None:
+    """Refuse what is no regular file, and a new file that does not end in .h5 (InputError)."""
+    try:
+        kind = irregular(path.stat().st_mode)
+    except FileNotFoundError:
+        if path.suffix != ".h5":
+            raise InputError(
+                f"{option} is {path}: the name of a new results file must end in .h5"
+            ) from None
+        return
+    except OSError as error:
+        raise InputError(f"{option} is {path}: it cannot be written ({error.strerror})") from None
+    if kind is not None:
+        raise InputError(f"{option} is {path}: it is {kind}, not a results file")
 
 
 def check_space(path: Path, campaign: Campaign, part: Part = WHOLE) -> None:

@@ -207,7 +207,7 @@ class Results:
 
         Readers of other programs go by them: by a seed, a unit, or a factor of a dataset.
         """
-        for name, value in fixed_attributes(self.campaign, self.part).items():
+        for name, value in ({"part": None} | fixed_attributes(self.campaign, self.part)).items():
             found: Any = self.attributes.get(name)
             if name not in _WORDING and not np.array_equal(found, value):
                 raise InputError(

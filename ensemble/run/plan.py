@@ -16,6 +16,7 @@ from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.regular_file import irregular
 from adhesis.ensemble.results.layout import check_space, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
@@ -240,8 +241,9 @@ def _check_path(path: Path) -> None:
     folder = path.parent
     if not folder.is_dir():
         raise InputError(f"{path} cannot be written: there is no folder {folder}")
-    if path.is_dir():
-        raise InputError(f"{path} is a directory, not a results file")
+    kind = irregular(path.stat().st_mode) if path.exists() else None
+    if kind is not None:
+        raise InputError(f"{path} is {kind}, not a results file")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{path} cannot be written: the folder {folder} is read-only")
     if path.exists() and not os.access(path, os.R_OK | os.W_OK):

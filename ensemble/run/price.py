@@ -198,8 +198,9 @@ def price(
         left, done = _left(campaign, path, tasks, known)
     if left:
         prepare(left.of_cells())
+    to_try = _to_try(left, known)
     pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
-    for unit in _units(campaign, left, known):
+    for unit in _units(campaign, to_try):
         if time.monotonic() > end:
             break
         together = 0.0
@@ -271,24 +272,27 @@ def _cell_in(campaign: Campaign, task: Task) -> Hashable:
     return (hurst, gamma, rest)
 
 
-def _units(campaign: Campaign, left: Tasks, known: _Known) -> Iterator[list[Task]]:
-    """Tasks that share a loading branch together; realisation by realisation, the cheapest first.
-
-    Tasks of cells that are not known yet; the cheapest first, so that as many cells as possible are
-    met.
-    """
+def _to_try(left: Tasks, known: _Known) -> Tasks:
+    """Tasks of the cells that are not known yet, realisation by realisation."""
     unknown = np.array([not known.seconds.get(cell) for cell in left.cells])
     rows = left.rows[unknown[left.cell_of()]]
-    realisation = rows % left.realisations
-    order = np.argsort(realisation, kind="stable")
-    ends = np.flatnonzero(np.diff(realisation[order], append=-1)) + 1
+    return left.chosen(rows[np.argsort(rows % left.realisations, kind="stable")])
+
+
+def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:
+    """Tasks that share a loading branch together; of each realisation the cheapest first.
+
+    The cheapest first, so that as many cells as possible are met.
+    """
     start = 0
-    for end in ends.tolist():
+    while start < len(tasks):
+        near = tasks[start : start + len(tasks.cells)].column("realisation")
+        count = int(np.count_nonzero(near == near[0]))
         found: dict[Hashable, list[Task]] = {}
-        for task in left.chosen(rows[order[start:end]]):
+        for task in tasks[start : start + count]:
             found.setdefault(campaign.branch_of(task) or task, []).append(task)
         yield from sorted(found.values(), key=lambda unit: sum(prior(task) for task in unit))
-        start = end
+        start += count
 
 
 def _cells(

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Merge; returns 0."""
-    from adhesis.ensemble.results.layout import check_new_file
+    from adhesis.ensemble.results.layout import check_results_file
     from adhesis.ensemble.results.merge import merge
     from adhesis.ensemble.run.lock import RunLock
     from adhesis.solver.checks import counted
@@ -39,8 +39,7 @@ def execute(args: argparse.Namespace) -> int:
     out = args.out
     if not out.parent.is_dir():
         raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
-    if not out.exists():
-        check_new_file("--out", out)
+    check_results_file("--out", out)
     try:
         with RunLock(out) as lock:
             lock.acquire(1, 10.0)

@@ -232,12 +232,11 @@ def _run(args: argparse.Namespace, comm: Any, started: float, engine: Engine | N
 
 
 def _check_out(args: argparse.Namespace, path: Path) -> None:
-    """Refuse the campaign file itself, and a new results file that does not end in .h5."""
-    from adhesis.ensemble.results.layout import check_new_file
+    """Refuse the campaign file itself, and what is no results file or will be none."""
+    from adhesis.ensemble.results.layout import check_results_file
 
-    if not path.exists():
-        check_new_file("--out", path)
-    elif path.samefile(args.campaign):
+    check_results_file("--out", path)
+    if path.exists() and path.samefile(args.campaign):
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
