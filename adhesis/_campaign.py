@@ -130,6 +130,10 @@ class Campaign:
         """
         path = None if out is None else checks.path("out", out)
         seconds = checks.real("seconds", seconds, _PILOT)
+        from adhesis.ensemble.results.layout import check_results_file
+
+        if path is not None:
+            check_results_file("out", path)
         from adhesis.ensemble.run.price import price
         from adhesis.ensemble.task.compute import methods_of
         from adhesis.ensemble.warm import warm_up

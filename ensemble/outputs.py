@@ -41,8 +41,8 @@ def target_of(path: Path | str) -> Path:
     Raises
     ------
     InputError
-        If another user has put the link into a folder in which all may write: it could lead to any
-        file of this user.
+        If the link leads in a circle, or another user has put it into a folder in which all may
+        write: it could lead to any file of this user.
     """
     path = Path(path)
     link = path
@@ -53,6 +53,8 @@ def target_of(path: Path | str) -> Path:
             break
         _check_link(path, link)
         link = link.parent / target
+    else:
+        raise InputError(f"{path} is a link that leads in a circle: give another path")
     return Path(os.path.realpath(path)) if link != path else path
 
 
@@ -124,6 +126,7 @@ def check_output_folder(
         One sentence with the option and the path.
     """
     with _refusing(option, folder):
+        target_of(folder)  # not through a link of another user
         place = Path(os.path.abspath(folder))
         while not os.path.lexists(place) and place.parent != place:
             _check_name(place)

@@ -85,6 +85,8 @@ class CampaignResults:
     def __init__(self, path: Path | str, beside: Sequence[Path | str] = ()) -> None:
         self.path = Path(path)
         self._beside = tuple(beside)
+        for other in self._beside:
+            Results(other).close()  # refused now, and not when a comparison is drawn
         with Results(self.path) as results:
             self.campaign: Campaign = results.campaign
             status = results.status()

@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -56,6 +57,10 @@ def check_results_file(option: str, path: Path) -> None:
         if path.suffix != ".h5":
             raise InputError(
                 f"{option} is {path}: the name of a new results file must end in .h5"
+            ) from None
+        if not target_of(path).parent.is_dir():
+            raise InputError(
+                f"{option} is {path}: there is no directory {target_of(path).parent}"
             ) from None
         return
     except OSError as error:
@@ -105,6 +110,8 @@ def create(
     """
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
+    if unfinished.is_dir() and not unfinished.is_symlink():
+        raise InputError(f"{path} cannot be written: there is a directory {unfinished}, remove it")
     with signals_held():
         try:
             check_space(path, campaign, part)
@@ -123,7 +130,8 @@ def create(
         except OSError as error:
             raise InputError(f"{path} cannot be written: {reason(error)}") from error
         finally:
-            unfinished.unlink(missing_ok=True)
+            with suppress(OSError):  # what another user has put there meanwhile
+                unfinished.unlink(missing_ok=True)
 
 
 def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
