@@ -46,8 +46,7 @@ def load_campaign(path: Path | str) -> Campaign:
             size = max(len(data), os.fstat(stream.fileno()).st_size)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    if size > _LONGEST_TEXT + len(codecs.BOM_UTF8):
-        raise _too_long(str(path), size)
+    _check_size(str(path), size, _LONGEST_TEXT + len(codecs.BOM_UTF8))
     return read_campaign(_decoded(data, str(path)), str(path))
 
 
@@ -115,8 +114,7 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
             f"{source} is not valid TOML: {quoted(text[error.start])} on line "
             f"{text.count(chr(10), 0, error.start) + 1} is half a character, so write it anew"
         ) from None
-    if size > _LONGEST_TEXT:
-        raise _too_long(source, size)
+    _check_size(source, size)
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -138,11 +136,12 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     return campaign
 
 
-def _too_long(source: str, size: int) -> InputError:
-    return InputError(
-        f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
-        "results file keeps its text"
-    )
+def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
+    if size > most:
+        raise InputError(
+            f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
+            "results file keeps its text"
+        )
 
 
 def _given_twice(text: str, error: str) -> str | None:

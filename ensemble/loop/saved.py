@@ -112,6 +112,7 @@ def to_xarray(result: Result) -> xr.Dataset:
         elif value is not None:
             about[entry.name] = np.array(value) if isinstance(value, tuple) else value
     problem = result.problem
+    variables["tangent"][2]["units"] = "m/Pa" if problem.control.is_load else "Pa/m"
     coefficients = problem.profile.coefficients
     for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
         name = f"coefficient_{name}"

@@ -58,10 +58,9 @@ def check_results_file(option: str, path: Path) -> None:
             raise InputError(
                 f"{option} is {path}: the name of a new results file must end in .h5"
             ) from None
-        if not target_of(path).parent.is_dir():
-            raise InputError(
-                f"{option} is {path}: there is no directory {target_of(path).parent}"
-            ) from None
+        folder = target_of(path).parent
+        if not folder.is_dir():
+            raise InputError(f"{path} cannot be written: there is no folder {folder}") from None
         return
     except OSError as error:
         raise InputError(f"{option} is {path}: it cannot be written ({error.strerror})") from None

@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import WriteError
 
 _WRITE_FAILED = 74
 EXAMPLES = (
@@ -37,8 +37,6 @@ def execute(args: argparse.Namespace) -> int:
     from adhesis.solver.checks import counted
 
     out = args.out
-    if not out.parent.is_dir():
-        raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
     check_results_file("--out", out)
     try:
         with RunLock(out) as lock:
