@@ -138,7 +138,10 @@ class Tasks(Sequence[Task]):
 
     def of_cells(self) -> Tasks:
         """Return the first task of each cell."""
-        return self.chosen(self.rows[np.unique(self.cell_of(), return_index=True)[1]])
+        cells = self.cell_of()
+        changes = np.flatnonzero(cells[1:] != cells[:-1]) + 1  # a cell is one long stretch
+        starts = np.concatenate(([0], changes))[: cells.size]
+        return self.chosen(self.rows[starts[np.unique(cells[starts], return_index=True)[1]]])
 
 
 @dataclass(frozen=True)
