@@ -180,6 +180,8 @@ def shown(value: object) -> str:
         text = repr(value)
     except ValueError:  # an integer of thousands of digits
         text = "a number of thousands of digits"
+    except RecursionError:
+        text = f"a {type(value).__name__} that is nested too deep"
     text = "".join(c if c.isprintable() else " " for c in text)
     text = " ".join(text.split()) if "\n" in text or "  " in text else text
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
@@ -285,10 +287,25 @@ def function(name: str, value: T) -> T:
 
 
 def path(name: str, value: object) -> Path:
-    """Return a path; TypeError for anything else."""
-    if not isinstance(value, str | os.PathLike):
+    """Return a path; TypeError for anything else.
+
+    Raises
+    ------
+    TypeError
+        If it is no path, or one of bytes.
+    ValueError
+        If no file can have this name: it is empty, or holds a NUL or half a character.
+    """
+    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise TypeError(_sentence(name, value, "a path"))
-    return Path(value)
+    text = os.fspath(value)
+    try:
+        possible = bool(text) and b"\0" not in os.fsencode(text)
+    except UnicodeEncodeError:
+        possible = False
+    if not possible:
+        raise ValueError(_sentence(name, text, "the name of a file"))
+    return Path(text)
 
 
 def row(

@@ -11,7 +11,7 @@ from typing import Any
 
 from adhesis.ensemble.campaign.rules import shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign
-from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.tasks import Tasks
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,6 @@ def _values(value: Any) -> set[Any]:
     return set(value) if isinstance(value, list) else {value}
 
 
-def _firsts(campaign: Campaign) -> list[Task]:
+def _firsts(campaign: Campaign) -> Tasks:
     """One task of every cell."""
-    return campaign.tasks()[:: campaign.realisations]
+    return campaign.tasks().of_cells()

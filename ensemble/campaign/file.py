@@ -5,7 +5,9 @@ A file that breaks a rule is refused with the key, the value and the rule in one
 
 from __future__ import annotations
 
+import codecs
 import math
+import os
 import re
 import tomllib
 from collections.abc import Sequence
@@ -16,8 +18,9 @@ from typing import Any
 from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.campaign.rules import list_of, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.lengths import HIGHEST_IN_METRES, LONGEST_IN_METRES, parse_length
+from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
@@ -38,20 +41,34 @@ def load_campaign(path: Path | str) -> Campaign:
         If it cannot be read or breaks a rule; one sentence.
     """
     try:
-        data = Path(path).read_bytes()
+        with open_regular(path) as stream:
+            data = stream.read(_LONGEST_TEXT + len(codecs.BOM_UTF8) + 1)
+            size = max(len(data), os.fstat(stream.fileno()).st_size)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    text = _decoded(data, str(path))
-    campaign = parse_campaign(text, str(path))
-    _ask_for_units(str(path), tomllib.loads(text))
+    _check_size(str(path), size, _LONGEST_TEXT + len(codecs.BOM_UTF8))
+    return read_campaign(_decoded(data, str(path)), str(path))
+
+
+def read_campaign(text: str, source: str = "campaign") -> Campaign:
+    """Read and check the text of a campaign that is to be computed.
+
+    Numbers that can hardly be in SI units are refused, as by the options of the command line. The
+    text in a results file is read by :func:`parse_campaign`, which takes them: its loops have been
+    computed.
+
+    Raises
+    ------
+    InputError
+        If it breaks a rule; one sentence.
+    """
+    campaign = parse_campaign(text, source)
+    _ask_for_units(source, tomllib.loads(text))
     return campaign
 
 
 def _ask_for_units(source: str, document: dict[str, Any]) -> None:
-    """Refuse numbers that can hardly be in SI units, as the options of the command line do.
-
-    The text of a campaign in a results file is not asked: its loops have been computed.
-    """
+    """Refuse numbers that can hardly be in SI units."""
     for table, key, read, largest in (
         ("profile", "period", parse_length, LONGEST_IN_METRES),
         ("profile", "h_rms", parse_length, HIGHEST_IN_METRES),
@@ -90,12 +107,14 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     InputError
         If it breaks a rule; one sentence.
     """
-    size = len(text.encode("utf-8"))
-    if size > _LONGEST_TEXT:
+    try:
+        size = len(text.encode("utf-8"))
+    except UnicodeEncodeError as error:
         raise InputError(
-            f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
-            "results file keeps its text"
-        )
+            f"{source} is not valid TOML: {quoted(text[error.start])} on line "
+            f"{text.count(chr(10), 0, error.start) + 1} is half a character, so write it anew"
+        ) from None
+    _check_size(source, size)
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -145,6 +164,14 @@ def _foreign_sign(text: str, error: str) -> str | None:
                     f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
                 )
     return None
+
+
+def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
+    if size > most:
+        raise InputError(
+            f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
+            "results file keeps its text"
+        )
 
 
 def _given_twice(text: str, error: str) -> str | None:
@@ -226,6 +253,11 @@ def _check_together(source: str, campaign: Campaign) -> None:
     """Check the rules that join several keys."""
     profile, cycle = campaign.profile, campaign.cycle
     given = list(profile.normalisation)
+    if campaign.task_count > _MOST_TASKS:
+        raise InputError(
+            f"{source}: [sweep] makes {campaign.task_count} tasks: "
+            f"it must make at most {_MOST_TASKS}"
+        )
     _check_turning_point(source, campaign)
     if len(given) != 1:
         raise InputError(
@@ -262,11 +294,6 @@ def _check_together(source: str, campaign: Campaign) -> None:
         raise InputError(
             f"{source}: [stop] most is {campaign.stop.most}: it must be at least realisations, the "
             f"number that every cell gets ({campaign.sweep.realisations})"
-        )
-    if campaign.task_count > _MOST_TASKS:
-        raise InputError(
-            f"{source}: [sweep] makes {campaign.task_count} tasks: "
-            f"it must make at most {_MOST_TASKS}"
         )
     if campaign.output.field_penetrations and campaign.has_axis("max_penetration"):
         raise InputError(

@@ -27,7 +27,7 @@ from adhesis.ensemble.campaign.rules import (
     positive_number,
     whole_number,
 )
-from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.solver.checks import (
     ACCURACY,
     ADHESION_RANGE,
@@ -339,7 +339,7 @@ class Campaign:
     @property
     def task_count(self) -> int:
         """Number of tasks."""
-        return len(self.cells) * self.realisations
+        return math.prod(len(group[0].values) for group in self._groups) * self.realisations
 
     @property
     def realisations(self) -> int:
@@ -409,20 +409,14 @@ class Campaign:
         )
         return (task.hurst, task.work_of_adhesion, task.realisation, task.seed, rest)
 
-    def tasks(self, part: Part = WHOLE) -> list[Task]:
+    def tasks(self, part: Part = WHOLE) -> Tasks:
         """Return every task, or those of a part: by H, γ, what else is an axis, and realisation.
 
         The order does not depend on that of the file, so that a grown campaign has the rows of one
         that was this large from the start.
         """
-        seeds = [task_seed(self.sweep.seed, r) for r in range(self.realisations)]
-        names = [axis.name for axis in self.axes[2:]]
-        tasks = [
-            Task(hurst, gamma, realisation, seed, tuple(zip(names, others, strict=True)))
-            for hurst, gamma, *others in self.cells
-            for realisation, seed in enumerate(seeds)
-        ]
-        return tasks if part == WHOLE else [tasks[row] for row in self.rows(part).tolist()]
+        names = tuple(axis.name for axis in self.axes[2:])
+        return Tasks(self.cells, names, self.realisations, self.sweep.seed, self.rows(part))
 
     def rows(self, part: Part = WHOLE) -> NDArray[np.int64]:
         """Rows of the whole campaign that belong to a part, ascending.

@@ -108,6 +108,8 @@ def _number(value: str) -> float:
 
 
 def _path(value: str) -> Path:
-    if not value:
-        raise argparse.ArgumentTypeError("is '': it must be the name of a file or directory")
+    if not value or "\0" in value:
+        raise argparse.ArgumentTypeError(
+            f"is {quoted(value)}: it must be the name of a file or directory"
+        )
     return Path(value)

@@ -26,9 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
+    check_outputs({"FILE": args.file}, {})
     if os.path.isfile(args.file):
         raise InputError(f"FILE is {args.file}, which exists: give another name")
-    check_outputs({"FILE": args.file}, {})
     writing = Writing()
     with writing.output("FILE", args.file), whole_file(args.file) as stream:
         stream.write(SAMPLE.read_bytes())

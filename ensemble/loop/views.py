@@ -13,6 +13,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.quantities import UNITS, in_works_of_adhesion, with_units
 from adhesis.ensemble.reporter import bar
 from adhesis.solver import checks
@@ -113,7 +114,9 @@ def write_trace_page(answer: Answer, folder: str | os.PathLike[str]) -> Path:
     """Write page, figures and numbers of an answer; see its method ``page``."""
     from adhesis.ensemble.trace.trace_page import write_all
 
-    return write_all(answer, checks.path("folder", folder))
+    path = checks.path("folder", folder)
+    check_output_folder("folder", path, (), {})
+    return write_all(answer, path)
 
 
 def table_of_runs(answer: Answer) -> Any:

@@ -27,6 +27,7 @@ FOLDERS = (*PACKAGES.values(), "tests")
 MPI = {"adhesis.ensemble.run.ranks", "adhesis.ensemble.doctor.probe"}
 HDF5 = {
     "adhesis.ensemble.results.disk_file",
+    "adhesis.ensemble.loop.sealed_file",
     "adhesis.ensemble.results.merge",
     "adhesis.ensemble.results.head",
     "adhesis.ensemble.results.layout",

@@ -27,9 +27,9 @@ def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
     if args.file.suffix != ".toml":
         raise InputError(f"FILE.toml is {args.file}: the name must end in .toml")
+    check_outputs({"FILE.toml": args.file}, {})
     if os.path.isfile(args.file):
         raise InputError(f"FILE.toml is {args.file}, which exists: give another name")
-    check_outputs({"FILE.toml": args.file}, {})
     from adhesis.ensemble.campaign.template import campaign_template
 
     writing = Writing()

@@ -24,7 +24,7 @@ from adhesis.ensemble.errors import InputError, WriteError, lack
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
-    from adhesis.ensemble.campaign.tasks import Task
+    from adhesis.ensemble.campaign.tasks import Task, Tasks
     from adhesis.ensemble.run.session import Engine, Options, Summary
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
@@ -41,9 +41,12 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="the campaign file")
     parser.add_argument(
-        "--out", metavar="FILE.h5", help="results file (default: the campaign's name, here)"
+        "--out",
+        type=Path,
+        metavar="FILE.h5",
+        help="results file (default: the campaign's name, here)",
     )
     parser.add_argument(
         "--ranks",
@@ -195,9 +198,9 @@ def _run(
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
-    if comm is not None and comm.rank == 0:
+    if comm.rank == 0:
         report_meeting()
-    path = Path(args.out or f"{Path(args.campaign).stem}.h5")
+    path = args.out or Path(f"{args.campaign.stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
         return _tell_price(campaign, path, args, engine) if comm.rank == 0 else DONE
@@ -232,12 +235,11 @@ def _run(
 
 
 def _check_out(args: argparse.Namespace, path: Path) -> None:
-    """Refuse the campaign file itself, and a new results file that does not end in .h5."""
-    from adhesis.ensemble.results.layout import check_new_file
+    """Refuse the campaign file itself, and what is no results file or will be none."""
+    from adhesis.ensemble.results.layout import check_results_file
 
-    if not os.path.exists(path):
-        check_new_file("--out", path)
-    elif path.samefile(args.campaign):
+    check_results_file("--out", path)
+    if os.path.exists(path) and path.samefile(args.campaign):
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
@@ -295,10 +297,10 @@ def _tell_price(
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    def prepare(tasks: list[Task]) -> None:
+    def prepare(tasks: Tasks) -> None:
         from adhesis.ensemble.warm import warm_up  # loads the compiler
 
-        for task in {t.cell: t for t in reversed(tasks)}.values():
+        for task in tasks:
             engine.check(campaign, task)
         warm_up(engine.methods(campaign, tasks), say)
 
