@@ -22,7 +22,8 @@ def summary(answer: Answer) -> str:
     loop = answer.main
     lines = [
         f"loss        {_value(answer.loss, 1e3, 'mJ/m²')}"
-        f"{in_works_of_adhesion(answer.loss.value, answer.cycle.works_of_adhesion[0])}",
+        f"{in_works_of_adhesion(answer.loss.value, answer.cycle.works_of_adhesion[0])}"
+        f"{_note(answer)}",
         f"pull-off    {_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension",
         f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area')} at most",
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
@@ -40,6 +41,12 @@ def summary(answer: Answer) -> str:
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
     return printable("\n".join(lines))
+
+
+def _note(answer: Answer) -> str:
+    """Say what the loss under a load leaves out, in brackets after it."""
+    note = answer.main["loss_note"]
+    return f" ({note})" if note else ""
 
 
 def _scope(answer: Answer) -> str:
@@ -106,7 +113,8 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
     parts = [
         f"# From the trace {code_span(name)} to its loss",
         f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area"
-        f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}, pull-off at a "
+        f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}{_note(answer)}, "
+        "pull-off at a "
         f"mean tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
         f"most **{_value(answer.contact_fraction, 1.0, '')}**: one loop to "
         f"{cycle.turn(cycle.turning_points[0])} (h_max = {length_text(answer.main['h_max'], 4)}) "
@@ -200,13 +208,10 @@ def _variant_rows(answer: Answer) -> list[list[str]]:
 def _sweep_rows(answer: Answer) -> list[list[str]]:
     cycle = answer.cycle
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
-    turn = (
-        "p̄, Pa" if cycle.control.is_load else "Δ/h_max" if cycle.control.is_fixed else "u_tot/h_max"
-    )
     rows = [(gamma, point, answer.main)]
     rows += [(float(n.split()[1]), point, r) for n, _, r in answer.group("work of adhesion")]
     rows += [(gamma, float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
-    head = ["γ, J/m²", turn, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
+    head = ["γ, J/m²", cycle.turn_sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
     return [
         head,
         *(

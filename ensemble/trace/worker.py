@@ -53,6 +53,8 @@ class Job(ByValue):
     accuracy: float
     stiffness: float = math.inf
     strength: float = math.inf
+    at_preload: bool = False
+    latest: float | None = None
 
 
 def main() -> None:
@@ -78,7 +80,7 @@ def main() -> None:
 
 def run(job: Job, report: Any = None) -> dict[str, Any]:
     """Run one loop and return its numbers, and its states as lists."""
-    from adhesis.solver.loading.loop import run_loop
+    from adhesis.solver.loading.loop import run_loop, turn_arguments
     from adhesis.solver.loading.loop_result import strain_warnings
     from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
     from adhesis.solver.method import Branch, ContactState
@@ -100,8 +102,7 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
     half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
     problem = Problem(profile, half_space, job.work_of_adhesion, control, strength=job.strength)
     method = make_method(job.method, problem, accuracy=job.accuracy)
-    name = "max_stress" if control.is_load else "max_penetration"
-    turn: Any = {name: job.turning_point}
+    turn = turn_arguments(control, job.turning_point, job.at_preload, job.latest)
     loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
     return loop.numbers() | {
@@ -112,6 +113,8 @@ def run(job: Job, report: Any = None) -> dict[str, Any]:
         "strain_warnings": strain_warnings(
             problem, loop.mean_stress, loop.separation, loop.patches
         ),
+        "preload_warnings": loop.preload_warnings,
+        "loss_note": loop.loss_note,
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),

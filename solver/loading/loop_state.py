@@ -1,0 +1,149 @@
+"""A state of a loop at a mean stress, located with the loop's method, and its fields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adhesis.solver.loading.mean_stress_event import locate
+from adhesis.solver.method import ContactState, Fields, Method, Opening
+from adhesis.solver.model.jump import Branch
+from adhesis.solver.model.profile import Array
+from adhesis.solver.values import ByValue
+
+# Nodes of fields for each of the shortest waves, where a method has no grid of its own.
+_NODES_PER_WAVE = 32
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopState(ByValue):
+    """A state in contact of a loop, with the method that computes its fields.
+
+    Attributes
+    ----------
+    branch : {"loading", "unloading"}
+    after_jump : bool
+        True if only jumps pass the wanted mean stress: the state is the end of the first of them.
+    penetration : float
+        Δ/h_max.
+    state : ContactState
+    method : Method
+    """
+
+    branch: Branch
+    after_jump: bool
+    penetration: float
+    state: ContactState
+    method: Method
+
+    @property
+    def mean_stress(self) -> float:
+        """p̄ in Pa, compression positive."""
+        return self.state.mean_stress
+
+    @property
+    def contact_fraction(self) -> float:
+        """A/A0."""
+        return self.state.contact_fraction
+
+    @property
+    def edges(self) -> Array:
+        """Left and right edge of each patch in m, shape (patches, 2)."""
+        return self.state.edges
+
+    def fields(self, nodes: int | None = None) -> Fields:
+        """Compute stress, displacement and gap on equally spaced nodes.
+
+        Parameters
+        ----------
+        nodes : int, optional
+            By default those of the method's grid, or 32 for each of the shortest waves.
+
+        Raises
+        ------
+        ValueError
+            If the method cannot compute them for so many nodes.
+        """
+        return self.method.fields(self.state, field_nodes(self.method) if nodes is None else nodes)
+
+    def openings(self) -> list[Opening]:
+        """Compute the opening of every gap, from edge to edge of contact."""
+        return self.method.openings(self.state)
+
+
+def field_nodes(method: Method) -> int:
+    """Return the number of nodes of fields, unless it is given."""
+    if method.nodes is not None:
+        return method.nodes
+    waves = method.problem.profile.highest_harmonic
+    return int(1 << (_NODES_PER_WAVE * waves - 1).bit_length())
+
+
+def state_at_stress(
+    method: Method,
+    branch: Branch,
+    states: Sequence[ContactState],
+    before_jumps: Sequence[int],
+    chosen: NDArray[np.intp],
+    stress: float,
+) -> LoopState:
+    """Find the first state in contact of a branch that has a mean stress.
+
+    Where only jumps pass the mean stress, it is the end of the first of them.
+
+    Parameters
+    ----------
+    method : Method
+    branch : {"loading", "unloading"}
+    states : sequence of ContactState
+        Of the whole loop.
+    before_jumps : sequence of int
+        Indices of the states before its jumps.
+    chosen : array of int
+        Indices of the states of the branch.
+    stress : float
+        In Pa.
+
+    Raises
+    ------
+    ValueError
+        If no state of the branch has it.
+    """
+    chosen = np.array([i for i in chosen.tolist() if states[i].patches])
+    differences = {int(i): states[i].mean_stress - stress for i in chosen}
+    found = list(differences.values())
+    if min(found) > 0 or max(found) < 0:
+        raise ValueError(
+            f"stress is {stress:g} Pa: on the {branch} branch the mean stress in contact lies "
+            f"between {stress + min(found):.6g} and {stress + max(found):.6g} Pa"
+        )
+    problem, jumps = method.problem, set(before_jumps)
+
+    def made(state: ContactState, after_jump: bool) -> LoopState:
+        return LoopState(
+            branch, after_jump, float(problem.penetration(state.separation)), state, method
+        )
+
+    after_jump: ContactState | None = None
+    for i, difference in differences.items():
+        if difference == 0:
+            return made(states[i], False)
+        before = differences.get(i - 1)
+        if before is None or before * difference > 0:
+            continue
+        if i - 1 in jumps:
+            after_jump = after_jump or states[i]
+            continue
+        sign, scale = np.sign(difference), max(map(abs, found))
+        path = locate(
+            method,
+            states[i - 1],
+            states[i],
+            lambda passed: float(sign * (passed.mean_stress - stress) / scale),
+        )
+        return made(path.states[-1], False)
+    assert after_jump is not None  # the mean stress changes its side of the wanted one somewhere
+    return made(after_jump, True)
