@@ -15,7 +15,7 @@ _NAMES = {
     "m³": "power floor",
     "rad/m": "wave_number",
     "Pa": "young modulus mean_stress pull_off_stress stress_change max_stress tension "
-    "largest_interior_tension",
+    "largest_interior_tension turning_stress preload",
     "Pa/m": "stiffness",
     "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
     "J/m²": "work_of_adhesion loss loss_from_drops loss_error energy_drop at_stake energy_at_stake "

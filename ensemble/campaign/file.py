@@ -321,7 +321,7 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
     if cycle.max_stress is not None and not cycle.under_load:
         stress = shown(cycle.max_stress)
         raise InputError(
-            f"{source}: [cycle] max_stress is {stress} with control = \"separation\": a weight or a "
+            f"{source}: [cycle] max_stress is {stress} at a prescribed separation: a weight or a "
             'machine? For a weight give control = "load"; for a machine, which turns at that mean '
             f"stress, give preload = {stress} instead"
         )

@@ -243,7 +243,7 @@ def fields_at_stresses(loop: LoopResult, stresses: Sequence[float], n: int) -> d
         If neither branch has it.
     """
     found: list[FieldsOfState] = []
-    absent = {stress: 0 for stress in stresses}
+    absent = dict.fromkeys(stresses, 0)
     for branch in BRANCHES:
         for wanted in stresses:
             try:

@@ -34,9 +34,16 @@ def _outcome(data: Aggregate) -> str:
     )
     ends = sorted({cell.campaign.cycle.turning_point for cell in cells})
     end = f"{ends[0]:g}" if len(ends) == 1 else f"{ends[0]:g} … {ends[-1]:g}"
-    load = data.campaign.cycle.under_load
-    to = f"a mean stress of {end} Pa" if load else f"Δ/h_max = {end}"
+    cycle = data.campaign.cycle
+    to = f"a mean stress of {end} Pa" if cycle.under_load else f"Δ/h_max = {end}"
+    to = to if cycle.preload is None else f"a preload of {end} Pa"
     top = f"A loop to {to} and back until detached loses"
+    if cycle.under_load:
+        falls = _all(data, "pull_off_stress")
+        top = (
+            f"A loop to {to} and back under a weight, which falls off at {falls.min():.3g} to "
+            f"{falls.max():.3g} Pa (the energy of the fall is not counted), loses"
+        )
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}."
     low, high = cells[0], cells[-1]
@@ -202,6 +209,8 @@ def quality(data: Aggregate) -> list[str]:
             f"loss: {_listed(wrong)}."
         )
     out += _limit(data)
+    if data.campaign.cycle.preload is not None:
+        out += _preload(data)
     steep = [cell_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
     if steep:
         out.append(
@@ -226,6 +235,19 @@ def quality(data: Aggregate) -> list[str]:
             "their curves are cut, their losses are complete."
         )
     return out
+
+
+def _preload(data: Aggregate) -> list[str]:
+    """Report the loops whose mean stress did not reach the preload, by cell."""
+    short = [(int(np.sum(cell.values["preload_reached"] == 0)), cell) for cell in data.cells]
+    short = [(count, cell) for count, cell in short if count]
+    if not short:
+        return ["Every loop reached its preload."]
+    return [
+        f"WARNING: {sum(count for count, _ in short)} of {data.done} loops did not reach their "
+        "preload, and turned at the latest turning point: "
+        f"{_listed([f'{count} at {cell_name(cell)}' for count, cell in short])}."
+    ]
 
 
 def _limit(data: Aggregate) -> list[str]:
@@ -433,7 +455,8 @@ def _spectrum(data: Aggregate) -> list[str]:
     if not parts:
         return []
     depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
-    depth = f"Δ/h_max = {' or '.join(sorted(depths))}"
+    sign = "p̄/p̄_max" if data.campaign.cycle.turns_at_stress else "Δ/h_max"
+    depth = f"{sign} = {' or '.join(sorted(depths))}"
     return [
         "Slope of the loading spectrum of the deformed surface at small wave numbers and "
         f"{depth}, fitted, against Persson's -(2+H): "

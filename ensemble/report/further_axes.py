@@ -11,6 +11,7 @@ from adhesis.ensemble.campaign.axes import Axis
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
     "max_stress": r"turning point $\bar p_\mathrm{max}$ (Pa)",
+    "preload": r"preload $\bar p_\mathrm{max}$ (Pa)",
     "period": r"period $\lambda$ (m)",
     "n0": "lowest harmonic $n_0$",
     "ratio": r"$q_\mathrm{max}/q_\mathrm{min}$",

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.escape import code_span, fence, markdown, printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.report import findings, paper
@@ -116,12 +117,12 @@ def _summary(data: Aggregate) -> str:
     sweep, cycle = data.campaign.sweep, data.campaign.cycle
     tops = {cell.campaign.cycle.turning_point for cell in data.cells}
     top = f"Δ/h_max = {_list(tops)}"
-    if cycle.under_load:
-        top = f"a mean stress of {_list(tops)} Pa"
+    if cycle.turns_at_stress:
+        top = f"a {'mean stress' if cycle.under_load else 'preload'} of {_list(tops)} Pa"
     further = "".join(
         f"{axis.name} = {_list(axis.values)}; "
         for axis in data.further
-        if axis.name not in ("max_penetration", "max_stress")
+        if axis.name not in TURNING_POINTS
     )
     many = f"{sweep.realisations} realisations"
     if data.campaign.stop.relative_error is not None:

@@ -128,7 +128,7 @@ class Runner:
         keep = task.realisation < plan.realisations
         sizes = sizes_of(row_scales(campaign))
         turn = here.cycle.turning_point
-        preload, load = here.cycle.preload, here.cycle.under_load
+        preload = here.cycle.preload
         unit = campaign.penetration_unit(task)
         # for loops whose load steps differ from the axes of the curves
         axes: dict[Branch, Array] = {

@@ -121,12 +121,19 @@ class LoopResult(EquilibriumPath):
         return has_reached(self.turning_stress, self.preload)
 
     @property
+    def _where(self) -> str:
+        """Turning point as prescribed, for a message."""
+        control, point = self.problem.control, self.turning_point
+        if control.is_load:
+            return f"p̄ = {stress_text(point)}"
+        return f"{'Δ' if control.is_fixed else 'u_tot'}/h_max = {point:.6g}"
+
+    @property
     def turning_text(self) -> str:
         """Return how the loop turned, for a terminal: at which preload, stress or penetration."""
-        control, at = self.problem.control, f"{self.turning_point:.6g}"
-        where = f"Δ/h_max = {at}" if control.is_fixed else f"u_tot/h_max = {at}"
+        where = self._where
         if self.preload is None:
-            return f"p̄ = {stress_text(self.turning_point)}" if control.is_load else where
+            return where
         preload = stress_text(self.preload)
         if not self.preload_reached:
             return f"{where}, before the preload of {preload} is reached"
@@ -141,13 +148,18 @@ class LoopResult(EquilibriumPath):
         if self.preload is None:
             return []
         if not self.preload_reached:
-            loading = self.mean_stress[self.branch == "loading"]
+            loading = np.where(self.branch == "loading", self.mean_stress, -np.inf)
             highest = int(loading.argmax())
+            most = (
+                f"at most {stress_text(loading[highest])}, at Δ/h_max = "
+                f"{self.penetration[highest]:.4g}"
+            )
+            if loading[highest] <= 0:
+                most = "a tension in every state of contact"
             return [
                 f"the preload of {stress_text(self.preload)} is not reached: on loading the mean "
-                f"stress is at most {stress_text(loading[highest])}, at Δ/h_max = "
-                f"{self.penetration[highest]:.4g}; the loop turns at Δ/h_max = "
-                f"{self.max_penetration:.4g}, with {stress_text(self.turning_stress)}"
+                f"stress is {most}; the loop turns at {self._where}, with "
+                f"{stress_text(self.turning_stress)}"
             ]
         if self.turning_stress > self.preload * (1 + _BEYOND):
             return [

@@ -112,38 +112,24 @@ def state_at_stress(
     ValueError
         If no state of the branch has it.
     """
-    chosen = np.array([i for i in chosen.tolist() if states[i].patches])
-    differences = {int(i): states[i].mean_stress - stress for i in chosen}
-    found = list(differences.values())
-    if min(found) > 0 or max(found) < 0:
+    found = {i: states[i].mean_stress - stress for i in chosen.tolist() if states[i].patches}
+    least, most = min(found.values()), max(found.values())
+    if least > 0 or most < 0:
         raise ValueError(
             f"stress is {stress:g} Pa: on the {branch} branch the mean stress in contact lies "
-            f"between {stress + min(found):.6g} and {stress + max(found):.6g} Pa"
+            f"between {stress + least:.6g} and {stress + most:.6g} Pa"
         )
-    problem, jumps = method.problem, set(before_jumps)
-
-    def made(state: ContactState, after_jump: bool) -> LoopState:
-        return LoopState(
-            branch, after_jump, float(problem.penetration(state.separation)), state, method
-        )
-
-    after_jump: ContactState | None = None
-    for i, difference in differences.items():
-        if difference == 0:
-            return made(states[i], False)
-        before = differences.get(i - 1)
-        if before is None or before * difference > 0:
-            continue
-        if i - 1 in jumps:
-            after_jump = after_jump or states[i]
-            continue
-        sign, scale = np.sign(difference), max(map(abs, found))
-        path = locate(
-            method,
-            states[i - 1],
-            states[i],
-            lambda passed: float(sign * (passed.mean_stress - stress) / scale),
-        )
-        return made(path.states[-1], False)
-    assert after_jump is not None  # the mean stress changes its side of the wanted one somewhere
-    return made(after_jump, True)
+    at = [i for i, difference in found.items() if difference == 0]
+    passing = [i for i in found if i - 1 in found and found[i - 1] * found[i] < 0]
+    jumps = set(before_jumps)
+    smooth = [i for i in passing if i - 1 not in jumps]
+    after_jump = not (at or smooth)
+    first = min(passing if after_jump else at + smooth)
+    state = states[first]
+    if first in smooth:
+        sign = float(np.sign(found[first])) / max(-least, most)
+        start = states[first - 1]
+        path = locate(method, start, state, lambda passed: sign * (passed.mean_stress - stress))
+        state = path.states[-1]
+    penetration = float(method.problem.penetration(state.separation))
+    return LoopState(branch, after_jump, penetration, state, method)

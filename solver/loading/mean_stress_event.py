@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
 from scipy.optimize import brentq
 
 from adhesis.solver.checks import plain
@@ -57,17 +58,15 @@ def follow_to_stress(
     PathError
         If the path cannot be followed so far, and does not reach the stress before.
     """
-
     start = method.problem.prescribed_in(state)
     try:
         path = method.follow(state, prescribed)
     except PathError as error:
         # the stress may be reached before the path ends
         if abs(prescribed - start) < _END_LOCATED * method.problem.profile.h_max:
-            where = method.problem.describe_prescribed(start)
             raise PathError(
-                f"{error}; the mean stress is {state.mean_stress:.4g} Pa before that, at {where}: "
-                f"the preload of {plain(stress)} Pa is not reached"
+                f"{error}; the mean stress before that is {state.mean_stress:.4g} Pa, and the "
+                f"preload of {plain(stress)} Pa is not reached"
             ) from error
         first, reached = follow_to_stress(method, state, 0.5 * (start + prescribed), stress)
         if reached:
@@ -82,9 +81,7 @@ def has_reached(mean_stress: float, stress: float) -> bool:
     return mean_stress / stress - 1.0 >= -_REACHED
 
 
-def up_to(
-    method: Method, state: ContactState, path: Path, excess: Excess
-) -> tuple[Path, bool]:
+def up_to(method: Method, state: ContactState, path: Path, excess: Excess) -> tuple[Path, bool]:
     """Return a path that was followed from ``state``, up to where the excess reaches 0, if it does.
 
     Returns
@@ -142,8 +139,8 @@ def _before_jumps(states: Sequence[ContactState], jumps: Sequence[Jump]) -> set[
     if not jumps:
         return set()
     branches = [jumps[0].branch] * len(states)
-    separation = [state.separation for state in states]
-    contact = [state.contact_fraction for state in states]
+    separation = np.array([state.separation for state in states])
+    contact = np.array([state.contact_fraction for state in states])
     return set(states_before_jumps(jumps, branches, separation, contact))
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from time import process_time
 
-from adhesis.solver.checks import instance, row
+from adhesis.solver.checks import instance, real, row
 from adhesis.solver.loading.loop import (
     DEFAULT_LOAD_STEPS,
     HOW_METHOD,
@@ -237,7 +237,8 @@ def run_loops(
         points = row(name, given, entry="turning point").tolist()
     else:
         points = row("preload", preload, entry="preload").tolist()
-        wanted = [latest_turn(problem, point, max_penetration, max_stress) for point in points]
+        one = None if max_penetration is None else real("max_penetration", max_penetration)
+        wanted = [latest_turn(problem, point, one, max_stress) for point in points]
         latest = max(wanted, default=None)
     branch = LoadingBranch(method, points, load_steps=load_steps, latest=latest)
     with progress_of(progress, max(points) if latest is None else latest) as report:

@@ -344,7 +344,7 @@ def _penetration_handles(
     # Where the largest penetration varies with H or γ, only its share is the same for all.
     tops = {cell.campaign.cycle.turning_point for cell in data.cells}
     unit = _penetration_sign(data)
-    if len(tops) > 1 and not data.campaign.cycle.under_load:
+    if len(tops) > 1 and not data.campaign.cycle.turns_at_stress:
         unit = r"\Delta/\Delta"
     penetration = data.cells[0].plan.penetration if len(tops) == 1 else data.fields.penetration
     return [
@@ -361,7 +361,7 @@ def _penetration_handles(
 
 
 def _penetration_sign(data: Aggregate) -> str:
-    return r"\bar p/\bar p" if data.campaign.cycle.under_load else r"\Delta/h"
+    return r"\bar p/\bar p" if data.campaign.cycle.turns_at_stress else r"\Delta/h"
 
 
 def _depth(data: Aggregate, cell: Cell, k: int) -> str:
