@@ -140,9 +140,9 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
         return Turns(_distinct("--max-stress", args.max_stress, _stresses))
     if args.max_stress is not None:
         raise InputError(
-            f"--max-stress is {args.max_stress} without --stiffness 0: a weight or a machine? For "
-            f"a weight give --stiffness 0 with --max-stress {args.max_stress}; for a machine, "
-            f"which turns at that mean stress, give --preload {args.max_stress} instead"
+            "--max-stress belongs to load control, and --stiffness 0 is not given: a weight or a "
+            f"machine? For a weight give --stiffness 0 with --max-stress {args.max_stress}; for a "
+            f"machine, which turns at that mean stress, give --preload {args.max_stress} instead"
         )
     rule = "one or more numbers, as 1.5 or 0.5,1.5"
     if control.is_fixed:

@@ -97,7 +97,9 @@ def to_xarray(result: Result) -> xr.Dataset:
     for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
         name = f"coefficient_{name}"
         variables[name] = _variable("harmonic", name, np.array(values))
-    about |= {name: value for name, value in result.numbers().items() if value is not None}
+    for name, value in result.numbers().items():
+        if value is not None:
+            about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
     about |= {
         "stiffness": problem.control.stiffness,
         "strength": problem.strength,

@@ -185,9 +185,9 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
 
 
 _WEIGHT_OR_MACHINE = (
-    "max_stress is given without a load: is it a weight or a machine that presses? For a weight "
-    "give the problem control=Control(0); for a machine, which turns at that mean stress, give "
-    "preload instead of max_stress"
+    "max_stress is given, but a path under a separation or a stiffness turns at max_penetration: a "
+    "weight or a machine? For a weight give the problem control=Control(0); for a machine, which "
+    "turns at that mean stress, give preload instead of max_stress"
 )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.loading.mean_stress_event import locate
+from adhesis.solver.loading.mean_stress_event import REACHED, locate
 from adhesis.solver.method import ContactState, Fields, Method, Opening
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
@@ -113,6 +113,8 @@ def state_at_stress(
         If no state of the branch has it.
     """
     found = {i: states[i].mean_stress - stress for i in chosen.tolist() if states[i].patches}
+    near = REACHED * abs(stress)
+    found = {i: 0.0 if abs(difference) <= near else difference for i, difference in found.items()}
     least, most = min(found.values()), max(found.values())
     if least > 0 or most < 0:
         raise ValueError(

@@ -12,8 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
-
 from adhesis.solver.checks import plain
 from adhesis.solver.loading.path_record import states_before_jumps
 from adhesis.solver.method import ContactState, Method, Path, PathError
@@ -22,8 +20,9 @@ from adhesis.solver.model.jump import Jump
 Excess = Callable[[ContactState], float]
 """Value of a state less the wanted one, with the sign with which it is reached from below 0."""
 
-# Relative difference below which the mean stress has reached a value; the field is less accurate.
-_REACHED = 1e-9
+REACHED = 1e-9
+"""Relative difference below which the mean stress has reached a value: the field is less exact."""
+
 # Share of the range of the control to which a state is located: the mean stress of a method whose
 # edges move from node to node has steps, of which the first that is high enough is taken.
 _LOCATED = 1e-12
@@ -78,7 +77,7 @@ def follow_to_stress(
 
 def has_reached(mean_stress: float, stress: float) -> bool:
     """Return whether a mean stress is at least ``stress`` (Pa, positive)."""
-    return mean_stress / stress - 1.0 >= -_REACHED
+    return mean_stress / stress - 1.0 >= -REACHED
 
 
 def up_to(method: Method, state: ContactState, path: Path, excess: Excess) -> tuple[Path, bool]:
@@ -93,10 +92,10 @@ def up_to(method: Method, state: ContactState, path: Path, excess: Excess) -> tu
         Whether the excess reaches 0.
     """
     states = (state, *path.states)
-    k = next((k for k in range(1, len(states)) if excess(states[k]) >= -_REACHED), None)
+    k = next((k for k in range(1, len(states)) if excess(states[k]) >= -REACHED), None)
     if k is None:
         return path, False
-    if k - 1 in _before_jumps(states, path.jumps) or excess(states[k]) <= _REACHED:
+    if k - 1 in _before_jumps(states, path.jumps) or excess(states[k]) <= REACHED:
         return _first(path, k, states), True
     located = locate(method, states[k - 1], states[k], excess)
     return _joined(_first(path, k - 1, states), located), True
@@ -112,6 +111,8 @@ def locate(method: Method, start: ContactState, end: ContactState, excess: Exces
         Neighbours on a stable branch, with an excess below 0 and above 0.
     excess : callable
     """
+    from scipy.optimize import brentq  # commands that follow no path do not load it
+
     problem = method.problem
     x = problem.prescribed_in(start), problem.prescribed_in(end)
     known = {x[0]: excess(start), x[1]: excess(end)}
@@ -125,11 +126,11 @@ def locate(method: Method, start: ContactState, end: ContactState, excess: Exces
             path = path if first is None else _first(path, first, states)
             found[prescribed], known[prescribed] = path, excess(path.states[-1])
         value = known[prescribed]
-        return 0.0 if abs(value) <= _REACHED else value
+        return 0.0 if abs(value) <= REACHED else value
 
     near = _LOCATED * problem.prescribed_range
     root = brentq(excess_at, *x, xtol=near, rtol=1e-15) if x[0] != x[1] else x[1]
-    if known.get(root, -1.0) < -_REACHED:  # the other end of the last bracket has reached it
+    if known.get(root, -1.0) < -REACHED:  # the other end of the last bracket has reached it
         root = min((p for p in known if known[p] >= 0), key=lambda p: abs(p - x[0]))
     return found.get(root, Path((end,), (), 0.0))
 

@@ -96,7 +96,10 @@ DIMENSIONAL = {
     "m": {"h_max", "h_rms", "period", "separation", "patch_length", "valid_range", "edge_range"},
     "m²": {"m0"},
     "1/m²": {"m4"},
-    "Pa": {"young", "mean_stress", "pull_off_stress", "largest_interior_tension"},
+    "Pa": {
+        *("young", "mean_stress", "pull_off_stress", "largest_interior_tension"),
+        *("turning_stress", "preload"),
+    },
     "J/m": {"energy", "elastic_energy", "adhesion_energy"},
     "J/m²": {
         *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),

@@ -76,6 +76,7 @@ SOLVER_FOR_ENSEMBLE = {
     "adhesis.solver.model.jump",
     "adhesis.solver.loading.loop",
     "adhesis.solver.loading.loop_result",
+    "adhesis.solver.loading.loop_state",
     "adhesis.solver.model.half_space",
     "adhesis.solver.method",
     "adhesis.solver.loading.path",
