@@ -310,6 +310,13 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
     cycle = campaign.cycle
     if cycle.preload is not None:
         _check_preload(source, campaign)
+    if cycle.max_stress is not None and not cycle.under_load:
+        stress = shown(cycle.max_stress)
+        raise InputError(
+            f"{source}: [cycle] max_stress is {stress} at a prescribed separation: a weight or a "
+            'machine? For a weight give control = "load"; for a machine, which turns at that mean '
+            f"stress, give preload = {stress} instead"
+        )
     wanted = "max_stress" if cycle.under_load else "max_penetration"
     by_default = cycle.preload is not None and cycle.stiffness is None
     if getattr(cycle, wanted) is None and not by_default:
@@ -317,13 +324,6 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
         raise InputError(
             f"{source}: [cycle] {wanted} is missing ({entry.metadata['meaning']}): "
             f"it must be {entry.metadata['rule'].text}"
-        )
-    if cycle.max_stress is not None and not cycle.under_load:
-        stress = shown(cycle.max_stress)
-        raise InputError(
-            f"{source}: [cycle] max_stress is {stress} at a prescribed separation: a weight or a "
-            'machine? For a weight give control = "load"; for a machine, which turns at that mean '
-            f"stress, give preload = {stress} instead"
         )
     for name in ("max_penetration", "stiffness") if cycle.under_load else ():
         if getattr(cycle, name) is not None:

@@ -362,9 +362,9 @@ def _turns(
         return max_stress
     if max_stress is not None:
         raise ValueError(
-            "max_stress is given: it belongs to a load, that of a weight: a weight or a machine? For "
-            "a weight give control=Control(0); for a machine, which turns at that mean stress, give "
-            "preload instead of max_stress"
+            "max_stress is given: it belongs to a load, that of a weight: a weight or a machine? "
+            "For a weight give control=Control(0); for a machine, which turns at that mean stress, "
+            "give preload instead of max_stress"
         )
     return MAX_PENETRATION if max_penetration is None else max_penetration
 

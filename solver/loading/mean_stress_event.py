@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+
 from adhesis.solver.checks import plain
 from adhesis.solver.loading.path_record import states_before_jumps
 from adhesis.solver.method import ContactState, Method, Path, PathError

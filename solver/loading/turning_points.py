@@ -80,9 +80,10 @@ class LoadingBranch:
         self._axis = Axis(ends[-1], load_steps)
         further = self._axis.apart(marks, ends)
         self._drives = self._axis.between(0.0, ends[-1], [*ends, *further])
-        self._turns = frozenset(turns)
+        self._turns = tuple(turns)
         self._of_preloads = latest is not None
-        self._at = -math.inf  # turning point at, or on the way to which the state lies
+        self._reached = -math.inf  # the last of the turning points
+        self._has_left = False  # whether the state lies beyond it
         self._drive = 0.0  # prescribed value of the state
         self._passed = 0  # number of prescribed values reached
         self._record = Record()
@@ -104,6 +105,13 @@ class LoadingBranch:
         if turn not in self._turns:
             raise ValueError(f"{turn!r} is not a turning point of this loading branch")
         started = process_time()
+        for stop in self._turns:
+            if self._reached < stop <= turn:
+                self._advance(stop, progress)
+        self._seconds += process_time() - started
+
+    def _advance(self, turn: float, progress: Progress | None) -> None:
+        """Follow the branch from one of its turning points to the next."""
         preload = turn if self._of_preloads else None
         while not self._is_at(turn):
             if self._error is not None:
@@ -119,9 +127,8 @@ class LoadingBranch:
             if progress is not None:
                 progress("loading", self._drive, self._state)
             self._passed += not reached
-            self._at = turn
-        self._at = max(self._at, turn)
-        self._seconds += process_time() - started
+            self._has_left = True
+        self._reached, self._has_left = turn, False
 
     def _is_at(self, turn: float) -> bool:
         """Return whether a turning point is reached, or the branch has ended before a preload."""
@@ -164,7 +171,7 @@ class LoadingBranch:
             As in :func:`adhesis.solver.loading.loop.run_loop`.
         """
         self.advance_to(turn, progress)
-        if self._at > turn:
+        if self._reached != turn or self._has_left:
             raise ValueError(f"this loading branch has passed {turn!r}")
         started = process_time() - self._seconds
         record = self._record.copy()
