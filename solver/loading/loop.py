@@ -174,7 +174,12 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
     if problem.control.is_load:
         wanted, other = other, wanted
     elif max_stress is not None:
-        raise ValueError(_WEIGHT_OR_MACHINE)
+        raise ValueError(
+            "max_stress is given, but a path under a separation or a stiffness turns at "
+            "max_penetration: a weight or a machine? For a weight give the problem "
+            "control=Control(0); for a machine, which turns at that mean stress, give preload "
+            "instead of max_stress"
+        )
     if wanted[1] is None or other[1] is not None:
         control = "a load" if problem.control.is_load else "a separation or a stiffness"
         raise ValueError(
@@ -182,13 +187,6 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
             + ("" if problem.control.is_load else " (or give preload, in Pa)")
         )
     return wanted[1]
-
-
-_WEIGHT_OR_MACHINE = (
-    "max_stress is given, but a path under a separation or a stiffness turns at max_penetration: a "
-    "weight or a machine? For a weight give the problem control=Control(0); for a machine, which "
-    "turns at that mean stress, give preload instead of max_stress"
-)
 
 
 def turn_arguments(

@@ -145,8 +145,9 @@ class LoopResult(EquilibriumPath):
     @property
     def preload_warnings(self) -> list[str]:
         """Return a sentence where the mean stress does not reach the preload, or jumps beyond."""
+        found: list[str] = []
         if self.preload is None:
-            return []
+            return found
         if not self.preload_reached:
             loading = np.where(self.branch == "loading", self.mean_stress, -np.inf)
             highest = int(loading.argmax())
@@ -156,17 +157,17 @@ class LoopResult(EquilibriumPath):
             )
             if loading[highest] <= 0:
                 most = "a tension in every state of contact"
-            return [
+            found.append(
                 f"the preload of {stress_text(self.preload)} is not reached: on loading the mean "
                 f"stress is {most}; the loop turns at {self._where}, with "
                 f"{stress_text(self.turning_stress)}"
-            ]
-        if self.turning_stress > self.preload * (1 + _BEYOND):
-            return [
+            )
+        elif self.turning_stress > self.preload * (1 + _BEYOND):
+            found.append(
                 f"a jump goes beyond the preload of {stress_text(self.preload)}: the loop turns at "
                 f"its end, with {stress_text(self.turning_stress)}"
-            ]
-        return []
+            )
+        return found
 
     @property
     def warnings(self) -> tuple[str, ...]:

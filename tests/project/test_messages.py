@@ -29,7 +29,7 @@ PARTS = {"truncated", "head"}
 # Functions that make the sentences of errors and warnings.
 SENTENCES = {
     "solver/model/problem.py": ("full_contact",),
-    "solver/loading/loop_result.py": ("warnings", "strain_warnings"),
+    "solver/loading/loop_result.py": ("warnings", "preload_warnings", "strain_warnings"),
     "solver/loading/zero_range.py": ("range_warnings",),
     "ensemble/loop/heights.py": ("_not_one_column", "closure_warning", "few_heights_warning"),
 }
