@@ -35,6 +35,7 @@ from adhesis.ensemble.trace.options import (
     what_was_read,
 )
 from adhesis.ensemble.warm import warm_missing
+from adhesis.solver.checks import plain
 from adhesis.solver.loading.loop import Progress, run_loop
 from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.loading.loop_state import field_nodes
@@ -57,6 +58,7 @@ _MOST_FIELD_VALUES = 2**26
 
 def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
+    taken = _defaults_taken(args)
     _set_material(args)
     _check_files(args)
     with refused_as_input(vars(args)):
@@ -115,6 +117,8 @@ def execute(args: argparse.Namespace) -> int:
     else:
         loops = results
         print("\n\n".join(map(loop_summary, results)))
+    if taken:
+        print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
         print(f"wrote       {path}")
     doubts = list(dict.fromkeys([*warnings, *(text for loop in loops for text in loop.warnings)]))
@@ -153,6 +157,20 @@ def _run(
 
 
 # ---------------------------------------------------------------------- input
+
+
+def _defaults_taken(args: argparse.Namespace) -> list[str]:
+    """Return the options whose defaults make the profile and the material of ``--hurst``."""
+    if args.hurst is None:
+        return []
+    taken: dict[str, Any] = {"period": f"{1e3 * PERIOD:.5g}mm", "n0": N0, "ratio": RATIO, "seed": 0}
+    if args.m2 is None and args.c0 is None:
+        taken["h_rms"] = f"{1e6 * H_RMS:g}um"
+    return [
+        f"--{name.replace('_', '-')} {plain(value) if isinstance(value, float) else value}"
+        for name, value in {**taken, **_MATERIAL}.items()
+        if getattr(args, name) is None
+    ]
 
 
 def _set_material(args: argparse.Namespace) -> None:

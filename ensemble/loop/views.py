@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 Result = LoopResult | PathResult
 
 
-def plot(result: Result) -> Any:
+def plot(result: Result, ax: Any = None) -> Any:
     """Draw mean stress and contact fraction; see :meth:`adhesis.LoopResult.plot`."""
     from adhesis.ensemble.loop.loop_figure import draw_loops
 
-    return draw_loops(result if isinstance(result, PathResult) else [result])
+    return draw_loops(result if isinstance(result, PathResult) else [result], ax)
 
 
 def film(

@@ -298,7 +298,7 @@ def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
 
 
 def _loss(loss: float, error: float | None) -> str:
-    return f"{loss:.4g}" if error is None else with_error(loss, error)
+    return f"{loss:.4g}" if error is None else with_error(loss, error, 0.0)
 
 
 def _task(row: Mapping[str, Any]) -> str:

@@ -45,8 +45,10 @@ def test_the_loop_of_a_machine_turns_at_the_preload(tmp_path, capsys):
     )
     stress = np.array(document["mean_stress"])[np.array(document["branch"]) == "loading"]
     assert stress.max() == stress[-1]
-    several, _, _ = run(tmp_path, capsys, "--preload", "0.5kPa,200")
+    table = ("--csv", str(tmp_path / "loop.csv"))
+    several, _, _ = run(tmp_path, capsys, "--preload", "0.5kPa,200", *table)
     assert [turn["preload"] for turn in several["turns"]] == [200.0, 500.0]
+    assert "preload (Pa)" in (tmp_path / "loop.csv").read_text().splitlines()[0]
     assert several["loss"] == pytest.approx(document["loss"], rel=1e-5)
     soft, text, _ = run(tmp_path, capsys, "--preload", "500", "--stiffness", "1e9")
     assert soft["turning_stress"] == pytest.approx(500.0, rel=1e-8)
