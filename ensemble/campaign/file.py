@@ -313,9 +313,10 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
     if cycle.max_stress is not None and not cycle.under_load:
         stress = shown(cycle.max_stress)
         raise InputError(
-            f"{source}: [cycle] max_stress is {stress} at a prescribed separation: a weight or a "
-            'machine? For a weight give control = "load"; for a machine, which turns at that mean '
-            f"stress, give preload = {stress} instead"
+            f'{source}: [cycle] max_stress is given: with control = "separation" a path turns at '
+            "max_penetration, so leave max_stress out. A weight or a machine? For a weight give "
+            'control = "load"; for a machine, which turns at that mean stress, give '
+            f"preload = {stress}"
         )
     wanted = "max_stress" if cycle.under_load else "max_penetration"
     by_default = cycle.preload is not None and cycle.stiffness is None

@@ -160,6 +160,8 @@ def _footnote(data: Aggregate) -> str:
         "± loop: mean of the estimated numerical error of a loop",
         f"± steps: {steps}",
     ]
+    if data.campaign.cycle.under_load:
+        parts.append("under a weight: it falls off, the energy of the fall is not counted")
     if any(cell.work_of_adhesion > 0 for cell in data.cells):
         parts.append("W/γ: loss over work of adhesion")
     if "resolution" in kinds:

@@ -56,6 +56,7 @@ LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
     "without adhesion": lambda: run_loop(
         ExactWave(Problem(WAVE, HalfSpace(1e6, 0.5), 0.0)), max_penetration=0.5, load_steps=4
     ),
+    "to a preload": lambda: run_loop(wave_method(), preload=500.0, load_steps=4),
     "path": lambda: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4),
 }
 

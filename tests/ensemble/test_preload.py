@@ -249,19 +249,34 @@ def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsy
     file, out = tmp_path / "c.toml", tmp_path / "c.h5"
     file.write_text(text_of('preload = [100, "1 MPa"]', realisations="1"))
     assert main(["run", str(file), "--out", str(out)]) == 0
-    (sentence,) = (s for s in findings.quality(aggregate(out)) if "preload" in s)
+    (sentence,) = (s for s in findings.quality(aggregate(out)) if "did not reach" in s)
     assert "WARNING: 1 of 2 loops did not reach their preload, and turned at the latest" in sentence
     assert "1 at H = 0.8, γ = 0.002 J/m², preload = 1e+06" in sentence
+    capsys.readouterr()
+    assert main(["status", str(out)]) == 0
+    assert "1 loop did not reach the preload" in capsys.readouterr().out
     with adhesis.open(out) as results:
         loops = results.dataset
         assert loops.preload_reached.values.ravel().tolist() == [1.0, 0.0]
         assert loops.turning_penetration.values.ravel()[1] == 0.99
 
 
+def test_a_campaign_under_a_weight_says_so_in_its_status_and_report(tmp_path, capsys):
+    file, out = tmp_path / "c.toml", tmp_path / "c.h5"
+    file.write_text(text_of('control = "load"\nmax_stress = 200', realisations="2"))
+    assert main(["run", str(file), "--out", str(out)]) == 0
+    capsys.readouterr()
+    assert main(["status", str(out)]) == 0
+    assert "under a weight: it falls off, the energy of the fall" in capsys.readouterr().out
+    outcome = findings.verdict(aggregate(out))[0]
+    assert "under a weight, which falls off at " in outcome
+    assert "(the energy of the fall is not counted)" in outcome
+
+
 @pytest.mark.parametrize(
     ("cycle", "sentence"),
     [
-        ("max_stress = 200", r"max_stress is 200.0 at a prescribed separation: a weight or a mach"),
+        ("max_stress = 200", "which turns at that mean stress, give preload = 200.0"),
         ('preload = 200\ncontrol = "load"', "a weight or a machine? For a weight give max_stress"),
         ("preload = 200\nmax_penetration = [0.5, 0.9]", "several values beside a preload"),
         ("preload = 200\nstiffness = 1e9", "max_penetration is missing"),
