@@ -95,7 +95,9 @@ SHAPES = (
         "fig3_shapes",
         "Deformed shapes",
         "The first realisation that kept its fields: rigid profile h - s and "
-        "elastic surface v on both branches, at the same separation. In contact the two coincide. "
+        "elastic surface v on both branches, at the same separation; of loops that turn at a mean "
+        "stress at the same mean stress, each surface above the profile by its own gap. In contact "
+        "they coincide. "
         "Right: one and a half of the longest waves around the highest point, carried on across "
         "the end of the period where it lies near one.",
         shapes_and_spectra.shapes,

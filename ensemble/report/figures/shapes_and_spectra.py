@@ -67,16 +67,16 @@ def shapes(data: Aggregate) -> Figure:
     everywhere = np.arange(cell.plan.position.size)
     window = _window(cell, shape)
     for (whole, detail), k in zip(panels(figure, len(chosen), 2), chosen, strict=True):
-        penetration = cell.plan.penetration[k]
-        separation = shape.h_max * (1 - penetration)
+        separations = _separations(data, cell, shape, k)
         for axes, part in ((whole, everywhere), (detail, window)):
-            _draw_shape(axes, cell.plan.position, shape, k, separation, part)
+            _draw_shape(axes, cell.plan.position, shape, k, separations, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
+        known = [1e6 * s for s in dict.fromkeys(separations) if np.isfinite(s)]
         label_panel(
             whole,
-            rf"{_cell_label(cell)}, $\Delta/h_\mathrm{{max}}$ = {penetration:.2f}, "
-            f"$s$ = {1e6 * separation:.2f} µm",
+            f"{_cell_label(cell)}, {_depth(data, cell, k)}, "
+            f"$s$ = {' and '.join(f'{s:.2f}' for s in known)} µm",
         )
         label_panel(detail, "detail")
         whole.set_ylabel("height (µm)")
@@ -283,22 +283,36 @@ def _reference_slopes(axes: Axes, hurst: float, rigid: np.ndarray, q: np.ndarray
         )
 
 
+def _separations(data: Aggregate, cell: Cell, shape: DeformedShape, k: int) -> list[float]:
+    """Return s in m of one state on both branches; NaN where a branch has none.
+
+    At equal mean stress it is not the same on both: the largest h - v, which is s in contact.
+    """
+    if not data.campaign.cycle.turns_at_stress:
+        return [shape.h_max * (1 - float(cell.plan.penetration[k]))] * len(BRANCHES)
+    return [float(np.max(shape.height - shape.displacement[b, k])) for b in range(len(BRANCHES))]
+
+
 def _draw_shape(
     axes: Axes,
     position: Array,
     shape: DeformedShape,
     k: int,
-    separation: float,
+    separations: list[float],
     part: NDArray[np.intp],
 ) -> None:
-    """Draw the nodes ``part``, counted on beyond the period where they exceed it."""
+    """Draw the nodes ``part``, counted on beyond the period where they exceed it.
+
+    The profile stands at the first separation that is known, each surface above it by its own gap.
+    """
+    place = next((s for s in separations if np.isfinite(s)), 0.0)
     factor = -(-_FEWEST_NODES // position.size)
     x = 1e3 * _between(part, factor) * (position[1] - position[0])
-    rigid = 1e6 * (_refined(CubicSpline, shape.height, part, factor) - separation)
+    rigid = 1e6 * (_refined(CubicSpline, shape.height, part, factor) - place)
     axes.fill_between(x, rigid, rigid.min(), color="0.8", linewidth=0)
     axes.plot(x, rigid, color="0.4", linewidth=0.5, label="rigid")
     for b, branch in enumerate(BRANCHES):
-        gap = shape.displacement[b, k] - (shape.height - separation)
+        gap = shape.displacement[b, k] - (shape.height - separations[b])
         if np.all(np.isfinite(gap)):
             # monotone between nodes: contact stays contact, and nothing overlaps
             axes.plot(
