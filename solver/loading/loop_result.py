@@ -35,8 +35,6 @@ is doubtful."""
 # Share of the loss above which an audit residual or an error of the loss is reported, for methods
 # without an accuracy.
 _LARGE = 0.02
-# Share of the preload beyond which a jump, and not a grid's steps of the mean stress, has gone.
-_BEYOND = 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -121,6 +119,12 @@ class LoopResult(EquilibriumPath):
         return has_reached(self.turning_stress, self.preload)
 
     @property
+    def _turned_after_jump(self) -> bool:
+        """Whether the last state of loading is the end of a jump."""
+        last = int(np.count_nonzero(self.branch == "loading")) - 1
+        return last - 1 in self.states_before_jumps()
+
+    @property
     def _where(self) -> str:
         """Turning point as prescribed, for a message."""
         control, point = self.problem.control, self.turning_point
@@ -137,7 +141,7 @@ class LoopResult(EquilibriumPath):
         preload = stress_text(self.preload)
         if not self.preload_reached:
             return f"{where}, before the preload of {preload} is reached"
-        if self.turning_stress > self.preload * (1 + _BEYOND):
+        if self._turned_after_jump:
             beyond = stress_text(self.turning_stress)
             return f"{where}, the end of a jump from below the preload of {preload} to {beyond}"
         return f"the preload of {preload}, at {where}"
@@ -162,7 +166,7 @@ class LoopResult(EquilibriumPath):
                 f"stress is {most}; the loop turns at {self._where}, with "
                 f"{stress_text(self.turning_stress)}"
             )
-        elif self.turning_stress > self.preload * (1 + _BEYOND):
+        elif self._turned_after_jump:
             found.append(
                 f"a jump goes beyond the preload of {stress_text(self.preload)}: the loop turns at "
                 f"its end, with {stress_text(self.turning_stress)}"
