@@ -122,10 +122,11 @@ class LoadingBranch:
             except PathError as error:
                 self._error = error
                 raise
-            self._state = self._record.extend("loading", path)
-            self._drive = drive_in(self.method.problem, self._state) if reached else drive
-            if progress is not None:
-                progress("loading", self._drive, self._state)
+            state = path.states[-1]
+            end = drive_in(self.method.problem, state) if reached else drive
+            if progress is not None:  # which may raise: nothing is changed before
+                progress("loading", end, state)
+            self._state, self._drive = self._record.extend("loading", path), end
             self._passed += not reached
             self._has_left = True
         self._reached, self._has_left = turn, False

@@ -19,6 +19,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.loading.mean_stress_event import up_to
+from adhesis.solver.loading.turning_points import LoadingBranch
 from adhesis.solver.method import ContactState, Path
 from adhesis.solver.model.jump import Jump
 from adhesis.solver.model.profile import Profile
@@ -270,3 +271,28 @@ def test_a_loss_under_a_weight_says_so_where_it_stands():
     machine = run_loop(make_method("sharp", rough()), preload=PRELOAD, load_steps=5)
     assert machine.loss_note == ""
     assert "weight" not in str(machine) + repr(machine) + machine._repr_html_()
+
+
+def test_a_branch_that_is_interrupted_goes_on_with_the_same_bits():
+    method = make_method("sharp", rough())
+    preloads = [200.0, 800.0]
+
+    def branch() -> LoadingBranch:
+        return LoadingBranch(method, preloads, load_steps=20, latest=0.9)
+
+    whole, broken = branch(), branch()
+    calls = []
+
+    def stop(*of_step: object) -> None:
+        calls.append(of_step)
+        if len(calls) == 6:
+            raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        broken.loop(800.0, progress=stop)
+    loops = [one.loop(800.0) for one in (whole, broken)]
+    assert loops[0] == loops[1]
+    with pytest.raises(ValueError, match="this loading branch has passed 200"):
+        broken.loop(200.0)
+    with pytest.raises(ValueError, match="is not a turning point of this loading branch"):
+        broken.loop(300.0)
