@@ -107,8 +107,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=stress,
         metavar="P",
-        help="instead, mean stresses of the fields on both branches: 10kPa (default with "
-        "--preload: its quarters)",
+        help="instead, mean stresses of the fields on both branches: 10kPa, a tension in Pa alone: "
+        "-500 (default with --preload: its quarters)",
     )
     output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
     output.add_argument("--strict", action="store_true", help="exit code 1 if the loss is doubtful")
