@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
-from adhesis.ensemble.campaign.rules import list_of, shown
+from adhesis.ensemble.campaign.rules import list_of, number_in, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.lengths import HIGHEST_IN_METRES, LONGEST_IN_METRES, parse_length
-from adhesis.solver.checks import MOST_WAVES
+from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.registry import check_nodes
@@ -326,6 +326,9 @@ def _check_turning_point(source: str, campaign: Campaign) -> None:
             f"{source}: [cycle] {wanted} is missing ({entry.metadata['meaning']}): "
             f"it must be {entry.metadata['rule'].text}"
         )
+    if cycle.stiffness is None and not cycle.under_load:
+        largest = _largest(campaign, wanted, cycle.deepest)
+        number_in(MAX_PENETRATION)(f"{source}: [cycle] {wanted}", largest)
     for name in ("max_penetration", "stiffness") if cycle.under_load else ():
         if getattr(cycle, name) is not None:
             raise InputError(

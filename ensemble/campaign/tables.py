@@ -31,6 +31,7 @@ from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
 from adhesis.solver.checks import (
     ACCURACY,
     ADHESION_RANGE,
+    FAR_DISPLACEMENT,
     FULL_PENETRATION,
     HARMONIC,
     HURST,
@@ -45,6 +46,7 @@ from adhesis.solver.checks import (
     STRENGTH,
     WORK_OF_ADHESION,
     YOUNG,
+    Bounds,
 )
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
@@ -65,6 +67,10 @@ def _key(
     """
     metadata = {"rule": rule, "meaning": meaning, "free": free, "axis": axis}
     return field(default=default, metadata=metadata)
+
+
+# The far side of a stiffness may go beyond 1; at a fixed separation the file's rules refuse that.
+_DISPLACEMENT = Bounds(0.0, FAR_DISPLACEMENT.high, without_low=True)
 
 
 @dataclass(frozen=True)
@@ -153,7 +159,7 @@ class CycleTable:
     """``[cycle]``: the loading path."""
 
     max_penetration: float | None = _key(
-        number_in(MAX_PENETRATION),
+        Rule(number_in(MAX_PENETRATION).text, number_in(_DISPLACEMENT).read),
         "Δ~max, the penetration in units of h_max at which unloading starts; with a preload, at "
         "which it starts at the latest",
         None,

@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from adhesis.solver.checks import plain
 from adhesis.solver.loading.path_record import states_before_jumps
 from adhesis.solver.method import ContactState, Method, Path, PathError
 from adhesis.solver.model.jump import Jump
@@ -65,8 +64,8 @@ def follow_to_stress(
         # the stress may be reached before the path ends
         if abs(prescribed - start) < _END_LOCATED * method.problem.profile.h_max:
             raise PathError(
-                f"{error}; the mean stress before that is {state.mean_stress:.4g} Pa, and the "
-                f"preload of {plain(stress)} Pa is not reached"
+                f"{error}; the mean stress before that is {state.mean_stress:.4g} Pa, less than "
+                "the preload"
             ) from error
         first, reached = follow_to_stress(method, state, 0.5 * (start + prescribed), stress)
         if reached:

@@ -173,10 +173,10 @@ def test_a_preload_before_the_contact_snaps_through_is_reached_and_one_beyond_is
     assert in_one.turning_point == pytest.approx(
         in_many.turning_point, rel=1e-6 if name == "sharp" else 3e-3
     )
-    with pytest.raises(PathError, match=r"full contact before .* preload of .* is not reached"):
+    with pytest.raises(PathError, match=r"full contact before .* less than the preload"):
         run_loop(method, preload=1.05 * largest, load_steps=10)
     strong = make_method(name, Problem(single_wave(1e-6, PERIOD), HALF_SPACE, 1.0, Control(1e9)))
-    with pytest.raises(PathError, match=r"full contact .* the preload of 500 Pa is not reached"):
+    with pytest.raises(PathError, match=r"full contact .* less than the preload"):
         run_loop(strong, preload=500.0, load_steps=10)
 
 
