@@ -72,11 +72,10 @@ def shapes(data: Aggregate) -> Figure:
             _draw_shape(axes, cell.plan.position, shape, k, separations, part)
             # Ticks that follow the size of a panel change while the layout is found.
             axes.locator_params(axis="y", nbins=5)
-        known = [1e6 * s for s in dict.fromkeys(separations) if np.isfinite(s)]
+        known = dict.fromkeys(f"{1e6 * s:.2f}" for s in separations if np.isfinite(s))
         label_panel(
             whole,
-            f"{_cell_label(cell)}, {_depth(data, cell, k)}, "
-            f"$s$ = {' and '.join(f'{s:.2f}' for s in known)} µm",
+            f"{_cell_label(cell)}, {_depth(data, cell, k)}, $s$ = {' and '.join(known)} µm",
         )
         label_panel(detail, "detail")
         whole.set_ylabel("height (µm)")
