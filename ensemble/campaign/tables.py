@@ -174,7 +174,7 @@ class CycleTable:
     preload: float | None = _key(
         number_in(MAX_STRESS),
         "mean stress in Pa that a machine reaches before it unloads; max_penetration is then the "
-        "latest turning point, and the end of the curves (by default 0.99; needed with a "
+        "latest turning point, and the end of the curves (by default 0.999; needed with a "
         "stiffness)",
         None,
         axis="Pa",

@@ -110,7 +110,7 @@ def run_loop(
     method : Method
     max_penetration : float
         Δ~max = Δ/h_max, 0 < Δ~max < 1; u_tot/h_max if the control is a stiffness. With a preload it
-        is where the path turns at the latest (by default 0.99; with a stiffness no limit).
+        is where the path turns at the latest (by default 0.999; with a stiffness no limit).
     max_stress : float
         Instead, under a load: p̄ in Pa, positive.
     preload : float
