@@ -133,6 +133,8 @@ MAX_PENETRATION = Bounds(
     without_high=True,
     note=" (in units of h_max; at 1 the mean gap would be zero, and no such state exists)",
 )
+FULL_PENETRATION = 0.999
+"""Δ/h_max at which a loop turns that has not reached its preload: nearly full contact."""
 FAR_DISPLACEMENT = Bounds(1e-12, 1e12, unit="units of h_max")
 HURST = Bounds(0.0, 1.0, without_low=True, without_high=True)
 ROLLOFF = Bounds(1.0)

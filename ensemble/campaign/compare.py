@@ -10,7 +10,7 @@ from dataclasses import Field, dataclass, fields
 from typing import Any
 
 from adhesis.ensemble.campaign.rules import shown
-from adhesis.ensemble.campaign.tables import TABLES, Campaign
+from adhesis.ensemble.campaign.tables import TABLES, TURNING_POINTS, Campaign
 from adhesis.ensemble.campaign.tasks import Tasks
 
 
@@ -69,7 +69,7 @@ def _extends(key: str, was: Any, now: Any) -> bool:
     if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not axis:
         return False
     # All turning points of a profile belong together: they do not become more.
-    if key in ("cycle.max_penetration", "cycle.max_stress"):
+    if key in [f"cycle.{name}" for name in TURNING_POINTS]:
         return False
     return _values(was) < _values(now)
 

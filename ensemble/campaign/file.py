@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
-from adhesis.ensemble.campaign.rules import list_of, shown
+from adhesis.ensemble.campaign.rules import list_of, number_in, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.lengths import HIGHEST_IN_METRES, LONGEST_IN_METRES, parse_length
 from adhesis.ensemble.regular_file import open_regular
-from adhesis.solver.checks import MOST_WAVES
+from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.registry import check_nodes
@@ -300,10 +300,13 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [output] field_penetrations is given beside several max_penetration: it "
             "must be left out there (a third, two thirds and all of each are kept) or be empty"
         )
-    if campaign.output.field_penetrations and cycle.under_load:
+    if campaign.output.field_penetrations and cycle.turns_at_stress:
+        where, turn = ("under a load", "max_stress")
+        if cycle.preload is not None:
+            where, turn = "beside a preload", "preload"
         raise InputError(
-            f"{source}: [output] field_penetrations is given under a load: it must be left out "
-            "there (a third, two thirds and all of max_stress are kept) or be empty"
+            f"{source}: [output] field_penetrations is given {where}: it must be left out "
+            f"there (a third, two thirds and all of {turn} are kept) or be empty"
         )
     for value in campaign.output.field_penetrations or ():
         if not cycle.unloading_until <= value <= cycle.turning_point:
@@ -362,18 +365,46 @@ def _check_slope(names: Sequence[str], values: Sequence[float]) -> None:
 def _check_turning_point(source: str, campaign: Campaign) -> None:
     """Check that the path turns where its control lets it turn."""
     cycle = campaign.cycle
-    wanted, other = "max_penetration", "max_stress"
-    if cycle.under_load:
-        wanted, other = other, wanted
-    if getattr(cycle, wanted) is None:
+    if cycle.preload is not None:
+        _check_preload(source, campaign)
+    if cycle.max_stress is not None and not cycle.under_load:
+        stress = shown(cycle.max_stress)
+        raise InputError(
+            f'{source}: [cycle] max_stress is given: with control = "separation" a path turns at '
+            "max_penetration, so leave max_stress out. A weight or a machine? For a weight give "
+            'control = "load"; for a machine, which turns at that mean stress, give '
+            f"preload = {stress}"
+        )
+    wanted = "max_stress" if cycle.under_load else "max_penetration"
+    by_default = cycle.preload is not None and cycle.stiffness is None
+    if getattr(cycle, wanted) is None and not by_default:
         entry = next(f for f in fields(type(cycle)) if f.name == wanted)
         raise InputError(
             f"{source}: [cycle] {wanted} is missing ({entry.metadata['meaning']}): "
             f"it must be {entry.metadata['rule'].text}"
         )
-    for name in (other, *(["stiffness"] if cycle.under_load else [])):
+    if cycle.stiffness is None and not cycle.under_load:
+        largest = _largest(campaign, wanted, cycle.deepest)
+        number_in(MAX_PENETRATION)(f"{source}: [cycle] {wanted}", largest)
+    for name in ("max_penetration", "stiffness") if cycle.under_load else ():
         if getattr(cycle, name) is not None:
             raise InputError(
                 f'{source}: [cycle] {name} is given: with control = "{cycle.control}" a path '
                 f"turns at {wanted}, so leave {name} out"
             )
+
+
+def _check_preload(source: str, campaign: Campaign) -> None:
+    """Check that a preload stands where a machine presses, and goes to one depth at most."""
+    preload = shown(campaign.cycle.preload)
+    if campaign.cycle.under_load:
+        raise InputError(
+            f'{source}: [cycle] preload is {preload} with control = "load": a weight or a machine? '
+            f"For a weight give max_stress = {preload} instead; for a machine, which turns at that "
+            'mean stress, leave control = "load" out'
+        )
+    if campaign.has_axis("max_penetration"):
+        raise InputError(
+            f"{source}: [cycle] max_penetration has several values beside a preload: it must be "
+            "one number, at which a loop turns that has not reached its preload"
+        )

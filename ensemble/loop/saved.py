@@ -117,7 +117,9 @@ def to_xarray(result: Result) -> xr.Dataset:
     for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
         name = f"coefficient_{name}"
         variables[name] = _variable("harmonic", name, np.array(values))
-    about |= {name: value for name, value in result.numbers().items() if value is not None}
+    for name, value in result.numbers().items():
+        if value is not None:
+            about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
     about |= {
         "stiffness": problem.control.stiffness,
         "strength": problem.strength,
@@ -150,15 +152,17 @@ def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str
 def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
     """Write the states as a CSV, one row each, with units in the header (OSError).
 
-    Of several loops the first column is the turning point.
+    Of several loops the first column is the turning point, or the preload.
     """
     several = [results] if isinstance(results, PathResult) else results
     tables = [to_dataframe(result, "states") for result in several]
     units = tables[0].attrs["units"] | {"penetration": "h_max"}
     if not isinstance(results, PathResult) and len(results) > 1:
-        units["turning_point"] = "Pa" if results[0].problem.control.is_load else "h_max"
+        turn = "turning_point" if results[0].preload is None else "preload"
+        at_stress = results[0].problem.control.is_load or turn == "preload"
+        units[turn] = "Pa" if at_stress else "h_max"
         for table, result in zip(tables, results, strict=True):
-            table.insert(0, "turning_point", result.turning_point)
+            table.insert(0, turn, getattr(result, turn))
     for table in tables:
         table.attrs.clear()  # pandas compares them when it joins tables
     names = {name: f"{name} ({unit})" if unit else name for name, unit in units.items()}

@@ -20,6 +20,7 @@ from adhesis.ensemble.trace.variants import Cycle, Plan, default_tables, make_pl
 from adhesis.solver import views
 from adhesis.solver.checks import (
     ACCURACY,
+    FULL_PENETRATION,
     Bounds,
     choice,
     counted,
@@ -31,7 +32,7 @@ from adhesis.solver.checks import (
     row,
     whole,
 )
-from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.loading.loop import check_cycle, check_preload
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
@@ -138,7 +139,7 @@ class Answer(ByValue):
     def __repr__(self) -> str:
         """One line: the loss with its uncertainty, and the warnings counted."""
         return (
-            f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty)} J/m², "
+            f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty, 0.0)} J/m², "
             f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
         )
 
@@ -242,6 +243,7 @@ def loss_of_trace(
     work_of_adhesion: Several,
     max_penetration: Several | None = None,
     max_stress: Several | None = None,
+    preload: Several | None = None,
     control: Control | None = None,
     load_steps: int = 40,
     method: MethodName = "auto",
@@ -267,6 +269,9 @@ def loss_of_trace(
         if the control is a stiffness. 0.9 by default.
     max_stress : float or several, optional
         Instead, under a load: turning points p̄ in Pa.
+    preload : float or several, optional
+        Instead, of a machine: p̄ in Pa at which loops turn (:func:`adhesis.run_loop`).
+        ``max_penetration`` is then one number, where they turn at the latest.
     control : Control, optional
         What is prescribed along the path; without it the separation.
     load_steps : int
@@ -301,16 +306,30 @@ def loss_of_trace(
     """
     control = Control() if control is None else control
     instance("control", control, Control, "Control(stiffness), for a load Control(0)")
+    latest = None
+    if preload is None:
+        turns = _turns(control, max_penetration, max_stress)
+    else:
+        turns = preload
+        if max_stress is not None:
+            raise ValueError(
+                "preload and max_stress are given: a machine turns at a preload, a weight "
+                "(control=Control(0)) at max_stress"
+            )
+        if max_penetration is not None:
+            latest = real("max_penetration", max_penetration)
     cycle = make_cycle(
         half_space,
         work_of_adhesion,
-        _turns(control, max_penetration, max_stress),
+        turns,
         load_steps,
         method,
         accuracy,
         control,
         adhesion_range,
         strength,
+        at_preload=preload is not None,
+        latest=latest,
     )
     check(prepared, cycle)
     flag("quick", quick)
@@ -342,7 +361,11 @@ def _turns(
             raise ValueError("max_stress is missing: a path under a load must have it, in Pa")
         return max_stress
     if max_stress is not None:
-        raise ValueError("max_stress is given: it belongs to a load, so give control=Control(0)")
+        raise ValueError(
+            "max_stress is given: it belongs to a load, that of a weight: a weight or a machine? "
+            "For a weight give control=Control(0); for a machine, which turns at that mean stress, "
+            "give preload instead of max_stress"
+        )
     return MAX_PENETRATION if max_penetration is None else max_penetration
 
 
@@ -356,6 +379,9 @@ def make_cycle(
     control: Control | None = None,
     adhesion_range: float | None = None,
     strength: float | None = None,
+    *,
+    at_preload: bool = False,
+    latest: float | None = None,
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -368,6 +394,7 @@ def make_cycle(
     real("accuracy", accuracy, ACCURACY)
     control = control or Control()
     turning = "max_stress" if control.is_load else "max_penetration"
+    turning = "preload" if at_preload else turning
     gammas, turns = default_tables(
         _several("work_of_adhesion", work_of_adhesion), _several(turning, turning_points)
     )
@@ -375,10 +402,14 @@ def make_cycle(
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
     for point in turns:
+        if at_preload:
+            check_preload(point, control)
+            point = FULL_PENETRATION if latest is None else latest
         check_cycle(point, load_steps, control)
     cycle = Cycle(
-        half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength
-    )
+        half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength,
+        at_preload, latest,
+    )  # fmt: skip
     for gamma in gammas:
         cycle.strength_at(gamma)
     return cycle
@@ -466,6 +497,10 @@ def _neighbours(answer: Answer) -> list[str]:
 def _warnings(answer: Answer, loss: Quantity) -> list[str]:
     found = [*answer.main["range_warnings"], *answer.main["strain_warnings"]]
     for run in answer.plan.runs:
+        of_run = answer.result(run.name)
+        for text in of_run["preload_warnings"] if of_run is not None else ():
+            found.append(text if run.name == "answer" else f"the loop “{run.name}”: {text}")
+    for run in answer.plan.runs:
         text = answer.results.get(run.name)
         if isinstance(text, str):
             counts = run.group in DOUBTS and not run.name.startswith(_FOR_THE_FIGURE)
@@ -531,6 +566,7 @@ def document(answer: Answer) -> dict[str, Any]:
     """Return every number of the answer as one JSON document, in SI units."""
     prepared, trace, cycle, plan = answer.prepared, answer.prepared.trace, answer.cycle, answer.plan
     spectrum = prepared.spectrum
+    at_stress = cycle.at_preload or cycle.control.is_load
     return {
         "file": trace.source,
         "read": {
@@ -559,8 +595,9 @@ def document(answer: Answer) -> dict[str, Any]:
         "work_of_adhesion": cycle.works_of_adhesion[0],
         "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
         "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
-        "max_penetration": None if cycle.control.is_load else cycle.turning_points[0],
+        "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
+        "preload": cycle.turning_points[0] if cycle.at_preload else None,
         "load_steps": cycle.load_steps,
         "loss": _plain(answer.loss),
         "loss_over_work_of_adhesion": answer.main["loss_over_work_of_adhesion"],

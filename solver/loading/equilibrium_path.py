@@ -173,6 +173,18 @@ class EquilibriumPath(ByValue, ResultViews):
             self.tangent[states],
         )
 
+    @property
+    def loss_note(self) -> str:
+        """Return what the loss of a path under a load leaves out; empty for all other paths."""
+        if not self.problem.control.is_load:
+            return ""
+        if self.patches[-1]:
+            return "under a weight"
+        return (
+            f"under a weight; it falls off at {stress_text(0.0 - self.mean_stress.min())}, the "
+            "energy of the fall is not counted"
+        )
+
     def states_before_jumps(self) -> list[int]:
         """Return the index of the state before each jump; the next one is that after it."""
         return states_before_jumps(self.jumps, self.branch, self.separation, self.contact_fraction)

@@ -58,6 +58,7 @@ LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
     "without adhesion": lambda: run_loop(
         ExactWave(Problem(WAVE, HalfSpace(1e6, 0.5), 0.0)), max_penetration=0.5, load_steps=4
     ),
+    "to a preload": lambda: run_loop(wave_method(), preload=500.0, load_steps=4),
     "path": lambda: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4),
 }
 
@@ -483,3 +484,21 @@ def test_the_examples_of_the_docstrings_are_right(module):
     done = doctest.testmod(module)
     assert done.failed == 0
     assert done.attempted >= 3
+
+
+def test_a_loop_is_drawn_into_axes_that_are_given():
+    problem = Problem(single_wave(1e-9, 1e-3), HalfSpace(1e6, 0.5), 1e-9)
+    loop = run_loop(ExactWave(problem), max_penetration=0.5, load_steps=4)
+    figure = Figure()
+    stress, contact = figure.subplots(1, 2)
+    assert loop.plot(ax=(stress, contact)) is figure
+    assert stress.get_lines()[0].get_ydata() == pytest.approx(
+        1e-3 * loop.mean_stress[loop.branch == "unloading"]
+    )
+    assert contact.get_ylabel() == "contact fraction $A/A_0$"
+    alone = Figure().subplots()
+    assert loop.plot(ax=alone) is alone.figure
+    assert len(alone.get_lines()) == 3  # two branches, and a line at 0
+    for bad in ("ax", [alone, 1], [], 3):
+        with pytest.raises(TypeError, match="it must be one Axes of matplotlib, or two of them"):
+            loop.plot(ax=bad)
