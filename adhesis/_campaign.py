@@ -222,8 +222,8 @@ class Campaign:
             )
 
     def _run_ranks(self, mpirun: str, path: Path, ranks: int, progress: bool) -> None:
-        from adhesis.ensemble.command.campaigns.run import BAD_INPUT, DONE, SOME_FAILED
         from adhesis.ensemble.errors import InputError
+        from adhesis.ensemble.exit_codes import BAD_INPUT, DONE, SOME_FAILED
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run import launch
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 
 def printable(text: str) -> str:
@@ -24,6 +25,12 @@ def one_line(text: str) -> str:
 def markdown(text: str) -> str:
     """Escape a text as Markdown: no image, link, HTML, code or table is made of it."""
     return re.sub(r"([\\`*\[\]<>&|])", r"\\\1", one_line(text))
+
+
+def markdown_table(head: Sequence[str], *rows: Sequence[str], left_columns: int = 0) -> str:
+    """Return a table of escaped cells, numbers in all columns but the first ``left_columns``."""
+    rule = ["---" if column < left_columns else "---:" for column in range(len(head))]
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, rule, *rows))
 
 
 def code_span(text: str) -> str:

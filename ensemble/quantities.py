@@ -1,13 +1,265 @@
-"""Units of the numbers that results and commands state; losses over the work of adhesion."""
+"""Quantities with their units: how they are read, and how numbers are shown.
+
+Each quantity that a user can give is one :class:`Quantity`, by which options, campaign files and
+Python read it.
+"""
 
 from __future__ import annotations
 
+import argparse
 import math
-from collections.abc import Mapping
+import re
+import unicodedata
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
-from adhesis.ensemble.lengths import METRES, length_unit
-from adhesis.ensemble.stresses import PASCALS, stress_unit
+from adhesis.ensemble.errors import InputError, UnitError, quoted
+
+_NUMBER = r"\s*([+\-]?(?:\d+\.?\d*|\.\d+)(?:e[+\-]?\d+)?)\s*"
+_WORD = r"[^\W\d_]+"
+_QUOTIENT = rf"{_WORD}\s*/\s*{_WORD}(?:\^?2)?"
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A quantity, given as a number in its SI unit or as a number with a unit.
+
+    Whether a value is positive and finite is left to its bounds. Sentences of errors begin with
+    "is", to follow the name of an option or a key.
+
+    Attributes
+    ----------
+    name : str
+    units : mapping of str to float
+        Size of each unit in the SI unit, which is the first.
+    example : str
+        A value with its unit.
+    rule : str
+        What a text must be.
+    shown : tuple of str
+        Units in which values are shown, from the largest to the smallest.
+    largest : float
+        A larger number without a unit is likely to be in another unit, and is asked about.
+    question : str
+        What to give instead of such a number, which replaces ``{0}``.
+    others : mapping of str to str
+        Units by further names; with them, capitals do not count.
+    """
+
+    name: str
+    units: Mapping[str, float]
+    example: str
+    rule: str
+    shown: tuple[str, ...]
+    largest: float = math.inf
+    question: str = ""
+    others: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def unit(self) -> str:
+        """The SI unit."""
+        return next(iter(self.units))
+
+    @cached_property
+    def spellings(self) -> dict[str, str]:
+        """Unit by each of its names, as these are compared."""
+        named = {unit: unit for unit in self.units} | dict(self.others)
+        return {self._compared(name): unit for name, unit in named.items()}
+
+    def _compared(self, name: str) -> str:
+        """Return a name in the form in which names are compared; ㎛ is one sign for µm."""
+        name = unicodedata.normalize("NFKC", name).strip().replace("^2", "2")
+        name = re.sub(r"\s*/\s*", "/", name)
+        return name.lower() if self.others else name
+
+    def unit_named(self, name: str) -> str:
+        """Return the unit of a name ("um" is "µm").
+
+        Raises
+        ------
+        InputError
+            For a name that is no unit of the quantity.
+        """
+        unit = self.spellings.get(self._compared(name))
+        if unit is None:
+            raise InputError(
+                f"{name!r} is no unit of {self.name}: it must be one of {', '.join(self.units)}"
+            )
+        return unit
+
+    def check(self, number: float) -> None:
+        """Raise InputError for a number that can hardly be in the SI unit."""
+        if self.largest < abs(number) < math.inf:
+            shown = f"{number:g}"
+            raise InputError(
+                f"is {shown}, which would be {shown} {self.unit}: give its unit, "
+                f"{self.question.format(shown)}"
+            )
+
+    def read(self, text: str) -> float:
+        """Read a number in the SI unit, or a number with its unit; InputError for anything else."""
+        try:
+            number = float(text)
+        except ValueError:
+            return self.read_with_unit(text)
+        self.check(number)
+        return number
+
+    def read_with_unit(self, text: str) -> float:
+        """Read a number and its unit, as in "2 mm".
+
+        Raises
+        ------
+        InputError
+            If it is anything else; UnitError if its unit is none of the quantity.
+        """
+        named = _QUOTIENT if "/" in self.unit else _WORD
+        found = re.fullmatch(
+            rf"{_NUMBER}({named})\s*", unicodedata.normalize("NFKC", text), re.IGNORECASE
+        )
+        if not found:
+            raise InputError(f"is {quoted(text)}: it must be {self.rule}")
+        unit = self.spellings.get(self._compared(found[2]))
+        if unit is None:
+            raise UnitError(f"is {quoted(text)}: its unit must be one of {', '.join(self.units)}")
+        # Decimal numbers, so that 7um is the same number as 7e-6.
+        return float(Decimal(found[1]) * Decimal(repr(self.units[unit])))
+
+    def option(self, text: str) -> float:
+        """Read an option; to be given to argparse."""
+        try:
+            return self.read(text)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    def unit_for(self, value: float) -> str:
+        """Return the largest shown unit that is not larger than a value, or the smallest."""
+        return next((u for u in self.shown if abs(value) >= self.units[u]), self.shown[-1])
+
+    def text(self, value: float, digits: int = 3) -> str:
+        """Show a value in a unit of its size: "5 µm"."""
+        unit = self.unit_for(float(f"{value:.{digits}g}"))
+        return f"{value / self.units[unit]:.{digits}g} {unit}"
+
+
+LENGTH = Quantity(
+    "length",
+    {
+        "m": 1.0,
+        "cm": 1e-2,
+        "mm": 1e-3,
+        "µm": 1e-6,
+        "nm": 1e-9,
+        "Å": 1e-10,
+        "inch": 25.4e-3,
+        "mil": 25.4e-6,
+        "µin": 25.4e-9,
+    },
+    "2 mm",
+    "a length, as in 5e-6 (m) or 5um",
+    ("m", "mm", "µm", "nm"),
+    1.0,
+    "as in {0}um ({0}m, if metres are meant)",
+    {
+        name: unit
+        for unit, names in {
+            "m": "meter meters metre metres",
+            "mm": "millimeter millimeters millimetre millimetres",
+            "µm": "um micron microns micrometer micrometers micrometre micrometres mikrometer",
+            "nm": "nanometer nanometers nanometre nanometres",
+            "Å": "a angstrom angstroms ångström",
+            "inch": "in inches",
+            "mil": "mils thou",
+            "µin": "uin uinch µinch microinch microinches",
+        }.items()
+        for name in names.split()
+    },
+)
+HEIGHT = replace(LENGTH, largest=1e-3)
+"""A height of a roughness."""
+
+STRESS = Quantity(
+    "stress",
+    {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
+    "20 kPa",
+    "a stress, as in 2e4 (Pa) or 20kPa",
+    ("GPa", "MPa", "kPa", "Pa"),
+)
+STIFFNESS = Quantity(
+    "stiffness",
+    {"Pa/m": 1.0, "kPa/m": 1e3, "MPa/m": 1e6, "GPa/m": 1e9},
+    "2 GPa/m",
+    "a stiffness, as in 2e9 (Pa/m) or 2GPa/m",
+    ("Pa/m",),
+)
+WORK_OF_ADHESION = Quantity(
+    "work of adhesion",
+    {"J/m²": 1.0, "mJ/m²": 1e-3, "N/m": 1.0, "mN/m": 1e-3},
+    "20 mJ/m2",
+    "a number in J/m² with a decimal point, as in 0.02, or with its unit, as in 20mJ/m2",
+    ("J/m²",),
+    10.0,  # the surface energies of solids are below
+    "as in {0}mJ/m2 ({0}J/m2, if J/m² are meant)",
+)
+QUANTITIES = {q.unit: q for q in (LENGTH, STRESS, STIFFNESS, WORK_OF_ADHESION)}
+"""Quantities by their SI unit."""
+
+length_text, stress_text = LENGTH.text, STRESS.text
+
+_WHOLE = re.compile(r"[+\-]?\d+")
+_DIGITS = re.compile(r"\d+(?![\d.])")
+
+
+def read_list(
+    option: str,
+    text: str,
+    read: Callable[[str], float] = float,
+    *,
+    rule: str = "",
+    distinct: str = "",
+) -> tuple[float, ...]:
+    """Read an option that is a list of numbers, such as "0.3,0.6".
+
+    A whole number, a comma and digits can be one number with a decimal comma, and are refused. A
+    list of whole numbers has decimals ("1.0,5.0") or blanks ("1, 5").
+
+    Parameters
+    ----------
+    option, text : str
+    read : callable
+        Reads one of the numbers; an InputError begins with "is".
+    rule : str
+        What the list must be, for a ``read`` that raises a ValueError of its own.
+    distinct : str
+        Which values must differ, if they must.
+
+    Raises
+    ------
+    InputError
+    """
+    words = text.split(",")
+    for whole, rest in pairwise(words):
+        digits = _DIGITS.match(rest)
+        if _WHOLE.fullmatch(whole.strip()) and digits is not None:
+            raise InputError(
+                f"{option} is {quoted(text)}: numbers have a decimal point, as in "
+                f"{whole}.{digits[0]}; if two are meant, write "
+                f"{float(whole):.1f},{float(digits[0]):.1f}"
+            )
+    try:
+        values = tuple(read(word.strip()) for word in words)
+    except InputError as error:
+        raise InputError(f"{option} {error}") from None
+    except ValueError:
+        raise InputError(f"{option} is {quoted(text)}: it must be {rule}") from None
+    if distinct and len(set(values)) < len(values):
+        raise InputError(f"{option} is {text}: {distinct} must differ")
+    return values
+
 
 _NAMES = {
     "m": "h_max h_rms period separation patch_length valid_range edge_range position step length "
@@ -54,13 +306,11 @@ def shown_unit(name: str, largest: float) -> tuple[str, float]:
         Largest of the values that are shown, in the SI unit.
     """
     unit = UNITS.get(name, "")
-    if unit == "m":
-        unit = length_unit(largest)
-        return unit, METRES[unit]
-    if unit == "Pa":
-        unit = stress_unit(largest)
-        return unit, PASCALS[unit]
-    return unit, 1.0
+    quantity = QUANTITIES.get(unit)
+    if quantity is None:
+        return unit, 1.0
+    unit = quantity.unit_for(largest)
+    return unit, quantity.units[unit]
 
 
 def with_unit(name: str, value: float) -> str:
@@ -112,6 +362,30 @@ def _unit(path: tuple[str, ...]) -> str:
     if name in ("value", "uncertainty"):
         return UNITS.get(parent, "1")
     return UNITS.get(name, "1")
+
+
+def duration(seconds: float) -> str:
+    """Return a time as people read it: "4.2 s", "3 min 20 s", "2 h 05 min"."""
+    if seconds < 60:
+        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest:02d} s"
+    hours, minutes = divmod(minutes, 60)
+    if hours < 48:
+        return f"{hours} h {minutes:02d} min"
+    return f"{hours // 24} d {hours % 24} h"
+
+
+def percent(*shares: float, digits: int = 2) -> str:
+    """Return significant digits of a share without an exponent: "12 %"; of two, "3 to 12 %"."""
+    return " to ".join(f"{float(f'{100 * share:.{digits}g}'):g}" for share in shares) + " %"
+
+
+def rounded_percent(share: float, places: int = 1, sign: str = "") -> str:
+    """Return a share with so many places, and with no sign if it rounds to 0: "+3.0 %"."""
+    rounded = round(100 * share, places) or 0.0
+    return f"{rounded:{sign if rounded else ''}.{places}f} %"
 
 
 def bytes_text(size: float) -> str:

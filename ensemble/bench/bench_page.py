@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from adhesis.ensemble.bench.equal_error import Exponent, Line, Quotient, Ratio
+from adhesis.ensemble.escape import markdown_table
 
 LINE_COLUMNS = (
     "method",
@@ -119,7 +120,7 @@ def page(
             f"Δ~max = {scene.max_penetration:g}, {scene.load_steps} load steps. "
             f"Reference: {chosen[0].reference.text}.",
             "",
-            *_markdown(LINE_COLUMNS, [line_cells(line) for line in chosen]),
+            _table(LINE_COLUMNS, (line_cells(line) for line in chosen)),
             "",
         ]
     if compared:
@@ -134,19 +135,18 @@ def page(
             ]
             for ratio in compared
         ]
-        parts += [*_markdown(_RATIO_COLUMNS, rows), ""]
+        parts += [_table(_RATIO_COLUMNS, rows), ""]
     if grown:
         parts += ["### How the cost grows", ""]
-        parts += [*_markdown(GROWTH_COLUMNS, [growth_cells(line) for line in grown]), ""]
+        parts += [_table(GROWTH_COLUMNS, (growth_cells(line) for line in grown)), ""]
     if fitted:
         parts += ["### Exponents of the growth of sharp", ""]
-        parts += [*_markdown(_EXPONENT_COLUMNS, [exponent_cells(one) for one in fitted]), ""]
+        parts += [_table(_EXPONENT_COLUMNS, (exponent_cells(one) for one in fitted)), ""]
     return "\n".join(parts)
 
 
-def _markdown(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    rule = ["---" if k < 2 else "---:" for k in range(len(columns))]
-    return ["| " + " | ".join(row) + " |" for row in (columns, rule, *rows)]
+def _table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    return markdown_table(columns, *rows, left_columns=2)
 
 
 def _quotient(one: Quotient) -> str:

@@ -15,11 +15,10 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.campaign.rules import list_of, number_in, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
 from adhesis.ensemble.errors import InputError, quoted
-from adhesis.ensemble.lengths import HIGHEST_IN_METRES, LONGEST_IN_METRES, parse_length
+from adhesis.ensemble.quantities import Quantity
 from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
@@ -69,19 +68,16 @@ def read_campaign(text: str, source: str = "campaign") -> Campaign:
 
 def _ask_for_units(source: str, document: dict[str, Any]) -> None:
     """Refuse numbers that can hardly be in SI units."""
-    for table, key, read, largest in (
-        ("profile", "period", parse_length, LONGEST_IN_METRES),
-        ("profile", "h_rms", parse_length, HIGHEST_IN_METRES),
-        ("material", "adhesion_range", parse_length, LONGEST_IN_METRES),
-        ("sweep", "work_of_adhesion", parse_work_of_adhesion, LARGEST_IN_JOULES),
-    ):
-        values = document.get(table, {}).get(key, [])
-        for value in values if isinstance(values, list) else [values]:
-            if not isinstance(value, str):
-                try:
-                    read(repr(value), largest)
-                except InputError as error:
-                    raise InputError(f"{source}: [{table}] {key} {error}") from None
+    for table, kind in TABLES.items():
+        for entry in fields(kind):
+            quantity: Quantity | None = entry.metadata["rule"].quantity
+            values = document.get(table, {}).get(entry.name, [])
+            for value in values if isinstance(values, list) else [values]:
+                if quantity is not None and not isinstance(value, str):
+                    try:
+                        quantity.check(value)
+                    except InputError as error:
+                        raise InputError(f"{source}: [{table}] {entry.name} {error}") from None
 
 
 def _decoded(data: bytes, source: str) -> str:

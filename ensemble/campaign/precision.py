@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble import interval
+from adhesis.ensemble.quantities import percent
 
 LEAST = 32
 LOOKS_IN_A_ROW = 4
@@ -90,20 +91,17 @@ class Precision:
         error = self.relative_error
         known = f"{self.quantity}: interval unknown"
         if np.isfinite(error):
-            known = f"{self.quantity} {self.low:.4g} to {self.high:.4g} (± {as_percent(error)})"
+            known = (
+                f"{self.quantity} {self.low:.4g} to {self.high:.4g} (± {percent(error, digits=3)})"
+            )
         verdict = {True: "met", False: "not met", None: "not finished"}[self.met]
         if self.met is False and self.count < LEAST:
             verdict += f", as it takes at least {LEAST} realisations"
         plural = "" if self.count == 1 else "s"
         return (
-            f"{known} of {self.count} realisation{plural}, wanted ± {as_percent(self.wanted)}: "
-            f"{verdict}"
+            f"{known} of {self.count} realisation{plural}, wanted ± "
+            f"{percent(self.wanted, digits=3)}: {verdict}"
         )
-
-
-def as_percent(share: float) -> str:
-    """Return three digits of a share, in percent and without an exponent."""
-    return f"{float(f'{100 * share:.3g}'):g} %"
 
 
 def precision(

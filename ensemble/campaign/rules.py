@@ -6,19 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from adhesis.ensemble.adhesions import work_of_adhesion_with_unit
 from adhesis.ensemble.errors import InputError, UnitError
-from adhesis.ensemble.lengths import length_with_unit
-from adhesis.ensemble.stresses import stress_with_unit
+from adhesis.ensemble.quantities import QUANTITIES, Quantity
 from adhesis.solver import checks
 from adhesis.solver.checks import Bounds
-
-# By the unit of a quantity: the reader of a text with another unit, and the end of the rule.
-_WITH_UNIT: dict[str, tuple[Callable[[str], float], str]] = {
-    "m": (length_with_unit, ', or a length as "2 mm"'),
-    "Pa": (stress_with_unit, ', or a stress as "20 kPa"'),
-    "J/m²": (work_of_adhesion_with_unit, ', or a text as "20 mJ/m2"'),
-}
 
 
 @dataclass(frozen=True)
@@ -31,10 +22,13 @@ class Rule:
         The rule in words, after "it must be".
     read : callable
         Returns the value as it will be used; ValueError if it breaks the rule.
+    quantity : Quantity, optional
+        Of the number, or of each one of a list, if it may have a unit.
     """
 
     text: str
     read: Callable[[object], Any]
+    quantity: Quantity | None = None
 
     def __call__(self, where: str, value: object) -> Any:
         """Return the value as it will be used.
@@ -57,23 +51,24 @@ def shown(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else checks.shown(value)
 
 
-def number_in(bounds: Bounds) -> Rule:
+def number_in(bounds: Bounds, quantity: Quantity | None = None) -> Rule:
     """A number between the solver's bounds; a whole one, where they say so, without a point.
 
-    A length or a stress may also be a text with its unit.
+    A quantity, by default that of the bounds' unit, may also be a text with its unit.
     """
-    read_text, example = _WITH_UNIT.get(bounds.unit, (None, ""))
+    quantity = quantity or QUANTITIES.get(bounds.unit.partition(" ")[0])
 
     def read(value: object) -> float:
-        if read_text is not None and isinstance(value, str):
-            value = read_text(value)
+        if quantity is not None and isinstance(value, str):
+            value = quantity.read_with_unit(value)
         # TOML has numbers of two types and bool; Python takes the latter for a number too.
         kinds = int if bounds.whole else int | float
         if isinstance(value, bool) or not isinstance(value, kinds):
             raise ValueError
         return (checks.whole if bounds.whole else checks.real)("", value, bounds)
 
-    return Rule(bounds.text + example, read)
+    example = "" if quantity is None else f', or a {quantity.name} as "{quantity.example}"'
+    return Rule(bounds.text + example, read, quantity)
 
 
 def positive_number(unit: str) -> Rule:
@@ -118,7 +113,7 @@ def list_of(rule: Rule, *, may_be_empty: bool = False) -> Rule:
             raise ValueError
         return values
 
-    return Rule(f"a list of different values, each {rule.text}", read)
+    return Rule(f"a list of different values, each {rule.text}", read, rule.quantity)
 
 
 def list_of_names() -> Rule:

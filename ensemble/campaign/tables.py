@@ -28,6 +28,7 @@ from adhesis.ensemble.campaign.rules import (
     whole_number,
 )
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
+from adhesis.ensemble.quantities import HEIGHT
 from adhesis.solver.checks import (
     ACCURACY,
     ADHESION_RANGE,
@@ -87,7 +88,7 @@ class ProfileTable:
         axis="1",
     )
     h_rms: float | None = _key(
-        number_in(NORMALISATIONS["h_rms"]), "root mean square height in m", None, axis="m"
+        number_in(NORMALISATIONS["h_rms"], HEIGHT), "root mean square height in m", None, axis="m"
     )
     m2: float | None = _key(number_in(NORMALISATIONS["m2"]), "mean square slope", None, axis="1")
     c0: float | None = _key(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Self, overload
@@ -12,6 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.errors import InputError, parameter
+from adhesis.ensemble.quantities import with_unit
+
+
+def place(others: Iterable[tuple[str, float]]) -> str:
+    """Return "max_stress = 20 kPa, ratio = 8"; empty without further axes."""
+    return ", ".join(f"{name} = {with_unit(name, value)}" for name, value in others)
+
+
+def name_at(hurst: float, work_of_adhesion: float, others: Sequence[tuple[str, float]]) -> str:
+    """Return "H = 0.8, γ = 0.04 J/m²", and where a cell stands on further axes."""
+    name = f"H = {hurst:g}, γ = {work_of_adhesion:g} J/m²"
+    return f"{name}, {place(others)}" if others else name
 
 
 @lru_cache(1 << 16)
@@ -58,9 +70,7 @@ class Task:
     @property
     def cell_name(self) -> str:
         """Values of the task on the axes of the sweep: "H = 0.8, γ = 0.04 J/m²"."""
-        return f"H = {self.hurst:g}, γ = {self.work_of_adhesion:g} J/m²" + "".join(
-            f", {name} = {value:g}" for name, value in self.others
-        )
+        return name_at(self.hurst, self.work_of_adhesion, self.others)
 
     def __str__(self) -> str:
         return f"{self.cell_name}, realisation {self.realisation}"

@@ -20,6 +20,15 @@ from types import FrameType
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
 from adhesis.ensemble.errors import InputError, RankError, WriteError, lack, naming_options
+from adhesis.ensemble.exit_codes import (
+    BAD_INPUT,
+    INTERRUPTED,
+    OUR_ERROR,
+    PIPE_CLOSED,
+    TERMINATED,
+    TOO_FEW_RESOURCES,
+    WRITE_FAILED,
+)
 from adhesis.ensemble.run.interrupt import in_main_thread
 from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
 from adhesis.ensemble.run.ranks import launched
@@ -57,10 +66,6 @@ _PARALLEL = "run"
 _INDEPENDENT = ("loop", "trace", "warm", "doctor")
 # How long a process waits for rank 0 to report the same error, whose end makes mpirun end all.
 _RANK_0_FIRST = 20.0  # s
-
-BAD_INPUT, OUR_ERROR, TOO_FEW_RESOURCES, WRITE_FAILED = 2, 70, 71, 74
-PIPE_CLOSED = 1
-INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
 
 
 class Terminated(KeyboardInterrupt):

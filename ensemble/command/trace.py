@@ -5,17 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 
-from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
-from adhesis.ensemble.number_lists import words_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
+from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration, read_list
 from adhesis.ensemble.reporter import StatusLine
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
-from adhesis.ensemble.trace.variants import Plan, clock, make_plan
+from adhesis.ensemble.trace.variants import Plan, make_plan
 from adhesis.solver.model.half_space import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
@@ -32,7 +31,8 @@ def execute(args: argparse.Namespace) -> int:
         raise InputError("--to is missing: give the directory for the page, or --plan for none")
     if args.processes is not None and args.processes < 1:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
-    gammas = _numbers(args.work_of_adhesion, "--work-of-adhesion")
+    read, option = WORK_OF_ADHESION.read, "--work-of-adhesion"
+    gammas = read_list(option, args.work_of_adhesion, read, distinct="its values")
     with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
         control = control_of(args, half_space)
@@ -80,16 +80,6 @@ def execute(args: argparse.Namespace) -> int:
     return 0
 
 
-def _numbers(text: str, option: str) -> list[float]:
-    try:
-        values = [parse_work_of_adhesion(word, LARGEST_IN_JOULES) for word in words_of(text)]
-    except InputError as error:
-        raise InputError(f"{option} {error}") from None
-    if len(set(values)) < len(values):
-        raise InputError(f"{option} is {text!r}: its values must differ")
-    return values
-
-
 class _Progress:
     """Lines on stderr: loops done, what is running, time left; none is longer silent than 10 s."""
 
@@ -110,7 +100,7 @@ class _Progress:
         if running:
             line += f"; running {running}"
         line += f"; {self.line.seconds:.0f} s so far"
-        return line + (f", about {clock(left)} left" if loops.done and not finished else "")
+        return line + (f", about {duration(left)} left" if loops.done and not finished else "")
 
     def _left(self, loops: Loops) -> float:
         """Expected wall seconds, corrected by what the loops have taken so far."""

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.number_lists import words_of
-from adhesis.ensemble.stresses import parse_stress
+from adhesis.ensemble.quantities import STRESS, read_list
 from adhesis.solver.loading.loop import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
@@ -18,6 +16,7 @@ from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 
 _OUT = "out"
+_POINTS = "turning points"
 _TURNS = ("max_penetration", "max_stress", "preload")
 _MAX_PENETRATION = 0.9
 
@@ -109,10 +108,12 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     control = control_of(args, half_space)
     if args.path is not None:
         _refuse_several(args, "path", *_TURNS)
-        words = _words("--path", args.path)
-        out = words[-1] == _OUT
+        before, _, last = args.path.rpartition(",")
+        out = last.strip() == _OUT
+        if out and not before:
+            raise InputError("--path holds no turning point")
         rule = "numbers with commas between them"
-        points = _numbers("--path", words[:-1] if out else words, rule)
+        points = read_list("--path", before if out else args.path, rule=rule)
         return Cycle(control, Turns(points), True, out, args.load_steps)
     turns = turns_of(args, control)
     turns = replace(turns, points=tuple(sorted(turns.points)))
@@ -138,7 +139,7 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
         _refuse_several(args, "max_penetration", "max_stress")
         if args.max_stress is None:
             raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
-        return Turns(_distinct("--max-stress", args.max_stress, _stresses))
+        return Turns(_stresses("--max-stress", args.max_stress))
     if args.max_stress is not None:
         raise InputError(
             "--max-stress belongs to load control, and --stiffness 0 is not given: a weight or a "
@@ -148,13 +149,10 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
     rule = "one or more numbers, as 1.5 or 0.5,1.5"
     if control.is_fixed:
         rule = "one or more numbers between 0 and 1, as 0.9 or 0.3,0.6"
-
-    def numbers(option: str, words: list[str]) -> tuple[float, ...]:
-        return _numbers(option, words, rule)
-
     penetrations: tuple[float, ...] | None = None
     if args.max_penetration is not None:
-        penetrations = _distinct("--max-penetration", args.max_penetration, numbers)
+        option = "--max-penetration"
+        penetrations = read_list(option, args.max_penetration, rule=rule, distinct=_POINTS)
     if args.preload is None:
         return Turns((_MAX_PENETRATION,) if penetrations is None else penetrations)
     if penetrations is not None and len(penetrations) > 1:
@@ -162,18 +160,12 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
             f"--max-penetration is {args.max_penetration} beside --preload: it must be one number, "
             "at which a loop turns that has not reached its preload"
         )
-    preloads = _distinct("--preload", args.preload, _stresses)
+    preloads = _stresses("--preload", args.preload)
     return Turns(preloads, True, None if penetrations is None else penetrations[0])
 
 
-def _distinct(
-    option: str, text: str, read: Callable[[str, list[str]], tuple[float, ...]]
-) -> tuple[float, ...]:
-    """Read turning points with commas between them, all different."""
-    points = read(option, _words(option, text))
-    if len(set(points)) < len(points):
-        raise InputError(f"{option} is {text}: turning points must differ")
-    return points
+def _stresses(option: str, text: str) -> tuple[float, ...]:
+    return read_list(option, text, STRESS.read, distinct=_POINTS)
 
 
 def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:
@@ -212,27 +204,3 @@ def _refuse_several(args: argparse.Namespace, *names: str) -> None:
     given = [f"--{n.replace('_', '-')}" for n in names if getattr(args, n) is not None]
     if len(given) > 1:
         raise InputError(f"{' and '.join(given)} are given: a loop has one of them")
-
-
-def _words(option: str, text: str) -> list[str]:
-    try:
-        return words_of(text)
-    except InputError as error:
-        raise InputError(f"{option} {error}") from None
-
-
-def _numbers(option: str, words: list[str], rule: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(word) for word in words)
-    except ValueError:
-        raise InputError(f"{option} is {','.join(words)!r}: it must be {rule}") from None
-    if not values:
-        raise InputError(f"{option} holds no turning point")
-    return values
-
-
-def _stresses(option: str, words: list[str]) -> tuple[float, ...]:
-    try:
-        return tuple(parse_stress(word) for word in words)
-    except InputError as error:
-        raise InputError(f"{option} {error}") from None

@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
+from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.header_units import parse_units, units_of_header
 from adhesis.ensemble.trace.reading.measured_trace import holds_numbers, load_array
 from adhesis.ensemble.trace.reading.source import Source, source_of
@@ -100,9 +100,9 @@ def _unit(text: str) -> str:
 def _in_metres(source: Source, heights: Array, unit: str | None) -> Array:
     """Convert heights to m; without a unit they are taken as metres, if they can be."""
     if unit is not None:
-        return np.asarray(heights * METRES[unit])
+        return np.asarray(heights * LENGTH.units[unit])
     size = float(np.ptp(heights)) if heights.size else 0.0
-    if HIGHEST_IN_METRES < size < np.inf:
+    if HEIGHT.largest < size < np.inf:
         raise InputError(
             f"{source} states no unit, and its heights would range over {length_text(size, 4)}: "
             "give --unit, as in --unit um (--unit m, if metres are meant)"

@@ -11,9 +11,7 @@ import argparse
 import math
 from pathlib import Path
 
-from adhesis.ensemble.adhesions import work_of_adhesion
-from adhesis.ensemble.lengths import height, length
-from adhesis.ensemble.stresses import stress
+from adhesis.ensemble.quantities import HEIGHT, LENGTH, STRESS, WORK_OF_ADHESION
 from adhesis.ensemble.trace.trace_arguments import (
     add_cycle_arguments,
     add_reading_arguments,
@@ -44,11 +42,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shape.add_argument("--hurst", type=float, metavar="H", help="Hurst exponent, 0 < H < 1")
     shape.add_argument("--seed", type=int, metavar="K", help="seed of the phases (default 0)")
     shape.add_argument(
-        "--period", type=length, metavar="L", help="period: 2mm (default with --hurst: 2π mm)"
+        "--period",
+        type=LENGTH.option,
+        metavar="L",
+        help="period: 2mm (default with --hurst: 2π mm)",
     )
     shape.add_argument("--n0", type=int, help=f"lowest harmonic (default {N0})")
     shape.add_argument("--ratio", type=int, help=f"highest over lowest harmonic (default {RATIO})")
-    shape.add_argument("--h-rms", type=height, metavar="M", help="rms height: 0.5um (default 1um)")
+    shape.add_argument(
+        "--h-rms", type=HEIGHT.option, metavar="M", help="rms height: 0.5um (default 1um)"
+    )
     shape.add_argument("--m2", type=float, help="mean square slope, instead of --h-rms")
     shape.add_argument("--c0", type=float, help="|a_n0|² in m², instead of --h-rms")
     shape.add_argument("--amplitudes", metavar="KIND", help="deterministic (default) or rayleigh")
@@ -56,12 +59,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     contact = parser.add_argument_group("contact and cycle")
     contact.add_argument(
         "--work-of-adhesion",
-        type=work_of_adhesion,
+        type=WORK_OF_ADHESION.option,
         metavar="G",
         help="in J/m², or 20mJ/m2 (required unless the profile is that of --hurst; there 0.04)",
     )
     contact.add_argument(
-        "--young", type=stress, metavar="E", help="in Pa, or 1MPa (likewise; with --hurst 1e6)"
+        "--young",
+        type=STRESS.option,
+        metavar="E",
+        help="in Pa, or 1MPa (likewise; with --hurst 1e6)",
     )
     contact.add_argument("--poisson", type=float, metavar="NU", help="(likewise; with --hurst 0.5)")
     add_strength_arguments(contact)
@@ -105,7 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument(
         "--field-stresses",
         nargs="+",
-        type=stress,
+        type=STRESS.option,
         metavar="P",
         help="instead, mean stresses of the fields on both branches: 10kPa, a tension in Pa alone: "
         "-500 (default with --preload: its quarters)",

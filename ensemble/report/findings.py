@@ -11,13 +11,13 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.campaign.precision import as_percent
-from adhesis.ensemble.quantities import with_unit
+from adhesis.ensemble.campaign.tasks import place
+from adhesis.ensemble.quantities import percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.further_axes import cell_name, lines_along, place, together
+from adhesis.ensemble.report.further_axes import cell_name, lines_along, together
 from adhesis.ensemble.report.tables.loss_tables import least
 from adhesis.ensemble.task.doubt import bound, doubtful, why_beyond
-from adhesis.solver.loading.zero_range import beyond_limit, stress_text
+from adhesis.solver.loading.zero_range import beyond_limit
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
@@ -77,11 +77,6 @@ def _loss(cell: Cell) -> str:
     return f"{1e3 * loss:.3g} mJ/m² ({', '.join(beside)}) at {cell_name(cell)}"
 
 
-def _percent(share: float) -> str:
-    """Return two digits of a share, in percent and without an exponent."""
-    return f"{float(f'{100 * share:.2g}'):g}"
-
-
 def _statistical(data: Aggregate) -> str:
     errors = [
         error for cell in data.cells if np.isfinite(error := cell.estimates["loss"].relative_error)
@@ -92,11 +87,7 @@ def _statistical(data: Aggregate) -> str:
     point = "cell" if data.further else "(H, γ)"
     if not errors:
         return f"With {many} {plural} of each {point}, the error of the mean is unknown."
-    reach = (
-        f"{_percent(min(errors))} to {_percent(max(errors))} %"
-        if len(errors) > 1
-        else f"{_percent(errors[0])} %"
-    )
+    reach = percent(*sorted({min(errors), max(errors)}))
     return (
         f"With {many} {plural} of each {point}, the 95 % interval of the mean loss in J/m² reaches "
         f"{reach} "
@@ -136,8 +127,8 @@ def precision(data: Aggregate) -> list[str]:
     quantity, wanted = cells[0][1].quantity, cells[0][1].wanted
     met = sum(bool(found.met) for _, found in cells)
     sentence = (
-        f"The 95 % interval of the mean {quantity} was to reach at most {as_percent(wanted)} from "
-        f"it ([stop]): {met} of {len(cells)} cells met that"
+        f"The 95 % interval of the mean {quantity} was to reach at most "
+        f"{percent(wanted, digits=3)} from it ([stop]): {met} of {len(cells)} cells met that"
     )
     rest = [f"{name}: {found}" for name, found in cells if not found.met]
     return [f"{sentence}; the others: {_listed(rest)}." if rest else f"{sentence}."]

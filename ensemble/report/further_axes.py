@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
-from adhesis.ensemble.quantities import shown_unit, with_unit
+from adhesis.ensemble.campaign.tasks import name_at, place
+from adhesis.ensemble.quantities import shown_unit
 
 _LABELS = {
     "max_penetration": r"turning point $\Delta_\mathrm{max}/h_\mathrm{max}$",
@@ -28,15 +27,9 @@ _LABELS = {
 }
 
 
-def place(others: Iterable[tuple[str, float]]) -> str:
-    """Return "max_stress = 20 kPa, ratio = 8"; empty without further axes."""
-    return ", ".join(f"{name} = {with_unit(name, value)}" for name, value in others)
-
-
 def cell_name(cell: Cell) -> str:
     """Return "H = 0.8, γ = 0.04 J/m²", and where the cell stands on further axes."""
-    name = f"H = {cell.hurst:g}, γ = {cell.work_of_adhesion:g} J/m²"
-    return f"{name}, {place(cell.others)}" if cell.others else name
+    return name_at(cell.hurst, cell.work_of_adhesion, cell.others)
 
 
 def axis_label(axis: Axis) -> tuple[str, float]:

@@ -45,9 +45,10 @@ class Plots:
         return f"<Plots: {', '.join(names)}>"
 
     def _draw(self, name: str) -> Panels:
+        from adhesis.ensemble.campaign.tasks import place
         from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
         from adhesis.ensemble.report.figures.style import say_below, style
-        from adhesis.ensemble.report.further_axes import common, place
+        from adhesis.ensemble.report.further_axes import common
 
         modules = (loops, loss_figures, shapes_and_spectra)
         draw: Callable[[Aggregate], Figure] = next(

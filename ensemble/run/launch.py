@@ -31,6 +31,7 @@ from typing import NamedTuple
 from adhesis import _version
 from adhesis.ensemble.errors import InputError, WriteError
 from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.exit_codes import BAD_INPUT, INTERRUPTED, KILLED, RESUME
 from adhesis.ensemble.reporter import log
 from adhesis.ensemble.run.interrupt import in_main_thread, stop_signals
 
@@ -53,8 +54,6 @@ _SIGNAL = ".signal"
 # Two begin what only this module reads: that the ranks have met, or an exit code and a message.
 _MARK = "\x1e"
 _RANKS_PER_CORE = 16
-BAD_INPUT, RESUME, INTERRUPTED = 2, 75, 130
-KILLED = 137  # exit code that a shell reports for a process ended by signal 9
 
 # s in which the ranks have to meet. On a busy machine they take 20 s, from a cold network disk a
 # minute; a second start, from a warm one, is quicker.

@@ -19,10 +19,10 @@ from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.plan import group_of, prior
-from adhesis.ensemble.run.progress import duration
 from adhesis.ensemble.task.compute import Runner
 from adhesis.ensemble.task.row import Row
 from adhesis.solver.method import PathError

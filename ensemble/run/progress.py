@@ -6,24 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TextIO
 
+from adhesis.ensemble.quantities import duration
 from adhesis.ensemble.reporter import StatusLine
 
 _LINE_INTERVALS = (5.0, 60.0)  # s: at first, and at most
 _LINES_AT_LEAST = 40  # the time between lines is this part of the time so far: 15 s after 10 min
 _MOST_FAILURES_SHOWN = 5
-
-
-def duration(seconds: float) -> str:
-    """Return a time as people read it: "4.2 s", "3 min 20 s", "2 h 05 min"."""
-    if seconds < 60:
-        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    if minutes < 60:
-        return f"{minutes} min {rest:02d} s"
-    hours, minutes = divmod(minutes, 60)
-    if hours < 48:
-        return f"{hours} h {minutes:02d} min"
-    return f"{hours // 24} d {hours % 24} h"
 
 
 @dataclass

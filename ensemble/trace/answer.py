@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from adhesis.ensemble.lengths import length_text
-from adhesis.ensemble.quantities import with_error
+from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
-from adhesis.ensemble.lengths import length_text
+from adhesis.ensemble.quantities import length_text
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
 from adhesis.solver.model.measured_profile import (

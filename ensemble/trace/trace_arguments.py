@@ -10,8 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.lengths import length
-from adhesis.ensemble.stresses import stress
+from adhesis.ensemble.quantities import LENGTH, STIFFNESS, STRESS
 
 EXAMPLES = (
     "adhesis trace trace.csv --unit um --work-of-adhesion 0.04 --young 1e6 --poisson 0.5 --to out",
@@ -30,7 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="in J/m², or 20mJ/m2; of several (0.04,0.02,0.08) the first is the answer's, the "
         "others make a table, as of several turning points",
     )
-    contact.add_argument("--young", type=stress, required=True, metavar="E", help="in Pa, or 1MPa")
+    contact.add_argument(
+        "--young", type=STRESS.option, required=True, metavar="E", help="in Pa, or 1MPa"
+    )
     contact.add_argument("--poisson", type=float, required=True, metavar="NU")
     add_strength_arguments(contact)
     add_cycle_arguments(contact)
@@ -69,14 +70,14 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--stiffness",
-        type=float,
+        type=STIFFNESS.option,
         metavar="K",
-        help="Pa/m of nominal area of what holds the solid; 0 is load control, that of a weight "
-        "(default: fixed separation)",
+        help="in Pa/m of nominal area, or 1GPa/m, of what holds the solid; 0 is load control, that "
+        "of a weight (default: fixed separation)",
     )
     group.add_argument(
         "--layer",
-        type=length,
+        type=LENGTH.option,
         metavar="D",
         help="instead: the stiffness of a layer of this thickness, 1mm",
     )
@@ -87,12 +88,14 @@ def add_strength_arguments(group: argparse._ArgumentGroup) -> None:
     """Declare the strength of the interface; ``adhesis loop`` shares it."""
     group.add_argument(
         "--adhesion-range",
-        type=length,
+        type=LENGTH.option,
         metavar="D",
         help="range of adhesion, 0.3nm; patches open from inside at the strength G/D "
         "(default: zero range, they never do)",
     )
-    group.add_argument("--strength", type=stress, metavar="S", help="instead, that strength, 10MPa")
+    group.add_argument(
+        "--strength", type=STRESS.option, metavar="S", help="instead, that strength, 10MPa"
+    )
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,7 +105,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         "--unit", metavar="U", help="unit of a text: um, or mm,um for positions and heights"
     )
     reading.add_argument(
-        "--step", type=length, metavar="S", help="step, for heights without positions: 0.5um"
+        "--step", type=LENGTH.option, metavar="S", help="step, for heights without positions: 0.5um"
     )
     reading.add_argument(
         "--columns", metavar="X,Z", help="columns of a text, from 1; Z: heights alone"
@@ -117,16 +120,16 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     )
     making.add_argument(
         "--cut-off",
-        type=length,
+        type=LENGTH.option,
         metavar="W",
         help="shortest wave kept: 5um (default from step, noise and tip)",
     )
     making.add_argument(
-        "--tip-radius", type=length, metavar="R", help="of the stylus or probe: 2um"
+        "--tip-radius", type=LENGTH.option, metavar="R", help="of the stylus or probe: 2um"
     )
     making.add_argument(
         "--longest-gap",
-        type=length,
+        type=LENGTH.option,
         metavar="G",
         help="drop-outs up to this length are interpolated: 20um",
     )

@@ -7,15 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from adhesis._version import __version__
-from adhesis.ensemble.escape import code_span, markdown, printable
-from adhesis.ensemble.lengths import length_text
+from adhesis.ensemble.escape import code_span, markdown, markdown_table, printable
 from adhesis.ensemble.outputs import staged_folder, write_json
-from adhesis.ensemble.quantities import in_works_of_adhesion, with_error
+from adhesis.ensemble.quantities import (
+    in_works_of_adhesion,
+    length_text,
+    rounded_percent,
+    stress_text,
+    with_error,
+)
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.zero_range import stress_text
 
 
 def summary(answer: Answer) -> str:
@@ -36,7 +40,9 @@ def summary(answer: Answer) -> str:
         f"scope       {_scope(answer)}",
         f"range       {_range(answer)}",
         "doubts      "
-        + ", ".join(f"{name} {_percent(share)}" for name, share in answer.loss.doubts.items())
+        + ", ".join(
+            f"{name} {rounded_percent(share)}" for name, share in answer.loss.doubts.items()
+        )
         + " of the loss (standard uncertainties; the half-width of the interval is "
         f"{COVERAGE:g} times the root of the sum of their squares, at least {100 * LEAST:g} %)",
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
@@ -94,14 +100,8 @@ def _value(quantity: Quantity, by: float, unit: str, most: float = math.inf) -> 
     """Return a quantity that is not negative, with its interval."""
     unit = f" {unit}" if unit else ""
     known = with_error(by * quantity.value, by * quantity.uncertainty, 0.0, most)
-    share = f" (± {_percent(quantity.relative, 0)})" if "±" in known else ""
+    share = f" (± {rounded_percent(quantity.relative, 0)})" if "±" in known else ""
     return f"{known}{unit}{share}"
-
-
-def _percent(share: float, digits: int = 1, sign: str = "") -> str:
-    """Per cent, and no sign of what rounds to nothing."""
-    rounded = round(100 * share, digits) or 0.0
-    return f"{rounded:{sign if rounded else ''}.{digits}f} %"
 
 
 def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
@@ -142,32 +142,26 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         f"{COVERAGE:g} times the root of the sum of their squares, at least {100 * LEAST:g} %. "
         "It is about this trace, "
         "closed to one period; other places of the same surface have other losses.",
-        _table(_doubt_rows(answer)),
-        _table(_variant_rows(answer)),
+        markdown_table(*_doubt_rows(answer), left_columns=1),
+        markdown_table(*_variant_rows(answer), left_columns=1),
         images.get("cut-off"),
     ]
     mirror = answer.change("mirror")
     if mirror is not None:
         parts.append(
-            f"A mirror image instead changes the loss by {_percent(mirror, sign='+')}. It is not "
-            "counted: it is a body of twice the period, and the loss grows with the period."
+            f"A mirror image instead changes the loss by {rounded_percent(mirror, sign='+')}. It "
+            "is not counted: it is a body of twice the period, and the loss grows with the period."
         )
     sweep = _sweep_rows(answer)
     if len(sweep) > 2:
         heading = "## Against work of adhesion and turning point"
-        parts += [heading, _table(sweep), images.get("tables")]
+        parts += [heading, markdown_table(*sweep, left_columns=1), images.get("tables")]
     parts += [
         "## What it took",
         f"{len(plan.runs)} loops in {answer.seconds:.0f} s on {counted(plan.processes, 'core')} "
         f"(planned: {plan.wall:.0f} s). Every number: `trace.json`. adhesis {__version__}.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
-
-
-def _table(rows: Sequence[Sequence[str]]) -> str:
-    rule = "|---|" + "---:|" * (len(rows[0]) - 1)
-    head, *body = (f"| {' | '.join(row)} |" for row in rows)
-    return "\n".join([head, rule, *body])
 
 
 def _doubt_rows(answer: Answer) -> list[list[str]]:
@@ -177,9 +171,9 @@ def _doubt_rows(answer: Answer) -> list[list[str]]:
         shares = [q.doubts.get(name) for q in quantities]
         if any(share is not None for share in shares):
             words = DOUBTS.get(name, "of the loop itself")
-            cells = ["" if share is None else _percent(share) for share in shares]
+            cells = ["" if share is None else rounded_percent(share) for share in shares]
             rows.append([f"{name}: {words}", *cells])
-    rows.append(["interval", *(f"± {_percent(q.relative)}" for q in quantities)])
+    rows.append(["interval", *(f"± {rounded_percent(q.relative)}" for q in quantities)])
     return rows
 
 
@@ -198,7 +192,7 @@ def _variant_rows(answer: Answer) -> list[list[str]]:
             [
                 f"{run.name}: {run.description}{against}",
                 f"{1e3 * found['loss']:.4g}",
-                "" if change is None else _percent(change, sign="+"),
+                "" if change is None else rounded_percent(change, sign="+"),
                 f"{1e-3 * found['pull_off_stress']:.4g}",
                 f"{found['contact_fraction']:.3f}",
                 f"{found['waves']}",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import parameter
-from adhesis.ensemble.lengths import length_text
+from adhesis.ensemble.quantities import duration, length_text
 from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.job import Job
 from adhesis.ensemble.trace.prepare import Prepared
@@ -126,19 +126,10 @@ class Plan(ByValue):
         lines = [
             f"plan        {self.waves} waves, about {self.patches} "
             f"patch{'es' if self.patches != 1 else ''} at a time: "
-            f"{len(self.runs)} loops, about {clock(sum(self.seconds.values()))} of CPU time, "
-            f"{clock(self.wall)} on {counted(self.processes, 'core')}"
+            f"{len(self.runs)} loops, about {duration(sum(self.seconds.values()))} of CPU time, "
+            f"{duration(self.wall)} on {counted(self.processes, 'core')}"
         ]
         return "\n".join(lines + [f"hint        {hint}" for hint in self.hints])
-
-
-def clock(seconds: float) -> str:
-    """Return a duration in words, rounded to the accuracy of an estimate."""
-    if seconds < 90:
-        return f"{max(1, round(seconds))} s"
-    if seconds < 5400:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
 
 
 def make_plan(
@@ -335,12 +326,14 @@ def _hints(prepared: Prepared, plan: Plan, quick: bool) -> tuple[str, ...]:
         hints.append(
             f"{parameter('cut_off')} {factor * prepared.cut_off * 1e6:.2g}um "
             f"({plan.waves / factor:.0f} waves) would take about "
-            f"{clock(plan.wall * factor**-_WAVES_POWER)}"
+            f"{duration(plan.wall * factor**-_WAVES_POWER)}"
         )
     if not quick:
         tables = [r.name for r in plan.runs if r.group in ("work of adhesion", "turning point")]
         saved = sum(plan.seconds[name] for name in tables) / max(plan.processes, 1)
-        hints.append(f"{parameter('quick')} leaves the tables out and saves about {clock(saved)}")
+        hints.append(
+            f"{parameter('quick')} leaves the tables out and saves about {duration(saved)}"
+        )
     return tuple(hints)
 
 

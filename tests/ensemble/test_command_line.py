@@ -90,6 +90,11 @@ BAD = {
         ("c.toml --redo some", "--redo is 'some'"),
         ("c.toml --hurst 0.7", "--hurst needs --redo: it chooses the tasks to compute again"),
         ("c.toml --realisation 1", "--realisation needs --redo"),
+        ("c.toml --redo all --work-of-adhesion 20mJ", "--work-of-adhesion is '20mJ': it must be"),
+        (
+            "c.toml --redo all --work-of-adhesion 40",
+            "--work-of-adhesion is 40, which would be 40 J/m²: give its unit, as in 40mJ/m2",
+        ),
         *(
             (f"c.toml --redo all {option} {bad}", f"{option} is '{bad}'")
             for option in ("--hurst", "--work-of-adhesion", "--realisation")

@@ -9,13 +9,22 @@ from pathlib import Path
 
 import pytest
 
-from adhesis.ensemble.adhesions import work_of_adhesion
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.lengths import height, length, length_text, length_with_unit
 from adhesis.ensemble.loop.cycle import turns_of
-from adhesis.ensemble.stresses import stress
+from adhesis.ensemble.quantities import (
+    HEIGHT,
+    LENGTH,
+    QUANTITIES,
+    STIFFNESS,
+    STRESS,
+    WORK_OF_ADHESION,
+    Quantity,
+    percent,
+    rounded_percent,
+    stress_text,
+)
 from adhesis.solver.model.control import Control
 from tests.support.campaign_support import campaign_text
 
@@ -46,45 +55,66 @@ REFUSED = {
 @pytest.mark.parametrize("text", READ)
 def test_a_length_is_the_number_nearest_to_its_decimals(text: str) -> None:
     """So that 7um has the bits of 7e-6, and the same loss."""
-    assert length(text) == READ[text]
+    assert LENGTH.option(text) == READ[text]
 
 
 @pytest.mark.parametrize("text", REFUSED)
 def test_what_is_no_length_is_refused_with_the_rule(text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as refusal:
-        length(text)
+        LENGTH.option(text)
     assert REFUSED[text] in str(refusal.value)
     assert len(str(refusal.value)) < 220
 
 
 def test_heights_of_a_metre_are_asked_about_and_a_nan_is_left_to_its_rule() -> None:
-    assert height("1e-3") == 1e-3
-    assert height("10m") == 10.0
+    assert HEIGHT.option("1e-3") == 1e-3
+    assert HEIGHT.option("10m") == 10.0
     with pytest.raises(argparse.ArgumentTypeError, match=r"is 0\.4, which would be 0\.4 m: give"):
-        height("0.4")
-    assert height("nan") != height("nan")
-    assert length("inf") == float("inf")
+        HEIGHT.option("0.4")
+    assert HEIGHT.option("nan") != HEIGHT.option("nan")
+    assert LENGTH.option("inf") == float("inf")
 
 
-# Options that are numbers, but no lengths.
-NUMBERS = (
-    *("--hurst", "--m2", "--c0", "--work-of-adhesion", "--poisson", "--stiffness"),
+# Options that are numbers, but no quantities.
+NUMBERS = {
+    *("--hurst", "--m2", "--c0", "--poisson"),
     *("--accuracy", "--field-penetrations", "--budget"),
-)
+}
 
 
-def test_every_option_that_is_a_length_or_a_stress_takes_a_unit() -> None:
+def test_every_option_that_is_a_quantity_takes_a_unit() -> None:
     actions = [action for name in COMMANDS for action in parser_of(name)._actions]
-    options = {kind: set[str]() for kind in (length, height, stress, float)}
+    options: dict[object, set[str]] = {}
     for action in actions:
-        if action.type in options:
-            options[action.type].add(action.option_strings[-1])  # type: ignore[index]
-    assert options[height] == {"--h-rms"}
+        if action.option_strings:
+            options.setdefault(action.type, set()).add(action.option_strings[-1])
+    assert options[HEIGHT.option] == {"--h-rms"}
     lengths = {"--period", "--step", "--cut-off", "--tip-radius", "--longest-gap", "--layer"}
-    assert options[length] == lengths | {"--adhesion-range"}
-    assert options[stress] == {"--young", "--strength", "--field-stresses"}
+    assert options[LENGTH.option] == lengths | {"--adhesion-range"}
+    assert options[STRESS.option] == {"--young", "--strength", "--field-stresses"}
     # and --max-stress and --preload, lists
-    assert options[float] == set(NUMBERS) - {"--work-of-adhesion"}
+    assert options[STIFFNESS.option] == {"--stiffness"}
+    assert options[WORK_OF_ADHESION.option] == {"--work-of-adhesion"}
+    assert options[float] == NUMBERS
+
+
+@pytest.mark.parametrize("quantity", [*QUANTITIES.values(), HEIGHT], ids=lambda q: q.name)
+def test_a_quantity_is_read_in_each_of_its_units(quantity: Quantity) -> None:
+    """An option, a list and a key of a campaign file know the same ones."""
+    for unit, size in quantity.units.items():
+        for text in (f"3{unit}", f" 3 {unit} ", f"3e0 {unit.replace('/', ' / ')}"):
+            assert quantity.option(text) == pytest.approx(3 * size, rel=1e-15)
+    with pytest.raises(InputError, match=f"its unit must be one of {', '.join(quantity.units)}$"):
+        quantity.read("3 " + ("pounds/m2" if "/" in quantity.unit else "pounds"))
+    assert quantity.read_with_unit(quantity.example) > 0
+
+
+def test_blanks_within_a_unit_make_no_unit_of_it() -> None:
+    for text in ("5 m m", "5 k Pa"):
+        with pytest.raises(InputError, match="it must be a"):
+            (LENGTH if "m m" in text else STRESS).read(text)
+    with pytest.raises(InputError, match=r"'m m' is no unit of length: it must be one of m, cm"):
+        LENGTH.unit_named("m m")
 
 
 @pytest.mark.parametrize(
@@ -134,12 +164,21 @@ def test_other_keys_take_no_unit() -> None:
     [
         ("young", '"1 mPa"', "Pa, kPa, MPa, GPa"),
         ("period", '"1 kPa"', "m, cm, mm, µm, nm, Å, inch, mil, µin"),
-        ("work_of_adhesion", '["20 kJ/m2"]', "J/m², mJ/m²"),
+        ("work_of_adhesion", '["20 kJ/m2"]', "J/m², mJ/m², N/m, mN/m"),
     ],
 )
 def test_a_campaign_lists_the_units_where_one_is_wrong(key: str, value: str, units: str) -> None:
     with pytest.raises(InputError, match=rf"{key} is .*: its unit must be one of {units}$"):
         parse_campaign(campaign_text(**{key: value}))
+
+
+def test_a_stiffness_of_a_campaign_may_have_a_unit() -> None:
+    text = campaign_text()
+    assert parse_campaign(
+        text.replace("[cycle]\n", '[cycle]\nstiffness = "2 GPa/m"\n')
+    ) == parse_campaign(text.replace("[cycle]\n", "[cycle]\nstiffness = 2e9\n"))
+    with pytest.raises(InputError, match=r"its unit must be one of Pa/m, kPa/m, MPa/m, GPa/m$"):
+        parse_campaign(text.replace("[cycle]\n", '[cycle]\nstiffness = "1 GPa/mm"\n'))
 
 
 @pytest.mark.parametrize(
@@ -175,9 +214,9 @@ def test_a_campaign_file_is_asked_for_units_as_the_options_are(
 
 
 def test_a_work_of_adhesion_has_a_unit_or_is_in_joules() -> None:
-    assert [work_of_adhesion(text) for text in ("0.02", "20mJ/m2", "20 mJ/m²", "40J/m^2")] == [
-        *(0.02, 0.02, 0.02, 40.0)
-    ]
+    texts = ("0.02", "20mJ/m2", "20 mJ/m²", "20mN/m", "40J/m^2", "40 N/m")
+    read = [WORK_OF_ADHESION.option(text) for text in texts]
+    assert read == [0.02, 0.02, 0.02, 0.02, 40.0, 40.0]
     for text, sentence in (
         ("20", "is 20, which would be 20 J/m²: give its unit, as in 20mJ/m2 (20J/m2, if J/m² are"),
         (
@@ -185,10 +224,10 @@ def test_a_work_of_adhesion_has_a_unit_or_is_in_joules() -> None:
             "is '20mJ': it must be a number in J/m² with a decimal point, as in 0.02, or with",
         ),
         ("0,02", "is '0,02': it must be a number in J/m² with a decimal point"),
-        ("20kJ/m2", "its unit must be one of J/m², mJ/m²"),
+        ("20kJ/m2", "its unit must be one of J/m², mJ/m², N/m, mN/m"),
     ):
         with pytest.raises(argparse.ArgumentTypeError) as refusal:
-            work_of_adhesion(text)
+            WORK_OF_ADHESION.option(text)
         assert sentence in str(refusal.value)
 
 
@@ -208,7 +247,7 @@ def test_trace_asks_for_the_unit_of_a_work_of_adhesion(capsys: pytest.CaptureFix
     [("2e4", 2e4), ("20kPa", 2e4), ("0.3 MPa", 3e5), ("7GPa", 7e9), ("1.5 Pa", 1.5), ("inf", inf)],
 )
 def test_a_stress_is_the_number_nearest_to_its_decimals(text: str, pascals: float) -> None:
-    assert stress(text) == pascals
+    assert STRESS.option(text) == pascals
 
 
 @pytest.mark.parametrize(
@@ -221,7 +260,7 @@ def test_a_stress_is_the_number_nearest_to_its_decimals(text: str, pascals: floa
 )
 def test_what_is_no_stress_is_refused_with_the_rule(text: str, sentence: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as refusal:
-        stress(text)
+        STRESS.option(text)
     assert sentence in str(refusal.value)
 
 
@@ -238,6 +277,22 @@ def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_u
 
 
 def test_lengths_are_shown_in_a_unit_of_their_size() -> None:
-    assert length_text(5e-6) == "5 µm"
-    assert length_text(2e-3) == "2 mm"
-    assert length_with_unit("2 mm") == 2e-3
+    assert LENGTH.text(5e-6) == "5 µm"
+    assert LENGTH.text(2e-3) == "2 mm"
+    assert LENGTH.read_with_unit("2 mm") == 2e-3
+
+
+def test_quantities_are_shown_in_a_unit_of_their_size() -> None:
+    texts = [stress_text(pascals) for pascals in (0.0, 1.5, 999.9, 2e4, -3e6, 2.5e9)]
+    assert texts == ["0 Pa", "1.5 Pa", "1 kPa", "20 kPa", "-3 MPa", "2.5 GPa"]
+    assert LENGTH.text(0.99999e-6) == "1 µm"
+    assert STIFFNESS.text(1e9) == "1e+09 Pa/m"
+
+
+def test_a_share_is_shown_in_percent_without_an_exponent() -> None:
+    assert percent(1.234) == "120 %"
+    assert percent(0.0123, 0.5) == "1.2 to 50 %"
+    assert percent(1.234, digits=3) == "123 %"
+    assert [rounded_percent(share, sign="+") for share in (0.03, -0.0123, -1e-5)] == [
+        *("+3.0 %", "-1.2 %", "0.0 %")
+    ]

@@ -192,7 +192,8 @@ def test_failed_tasks_are_recorded_and_computed_again_when_asked(tmp_path):
     assert process.returncode == 1
     assert "0 to do, 2 failed before" in process.stderr
     log = tmp_path / "log"
-    process, _ = run(tmp_path, "--redo", "failed", "--work-of-adhesion", "0.04", fake=f"log={log}")
+    words = ("--redo", "failed", "--work-of-adhesion", "40mJ/m2")
+    process, _ = run(tmp_path, *words, fake=f"log={log}")
     assert process.returncode == 1
     assert log.read_text() == "0.7:0.04:1\n"
     process, _ = run(tmp_path, "--redo", "failed")

@@ -21,16 +21,23 @@ from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble.command.streams import OutputError, write_line
 from adhesis.ensemble.errors import InputError, WriteError, lack
+from adhesis.ensemble.exit_codes import (
+    BAD_INPUT,
+    DONE,
+    INTERRUPTED,
+    OUR_ERROR,
+    RESUME,
+    SOME_FAILED,
+    TOO_FEW_RESOURCES,
+    WRITE_FAILED,
+)
+from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
     from adhesis.ensemble.campaign.tasks import Task, Tasks
     from adhesis.ensemble.run.session import Engine, Options, Summary
 
-DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
-OUR_ERROR, TOO_FEW_RESOURCES = 70, 71  # EX_SOFTWARE, EX_OSERR
-WRITE_FAILED, RESUME = 74, 75  # EX_IOERR, EX_TEMPFAIL
-INTERRUPTED = 130  # by a second Ctrl-C: the first one stops the run in order
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
 EXAMPLES = (
@@ -151,7 +158,7 @@ def _ranks(args: argparse.Namespace) -> int:
     from adhesis.ensemble.run.ranks import launched
     from adhesis.solver.checks import counted
 
-    ranks = int(_number("--ranks", args.ranks, whole=True, least=1))
+    ranks = int(_number("--ranks", args.ranks, int, least=1))
     most = launch.largest_number_of_ranks()
     if ranks > most:
         raise InputError(
@@ -206,7 +213,7 @@ def _run(
         return _tell_price(campaign, path, args, engine) if comm.rank == 0 else DONE
     if args.part and not args.out:
         raise InputError("--part needs --out: every part has a results file of its own")
-    most = _number("--max-failures", args.max_failures, whole=True)
+    most = _number("--max-failures", args.max_failures, int)
     options = Options(
         part=Part.parse(args.part) if args.part else WHOLE,
         redo=_selection(args),
@@ -248,7 +255,6 @@ def _report_end(
 ) -> None:
     """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
-    from adhesis.ensemble.run.progress import duration
     from adhesis.ensemble.task.doubt import bound, why_beyond
 
     failed = f", {summary.failed} failed" if summary.failed else ""
@@ -326,8 +332,9 @@ def _selection(args: argparse.Namespace) -> Any:
     from adhesis.ensemble.run.plan import Selection
 
     hurst = tuple(_number("--hurst", v) for v in args.hurst)
-    gamma = tuple(_number("--work-of-adhesion", v) for v in args.work_of_adhesion)
-    realisation = tuple(int(_number("--realisation", v, whole=True)) for v in args.realisation)
+    read = WORK_OF_ADHESION.read
+    gamma = tuple(_number("--work-of-adhesion", v, read) for v in args.work_of_adhesion)
+    realisation = tuple(int(_number("--realisation", v, int)) for v in args.realisation)
     if args.redo is None:
         for name in ("hurst", "work_of_adhesion", "realisation"):
             if getattr(args, name):
@@ -339,14 +346,18 @@ def _selection(args: argparse.Namespace) -> Any:
     return Selection(args.redo, hurst, gamma, realisation)
 
 
-def _number(option: str, text: str, *, whole: bool = False, least: int = 0) -> float:
+def _number(
+    option: str, text: str, read: Callable[[str], float] = float, *, least: int = 0
+) -> float:
     """Return the number that is given for an option."""
     try:
-        value = int(text) if whole else float(text)
+        value = read(text)
+    except InputError as error:
+        raise InputError(f"{option} {error}") from None
     except ValueError:
         value = -1
     if not least <= value < 2**31:
-        kind = "whole number" if whole else "number"
+        kind = "whole number" if read is int else "number"
         rule = f"of at least {least}" if least else "that is not negative"
         raise InputError(f"{option} is {text!r}: it must be a {kind} {rule}")
     return value

@@ -89,8 +89,8 @@ def _watch(path: Path | str, interval: float) -> int:
 
 def _life(status: dict[str, Any]) -> str:
     """Return whether a run is at work, and how old the last row is, as a line of its own."""
+    from adhesis.ensemble.quantities import duration
     from adhesis.ensemble.run.lock import described
-    from adhesis.ensemble.run.progress import duration
 
     run, last = status["run"], status["last_row"]
     text = "no run is writing" if run is None else f"a run is writing ({described(run)})"
@@ -109,7 +109,7 @@ def _live() -> Any:
 
 def _pace(status: dict[str, Any], seconds: float, finished: int) -> str:
     """Return rate and time left, from what was finished since the watch began."""
-    from adhesis.ensemble.run.progress import duration
+    from adhesis.ensemble.quantities import duration
 
     if not finished or not status["pending"]:
         return ""

@@ -11,6 +11,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import TURNING_POINTS
+from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.report.figures.loss_figures import errorbar
 from adhesis.ensemble.report.figures.style import (
     MM,
@@ -26,7 +27,7 @@ from adhesis.ensemble.report.figures.style import (
     say_below,
     spread_out,
 )
-from adhesis.ensemble.report.further_axes import axis_label, lines_along, place, together
+from adhesis.ensemble.report.further_axes import axis_label, lines_along, together
 
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 

@@ -11,8 +11,8 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
 from adhesis.ensemble.aggregate.companions import difference
 from adhesis.ensemble.aggregate.statistics import Estimate
-from adhesis.ensemble.campaign.precision import as_percent
 from adhesis.ensemble.interval import interval_method
+from adhesis.ensemble.quantities import percent, rounded_percent
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.tables.key import axis_columns, key, key_columns
 from adhesis.ensemble.report.tables.table import (
@@ -23,9 +23,7 @@ from adhesis.ensemble.report.tables.table import (
     fixed,
     make_table,
     number,
-    percent,
     plain,
-    signed_percent,
 )
 from adhesis.solver.model.profile import Array
 
@@ -97,8 +95,8 @@ def precision(data: Aggregate) -> Table:
         TableColumn("mean", "mean", number()),
         TableColumn("ci_low", "95 % from", number()),
         TableColumn("ci_high", "to", number()),
-        TableColumn("relative_error", "±, further side", as_percent),
-        TableColumn("wanted_relative_error", "wanted", as_percent),
+        TableColumn("relative_error", "±, further side", partial(percent, digits=3)),
+        TableColumn("wanted_relative_error", "wanted", partial(percent, digits=3)),
         TableColumn("met", "met"),
     )
     verdict = {True: "yes", False: "no", None: "not finished"}
@@ -205,7 +203,7 @@ def beside_the_paper(data: Aggregate) -> Table:
         TableColumn("ci_low", "95 % from", number()),
         TableColumn("ci_high", "to", number()),
         TableColumn("paper", "paper", fixed(2)),
-        TableColumn("deviation", "W~ off the paper by", signed_percent),
+        TableColumn("deviation", "W~ off the paper by", partial(rounded_percent, sign="+")),
         TableColumn("inside", "paper in the interval"),
     )
     rows: list[list[Value]] = []

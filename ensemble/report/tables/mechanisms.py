@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
+from adhesis.ensemble.quantities import percent
 from adhesis.ensemble.report.tables.key import key, key_columns
 from adhesis.ensemble.report.tables.table import (
     Table,
@@ -14,7 +15,6 @@ from adhesis.ensemble.report.tables.table import (
     fixed,
     make_table,
     number,
-    percent,
     plain,
 )
 from adhesis.solver.method import BRANCHES

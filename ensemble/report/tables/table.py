@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from adhesis.ensemble.escape import markdown
+from adhesis.ensemble.escape import markdown, markdown_table
 
 Value = float | int | str | None
 Format = Callable[[Any], str]
@@ -39,16 +39,6 @@ def plain(value: Any) -> str:
 def fixed(digits: int) -> Format:
     """Show a number with so many digits after the point."""
     return lambda value: f"{value:.{digits}f}"
-
-
-def signed_percent(value: Any) -> str:
-    """Show a relative deviation in percent, with its sign."""
-    return f"{100 * value:+.1f} %"
-
-
-def percent(value: Any) -> str:
-    """Show a fraction in percent, with two significant digits."""
-    return f"{100 * value:.2g} %"
 
 
 @dataclass(frozen=True)
@@ -98,9 +88,7 @@ class Table:
     def markdown(self) -> str:
         """Return the columns that have a heading as a Markdown table."""
         shown = self._shown()
-        rule = ["---:"] * len(shown[0])
-        body = [[markdown(cell) for cell in row] for row in shown[1:]]
-        return "\n".join("| " + " | ".join(row) + " |" for row in (shown[0], rule, *body))
+        return markdown_table(shown[0], *([markdown(cell) for cell in row] for row in shown[1:]))
 
     def print(self, stream: IO[str]) -> None:
         """Print the columns that have a heading: rich on a terminal, plain lines elsewhere."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.lengths import length_text
+from adhesis.ensemble.quantities import length_text
 from adhesis.solver.checks import counted
 from adhesis.solver.model.profile import Array
 

@@ -7,11 +7,11 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.lengths import METRES, OTHER_NAMES, length_text, unit_named
+from adhesis.ensemble.quantities import LENGTH, length_text
 
 # Units that are words or parts of names, too, need brackets.
 _AMBIGUOUS = ("m", "in", "a", "å", "mil", "mils", "thou")
-_UNAMBIGUOUS = [name for name in (*METRES, *OTHER_NAMES) if name.lower() not in _AMBIGUOUS]
+_UNAMBIGUOUS = [name for name in LENGTH.spellings if name.lower() not in _AMBIGUOUS]
 _ANY = [*_UNAMBIGUOUS, *_AMBIGUOUS]
 
 
@@ -74,16 +74,16 @@ def parse_units(text: str) -> tuple[str, str]:
         raise InputError(
             f"{parameter('unit')} is {text!r}: one unit for both columns, or two as in mm,um"
         )
-    return unit_named(words[0]), unit_named(words[-1])
+    return LENGTH.unit_named(words[0]), LENGTH.unit_named(words[-1])
 
 
 def _units_in(text: str) -> list[str]:
     plain = unicodedata.normalize("NFKC", text).replace("_", " ")
     if plain.strip() != "a" and plain.strip().lower() in _ANY:
-        return [unit_named(plain)]
+        return [LENGTH.unit_named(plain)]
     names = [match[1] for match in _IN_TEXT.finditer(plain)]
     names += [match[1] for match in _IN_BRACKETS.finditer(plain) if match[1] != "a"]
-    return [unit_named(name) for name in names]
+    return [LENGTH.unit_named(name) for name in names]
 
 
 def units_of_header(header: Sequence[str], fields: Sequence[Sequence[str]]) -> list[str | None]:
@@ -182,7 +182,7 @@ def _step(text: str, decimal: str) -> float | None:
     if len(set(units)) != 1 or not any(_names_step(words, phrase) for phrase in _PHRASES):
         return None
     try:
-        metres = METRES[unit_named(units[0])]
+        metres = LENGTH.units[LENGTH.unit_named(units[0])]
         value = float(number[0].replace(",", ".") if decimal == "," else number[0])
     except (InputError, ValueError):
         return None

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter
-from adhesis.ensemble.lengths import METRES, unit_named
+from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.reading.source import Source
 from adhesis.solver.model.profile import Array
 
@@ -87,7 +87,7 @@ def read_scan(source: Source, row: int | None = None, channel: int | None = None
             raise UnknownFormatError(
                 f"{source} cannot be read as heights: {_one_line(error)}"
             ) from None
-    metres = METRES[unit_named(str(topography.unit))]
+    metres = LENGTH.units[LENGTH.unit_named(str(topography.unit))]
     label = f"{_name(reader)}, channel {chosen.name!r}{where}, lengths in {topography.unit}"
     return Scan(positions * metres, heights * metres, label, _tip_radius(topography))
 
@@ -157,7 +157,7 @@ def _line(
 def _tip_radius(topography: Any) -> float | None:
     try:
         radius = topography.info["instrument"]["parameters"]["tip_radius"]
-        return float(radius["value"]) * METRES[unit_named(str(radius["unit"]))]
+        return float(radius["value"]) * LENGTH.units[LENGTH.unit_named(str(radius["unit"]))]
     except (KeyError, TypeError, ValueError, InputError):
         return None
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
-from adhesis.ensemble.lengths import HIGHEST_IN_METRES, METRES, length_text
+from adhesis.ensemble.quantities import HEIGHT, LENGTH, length_text
 from adhesis.ensemble.trace.reading.equal_steps import equal_steps
 from adhesis.ensemble.trace.reading.header_units import (
     parse_units,
@@ -400,7 +400,7 @@ def _from_table(
             notes.append("the first column counts the points")
     named = units_of_header((), fields)  # by the names of the columns, not by other lines
     (x_unit, z_unit), given_by = _units(name, found, named, unit, columns, step)
-    column, heights = heights, heights * METRES[z_unit]
+    column, heights = heights, heights * LENGTH.units[z_unit]
     positions = f"positions in {x_unit}, " if len(columns) == 2 else ""
     notes.append(f"{positions}heights in {z_unit} ({given_by})")
     if gaps:
@@ -410,7 +410,7 @@ def _from_table(
             raise InputError(
                 f"{parameter('step')} belongs to heights without positions: {name} has positions"
             )
-        heights, step, more = equal_steps(name, columns[0], METRES[x_unit], heights, lines)
+        heights, step, more = equal_steps(name, columns[0], LENGTH.units[x_unit], heights, lines)
         notes.extend(more)
     else:
         if step is None:
@@ -520,7 +520,7 @@ def _step_beside_count(
             f"the first column of {name} counts the points: give {parameter('step')}, as in 0.5um"
         )
     if stated is not None and unit is not None and not is_named:
-        counted_as = METRES[parse_units(unit)[0]]
+        counted_as = LENGTH.units[parse_units(unit)[0]]
         if abs(stated / counted_as - 1) > _SAME:
             raise InputError(
                 f"the positions of {name} would have steps of {length_text(counted_as)}, and its "
@@ -534,7 +534,7 @@ def _refuse_length_on_top(name: str, column: Array, step: float, lines: Array | 
     for k, number in enumerate(column[:3]):
         below = column.size - k - 1
         for length in (step, below * step, (below - 1) * step):
-            if any(abs(number * size / length - 1) < _SAME for size in METRES.values()):
+            if any(abs(number * size / length - 1) < _SAME for size in LENGTH.units.values()):
                 where = f"point {k + 1}" if lines is None else f"line {lines[k]}"
                 raise InputError(
                     f"{where} of {name} is {number:g}, and the step or the length of the trace is "
@@ -590,10 +590,7 @@ def _units(
 
 def _sure_to_be_metres(columns: Array, step: float | None) -> bool:
     heights = columns[-1][np.isfinite(columns[-1])]
-    if (
-        heights.size == 0
-        or np.percentile(heights, 99) - np.percentile(heights, 1) > HIGHEST_IN_METRES
-    ):
+    if heights.size == 0 or np.percentile(heights, 99) - np.percentile(heights, 1) > HEIGHT.largest:
         return False
     if len(columns) == 1:
         return step is not None
