@@ -98,11 +98,11 @@ def _statistical(data: Aggregate) -> str:
 def _numerical(data: Aggregate) -> str:
     loss, audit = _all(data, "loss"), np.abs(_all(data, "audit_residual"))
     error, races = _all(data, "loss_error"), _all(data, "races")
-    parts = [f"the energy audit of each loop closes within {100 * audit.max():.2g} %"]
+    parts = [f"the energy audit of each loop closes within {percent(audit.max())}"]
     if np.isfinite(error).all():
         share = np.divide(error, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
         parts.insert(
-            0, f"the estimated numerical error of a loss is at most {100 * share.max():.2g} % of it"
+            0, f"the estimated numerical error of a loss is at most {percent(share.max())} of it"
         )
     if np.isfinite(races).all():
         raced = int(np.sum(races > 0))
@@ -110,7 +110,7 @@ def _numerical(data: Aggregate) -> str:
         most = np.max(np.divide(stake, np.abs(loss), out=np.zeros_like(loss), where=loss != 0))
         parts.append(
             f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
-            f"elsewhere (at most {100 * most:.2g} % of a loop's loss at stake)"
+            f"elsewhere (at most {percent(most)} of a loop's loss at stake)"
             if raced
             else "no jump would have ended elsewhere by another rule of descent"
         )
@@ -211,15 +211,15 @@ def quality(data: Aggregate) -> list[str]:
     audit = _all(data, "audit_residual")
     out = [
         "Energy audit: loop integral and sum of the drops differ by "
-        f"{100 * np.sqrt(np.mean(audit**2)):.2g} % of the loss (root mean square over loops), "
-        f"{100 * np.max(np.abs(audit)):.2g} % in the worst loop."
+        f"{percent(np.sqrt(np.mean(audit**2)))} of the loss (root mean square over loops), "
+        f"{percent(np.max(np.abs(audit)))} in the worst loop."
     ]
     most = bound(data.campaign.solver.accuracy)
     wrong = doubts(data)
     if wrong:
         out.append(
             f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
-            f"their estimated error exceeds the accuracy asked for, {100 * most:.2g} % of the "
+            f"their estimated error exceeds the accuracy asked for, {percent(most)} of the "
             f"loss: {_listed(wrong)}."
         )
     out += _limit(data)
@@ -313,7 +313,7 @@ def doubts(data: Aggregate) -> list[str]:
         wrong = doubtful(data.campaign.solver.accuracy, loss, audit, error)
         for k in np.flatnonzero(wrong):
             share = max(audit[k], error[k] / abs(loss[k]) if loss[k] else np.inf)
-            text = f"row {cell.rows[k]}, {cell_name(cell)} ({100 * share:.2g} %)"
+            text = f"row {cell.rows[k]}, {cell_name(cell)} ({percent(share)})"
             found.append((-share, text))
     return [text for _, text in sorted(found)]
 

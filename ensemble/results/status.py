@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
-from adhesis.ensemble.quantities import AXIS_UNITS, with_error
+from adhesis.ensemble.quantities import AXIS_UNITS, percent, with_error
 from adhesis.ensemble.results.read import (
     NO_CHECKSUMS,
     NO_RANGES,
@@ -328,8 +328,8 @@ def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
     ]
     for d in doubts[:_MOST_FAILURES_SHOWN]:
         lines.append(
-            f"  {_task(d)}: audit residual {100 * d['audit_residual']:.2g} %, "
-            f"estimated error {100 * d['loss_error'] / (abs(d['loss']) or 1):.2g} %"
+            f"  {_task(d)}: audit residual {percent(d['audit_residual'])}, "
+            f"estimated error {percent(d['loss_error'] / (abs(d['loss']) or 1))}"
         )
     if len(doubts) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(doubts) - _MOST_FAILURES_SHOWN} more (--json lists all)")

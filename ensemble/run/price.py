@@ -19,7 +19,7 @@ from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.quantities import duration
+from adhesis.ensemble.quantities import duration, percent
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
 from adhesis.ensemble.run.plan import group_of, prior
@@ -350,7 +350,7 @@ def _realisations(campaign: Campaign, known: _Known) -> tuple[int, str]:
     count = next((look for look in at if look >= max(needed, few)), at[-1])
     return count, (
         f"[stop]: about {count} realisations a cell, as {campaign.stop.quantity} of {loops} loops "
-        f"scatters by {100 * spread:.2g} % so far; at least {few}, at most {at[-1]}"
+        f"scatters by {percent(spread)} so far; at least {few}, at most {at[-1]}"
     )
 
 

@@ -17,6 +17,7 @@ from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
+from adhesis.ensemble.quantities import percent
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.attempt import Outcome, StopCheck
@@ -439,7 +440,7 @@ class _Session:
                 what = str(self._plan.tasks[outcome.task])
                 share = 100 * written.loss_error / (abs(written.loss) or 1.0)
                 progress.doubt(
-                    f"{what}: audit residual {100 * written.audit_residual:.2g} %, "
+                    f"{what}: audit residual {percent(written.audit_residual)}, "
                     f"estimated error {share:.2g} %"
                 )
         else:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
-from adhesis.ensemble.quantities import length_text
+from adhesis.ensemble.quantities import length_text, percent
 from adhesis.ensemble.trace.reading.measured_trace import Trace
 from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
 from adhesis.solver.model.measured_profile import (
@@ -304,7 +304,7 @@ def _filled(
     steps.append(
         Step(
             "drop-outs",
-            f"{counted(int(gaps.sum()), 'height')} ({100 * share:.2g} %) in "
+            f"{counted(int(gaps.sum()), 'height')} ({percent(share)}) in "
             f"{counted(starts.size, 'gap')} interpolated by "
             f"straight lines, the longest over {length_text(longest_here)}",
             {"points": int(gaps.sum()), "gaps": starts.size, "longest": longest_here},

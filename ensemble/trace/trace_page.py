@@ -60,7 +60,7 @@ def _scope(answer: Answer) -> str:
     """Describe of what body the loss is, and whether anything presses it."""
     largest = max(answer.main["states"]["mean_stress"])
     pressed = (
-        f"the mean stress reaches a compression of {1e-3 * largest:.3g} kPa"
+        f"the mean stress reaches a compression of {stress_text(largest)}"
         if largest > 0
         else "the mean stress is a tension on the whole loop"
     )

@@ -11,8 +11,6 @@ from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.quantities import AXIS_UNITS, shown_unit
 from adhesis.ensemble.report.tables.table import KEY, TableColumn, Value
 
-_CSV_UNITS = {"1": "", "m": " [m]", "m2": " [m^2]", "Pa": " [Pa]", "Pa m-1": " [Pa/m]"}
-
 
 def key_columns(data: Aggregate) -> tuple[TableColumn, ...]:
     """Return the columns of what a row is about: H, γ, and every further axis."""
@@ -23,11 +21,12 @@ def axis_columns(axes: Iterable[Axis]) -> tuple[TableColumn, ...]:
     """One column for each axis."""
     columns = []
     for axis in axes:
-        unit, size = shown_unit(axis.name, max(axis.values))
-        unit = unit or AXIS_UNITS.get(axis.unit, "")
+        shown, size = shown_unit(axis.name, max(axis.values))
+        si = AXIS_UNITS.get(axis.unit, "")
+        unit = shown or si
         columns.append(
             TableColumn(
-                f"{axis.name}{_CSV_UNITS[axis.unit]}",
+                f"{axis.name} [{si.replace('²', '^2')}]" if si else axis.name,
                 f"{axis.name} ({unit})" if unit else axis.name,
                 partial(_in_unit, size),
             )
