@@ -10,7 +10,7 @@ import argparse
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
@@ -214,32 +214,16 @@ _WHOLE = re.compile(r"[+\-]?\d+")
 _DIGITS = re.compile(r"\d+(?![\d.])")
 
 
-def read_list(
-    option: str,
-    text: str,
-    read: Callable[[str], float] = float,
-    *,
-    rule: str = "",
-    distinct: str = "",
-) -> tuple[float, ...]:
-    """Read an option that is a list of numbers, such as "0.3,0.6".
+def words_of(option: str, text: str) -> list[str]:
+    """Return the words of an option that is a list, such as "0.3,0.6".
 
-    A whole number, a comma and digits can be one number with a decimal comma, and are refused. A
-    list of whole numbers has decimals ("1.0,5.0") or blanks ("1, 5").
-
-    Parameters
-    ----------
-    option, text : str
-    read : callable
-        Reads one of the numbers; an InputError begins with "is".
-    rule : str
-        What the list must be, for a ``read`` that raises a ValueError of its own.
-    distinct : str
-        Which values must differ, if they must.
+    A whole number, a comma and digits can be one number with a decimal comma. A list of whole
+    numbers has decimals ("1.0,5.0") or blanks ("1, 5").
 
     Raises
     ------
     InputError
+        If two words can be one number.
     """
     words = text.split(",")
     for whole, rest in pairwise(words):
@@ -250,15 +234,33 @@ def read_list(
                 f"{whole}.{digits[0]}; if two are meant, write "
                 f"{float(whole):.1f},{float(digits[0]):.1f}"
             )
+    return [word.strip() for word in words]
+
+
+def read_words(
+    option: str, words: Sequence[str], read: Callable[[str], float] = float, rule: str = ""
+) -> tuple[float, ...]:
+    """Read the numbers of an option that is a list.
+
+    Parameters
+    ----------
+    option : str
+    words : sequence of str
+    read : callable
+        Reads one of them; an InputError begins with "is".
+    rule : str
+        What the list must be, for a ``read`` whose ValueError has no sentence.
+
+    Raises
+    ------
+    InputError
+    """
     try:
-        values = tuple(read(word.strip()) for word in words)
+        return tuple(read(word) for word in words)
     except InputError as error:
         raise InputError(f"{option} {error}") from None
     except ValueError:
-        raise InputError(f"{option} is {quoted(text)}: it must be {rule}") from None
-    if distinct and len(set(values)) < len(values):
-        raise InputError(f"{option} is {text}: {distinct} must differ")
-    return values
+        raise InputError(f"{option} is {quoted(','.join(words))}: it must be {rule}") from None
 
 
 _NAMES = {

@@ -9,7 +9,7 @@ from adhesis.ensemble.errors import InputError, refused_as_input
 from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
-from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration, read_list
+from adhesis.ensemble.quantities import WORK_OF_ADHESION, duration, read_words, words_of
 from adhesis.ensemble.reporter import StatusLine
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.loops import Loops
@@ -31,8 +31,10 @@ def execute(args: argparse.Namespace) -> int:
         raise InputError("--to is missing: give the directory for the page, or --plan for none")
     if args.processes is not None and args.processes < 1:
         raise InputError(f"--processes is {args.processes}: it must be at least 1")
-    read, option = WORK_OF_ADHESION.read, "--work-of-adhesion"
-    gammas = read_list(option, args.work_of_adhesion, read, distinct="its values")
+    option, text = "--work-of-adhesion", args.work_of_adhesion
+    gammas = read_words(option, words_of(option, text), WORK_OF_ADHESION.read)
+    if len(set(gammas)) < len(gammas):
+        raise InputError(f"{option} is {text!r}: its values must differ")
     with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
         control = control_of(args, half_space)

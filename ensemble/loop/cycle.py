@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.quantities import STRESS, read_list
+from adhesis.ensemble.quantities import STRESS, read_words, words_of
 from adhesis.solver.loading.loop import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
@@ -16,7 +17,6 @@ from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 
 _OUT = "out"
-_POINTS = "turning points"
 _TURNS = ("max_penetration", "max_stress", "preload")
 _MAX_PENETRATION = 0.9
 
@@ -108,12 +108,12 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
     control = control_of(args, half_space)
     if args.path is not None:
         _refuse_several(args, "path", *_TURNS)
-        before, _, last = args.path.rpartition(",")
-        out = last.strip() == _OUT
-        if out and not before:
+        words = words_of("--path", args.path)
+        out = words[-1] == _OUT
+        words = words[:-1] if out else words
+        if not words:
             raise InputError("--path holds no turning point")
-        rule = "numbers with commas between them"
-        points = read_list("--path", before if out else args.path, rule=rule)
+        points = read_words("--path", words, rule="numbers with commas between them")
         return Cycle(control, Turns(points), True, out, args.load_steps)
     turns = turns_of(args, control)
     turns = replace(turns, points=tuple(sorted(turns.points)))
@@ -139,7 +139,7 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
         _refuse_several(args, "max_penetration", "max_stress")
         if args.max_stress is None:
             raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
-        return Turns(_stresses("--max-stress", args.max_stress))
+        return Turns(_distinct("--max-stress", args.max_stress, STRESS.read))
     if args.max_stress is not None:
         raise InputError(
             "--max-stress belongs to load control, and --stiffness 0 is not given: a weight or a "
@@ -151,8 +151,7 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
         rule = "one or more numbers between 0 and 1, as 0.9 or 0.3,0.6"
     penetrations: tuple[float, ...] | None = None
     if args.max_penetration is not None:
-        option = "--max-penetration"
-        penetrations = read_list(option, args.max_penetration, rule=rule, distinct=_POINTS)
+        penetrations = _distinct("--max-penetration", args.max_penetration, float, rule)
     if args.preload is None:
         return Turns((_MAX_PENETRATION,) if penetrations is None else penetrations)
     if penetrations is not None and len(penetrations) > 1:
@@ -160,12 +159,18 @@ def turns_of(args: argparse.Namespace, control: Control) -> Turns:
             f"--max-penetration is {args.max_penetration} beside --preload: it must be one number, "
             "at which a loop turns that has not reached its preload"
         )
-    preloads = _stresses("--preload", args.preload)
+    preloads = _distinct("--preload", args.preload, STRESS.read)
     return Turns(preloads, True, None if penetrations is None else penetrations[0])
 
 
-def _stresses(option: str, text: str) -> tuple[float, ...]:
-    return read_list(option, text, STRESS.read, distinct=_POINTS)
+def _distinct(
+    option: str, text: str, read: Callable[[str], float], rule: str = ""
+) -> tuple[float, ...]:
+    """Read turning points with commas between them, all different."""
+    points = read_words(option, words_of(option, text), read, rule)
+    if len(set(points)) < len(points):
+        raise InputError(f"{option} is {text}: turning points must differ")
+    return points
 
 
 def control_of(args: argparse.Namespace, half_space: HalfSpace) -> Control:

@@ -348,7 +348,7 @@ def test_every_list_is_an_axis():
     assert len(set(tasks)) == len(tasks)
     first, last = tasks[0], tasks[-1]
     assert first.others == (("ratio", 2), ("young", 1e6), ("max_penetration", 0.3))
-    assert "ratio = 4, young = 2e+06, max_penetration = 0.6, realisation 1" in str(last)
+    assert "ratio = 4, young = 2 MPa, max_penetration = 0.6, realisation 1" in str(last)
     here = campaign.at(last)
     assert (here.profile.ratio, here.material.young, here.cycle.max_penetration) == (4, 2e6, 0.6)
     assert not here.has_axis("ratio")

@@ -191,7 +191,8 @@ def _step(text: str, decimal: str) -> float | None:
 
 def _words(label: str, units: Sequence[str]) -> list[str]:
     """Return the words of a label in lower case, without its unit."""
-    apart = re.sub(r"[_\-.]|(?<=[a-z])(?=[A-Z][a-z])", " ", label.replace("∆", "Δ"))
+    plain = unicodedata.normalize("NFKC", label).replace("∆", "Δ")
+    apart = re.sub(r"[_\-.]|(?<=[a-z])(?=[A-Z][a-z])", " ", plain)
     words = re.findall(r"[^\W\d_]+", apart.lower())
     names = {word for word in words if word in _ANY} if units else set()
     return [word for word in words if word not in names]
