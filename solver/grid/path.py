@@ -93,11 +93,14 @@ class Steps:
         self.min_displacement = max(_FEWEST_NODES_APART, _LEAST_DISPLACEMENT * wave)
 
     def first_touch(self, separation: float) -> Contact:
-        """Return the contact at the separation at which the highest crests touch."""
+        """Return the contact at the separation at which the highest crest touches."""
         contact = self.solver.empty(separation)
         before = state_of(self.lattice, contact)
         self.states.append(before)
-        crests = np.rint(self.profile.crests().position / self.lattice.dx).astype(np.intp)
+        position = self.profile.crests().position
+        if self.adhesion_scale:
+            position = position[self.profile.first_of_equal(position)]
+        crests = np.rint(position / self.lattice.dx).astype(np.intp)
         contact.mask[crests % self.lattice.n] = True
         self.solver.solve(contact, self.relaxation.tight)
         if self.energy(contact) < 0:
