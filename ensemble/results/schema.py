@@ -29,7 +29,7 @@ from adhesis.ensemble.task.dataset import (
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_scales
 
 FILE_TYPE = "adhesis-results"
-FILE_VERSION = (1, 3)
+FILE_VERSION = (1, 4)
 # Versions, beside that of adhesis, on which the last bits of a loop depend.
 _COMPUTING = ("numpy", "scipy", "numba", "llvmlite", "fftw", "processor")
 # Files of this version and later ones have checksums.

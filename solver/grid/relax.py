@@ -155,7 +155,7 @@ class Relaxation:
             return tied
         lattice = self.lattice
         part = lattice.n / lattice.equal_parts
-        return tied[first_of_equal(tied, lattice.origin, part, lattice.n, _SAME_NODE)]
+        return tied[first_of_equal(tied.astype(float), lattice.origin, part, lattice.n, _SAME_NODE)]
 
     def nucleate(self, contact: Contact) -> bool:
         """Add the nodes where the surfaces touch; returns True if there are any."""

@@ -82,9 +82,14 @@ class LoopResult(EquilibriumPath):
             f"LoopResult(turning_point={self.turning_point:g}, {self.load_steps} load steps, "
             f"{len(self.separation)} states, method {self.method.name!r},\n"
             f"  loss={self.loss:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
-            f"valid_range={self.valid_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
+            f"least_range={self.least_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
             f"{counted(len(self.warnings), 'warning')})"
         )
+
+    @property
+    def lost(self) -> float:
+        """The loss."""
+        return self.loss
 
     @property
     def audit_residual(self) -> float:
@@ -121,7 +126,10 @@ class LoopResult(EquilibriumPath):
                 f"the numerical error of the loss, {self.loss_error:.2g} J/m² of {self.loss:.3g} "
                 f"J/m², is larger than {most:g} of it, the relative error allowed"
             )
-        found += range_warnings(self.problem, self.valid_range, self.loss, self.contact_fraction)
+        found += range_warnings(
+            *(self.problem, self.valid_range, self.loss, self.contact_fraction),
+            *(self.edge_range, self.touch_range),
+        )
         found += opening_warnings(self.jumps, self.loss)
         return tuple(found)
 

@@ -60,6 +60,9 @@ EQUAL_CRESTS = 1e-9
 """Crests whose heights differ by less than this share of h_max are equal. Waves whose amplitude is
 below it make no two parts of a period differ."""
 
+# Of h_max: waves may be so far from their mirror image. Jumps are hardly located more finely.
+_MIRRORED = 1e-6
+
 # Of the shortest wave: places in equal parts of the period that differ by less are copies.
 _SAME_PLACE = 1e-3
 
@@ -295,8 +298,8 @@ class Profile(ByValue):
 
     @cached_property
     def mirror_axes(self) -> Array:
-        """Places x in m, from 0 to λ/2, about which the profile is its own mirror image."""
-        harmonics, allowed = self._harmonics, EQUAL_CRESTS * self.h_max
+        """Places x in m, from 0 to λ/2, about which the profile is nearly its own mirror image."""
+        harmonics, allowed = self._harmonics, _MIRRORED * self.h_max
         first = int(harmonics[0])
         angle = (np.pi * np.arange(first) - np.angle(self.coefficients[first])) / first
         for m in harmonics[1:]:

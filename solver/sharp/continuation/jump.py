@@ -100,7 +100,8 @@ class Jumps:
             at_stake = 0.0
         except NoState:  # a comparison that does not come to rest is no failure of the path
             pass
-        if at_stake is None and point is not None and self.mirror.is_broken(start, point.gaps):
+        left = start if known is None else known.gaps
+        if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
             at_stake = 0.0
         jump = self.states.jump(before, after, branch, at_stake, barrier)
         return ComputedJump(at, (after,), jump, point, known)

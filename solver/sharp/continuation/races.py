@@ -79,6 +79,10 @@ class MirrorCheck:
     def __init__(self, edges: EdgeMechanics, axes: Array) -> None:
         self._near, self._axes = OTHER_MINIMUM * edges.wave, axes
 
+    def is_symmetric(self, gaps: Array) -> bool:
+        """Whether these gaps are their own mirror image."""
+        return any(self._is_image(gaps, axis) for axis in self._axes)
+
     def is_broken(self, before: Array, after: Array) -> bool:
         """Whether a symmetry of the gaps ``before`` is not one of those ``after``."""
         return any(
@@ -88,5 +92,6 @@ class MirrorCheck:
     def _is_image(self, gaps: Array, axis: float) -> bool:
         """Whether these gaps are their own image about this axis."""
         image = 2 * axis - gaps[:, ::-1]
-        apart = (image[:, None] - gaps[None] + np.pi) % (2 * np.pi) - np.pi
-        return bool((np.abs(apart).max(axis=2, initial=0.0).min(axis=1, initial=np.inf) < self._near).all())
+        apart = np.abs((image[:, None] - gaps[None] + np.pi) % (2 * np.pi) - np.pi)
+        nearest = apart.max(axis=2).min(axis=1, initial=np.inf)
+        return bool((nearest < self._near).all())
