@@ -52,24 +52,20 @@ def read_status(path: Path | str) -> dict[str, Any]:
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
         dict for each row that does not have its checksum (it counts as nothing else), and
         ``checksums``, ``valid_ranges`` and ``touch_ranges``, whether the file has any;
-        ``computed_by``, the number of done rows by the versions and the processor that
-        computed them; ``seconds`` per done task (``mean``, ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each
-        cell (a value of each of the ``axes``, in the ``axis_units``) with its counts, its mean
-        time, its mean loss with standard error (J/m², and W~), and with ``[stop]`` how well the
-        mean of the steered ``quantity`` is known: ``relative_error``, ``interval_low`` and
-        ``interval_high`` (None where unknown), ``wanted_relative_error``, whether it was ``met``
-        (None while tasks of the cell are pending), and all this as a sentence (``precision``);
-        ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
-        checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the worst first;
-        ``beyond_limit``, one for each loss that is beyond what zero range describes
-        (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least range first;
-        ``opens``, whether patches may open from inside; ``last_row``, when the file was last
-        written to (as ``time.time()`` counts), None before the first row.
-
-    Raises
-    ------
-    InputError
-        If the file is not a sound results file.
+        ``computed_by``, the number of done rows by the versions and the processor that computed
+        them; ``seconds`` per done task (``mean``, ``median``, ``max``, ``sum``; None without any);
+        ``groups``, one dict for each cell (a value of each of the ``axes``, in the ``axis_units``)
+        with its counts, its mean time, its mean loss with standard error (J/m², and W~), and with
+        ``[stop]`` how well the mean of the steered ``quantity`` is known: ``relative_error``,
+        ``interval_low`` and ``interval_high`` (None where unknown), ``wanted_relative_error``,
+        whether it was ``met`` (None while tasks of the cell are pending), and all this as a
+        sentence (``precision``); ``failures``, one dict for each failed task; ``doubtful``, one for
+        each loss whose own checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the
+        worst first; ``beyond_limit``, one for each loss that is beyond what zero range describes
+        (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least range first; ``opens``,
+        whether patches may open from inside; ``last_row``, when the file was last written to (as
+        ``time.time()`` counts), None before the first row. Raises ------ InputError If the file is
+        not a sound results file.
     """
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy
