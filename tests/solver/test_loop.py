@@ -324,6 +324,6 @@ def test_a_loop_prints_itself_in_a_few_lines():
     words = [line.split()[0] for line in lines]
     assert words == ["profile", "loop", "loss", "range", "jumps", "pull-off", "states"]
     assert f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²" in lines[2]
-    assert lines[3].endswith("no tension inside patches")
+    assert "(no tension inside patches; at edges: " in lines[3]
     assert lines[4].endswith("2 (1 snap-in, 1 pull-off)")
     assert str(len(result.separation)) in lines[6]
