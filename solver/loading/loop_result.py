@@ -17,7 +17,7 @@ from adhesis.solver.checks import choice, counted, reals
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
-from adhesis.solver.method import Method
+from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch
 from adhesis.solver.model.problem import Problem
@@ -267,10 +267,23 @@ class LoopResult(EquilibriumPath):
 def result_of(
     method: Method, record: Record, turning_point: float, load_steps: int, started: float
 ) -> LoopResult:
-    """Make the result from the record of a loop; ``started`` is its first CPU time, in s."""
+    """Make the result from the record of a loop; ``started`` is its first CPU time, in s.
+
+    Raises
+    ------
+    PathError
+        If the error of the loss is as large as the loss, or surfaces overlap where nothing touches.
+    """
     problem = method.problem
     fields = path_fields(method, record, started)
     loss = record.work(problem)
+    error = estimated_error(record, loss - fields["loss_from_drops"], problem)
+    if problem.work_of_adhesion > 0 and not error < abs(loss):
+        raise PathError(
+            f"the loss is not resolved: {loss:.3g} J/m² with a numerical error of {error:.2g} "
+            "J/m², as large as itself; a finer accuracy, more nodes, or the other method may "
+            "resolve it"
+        )
     turn = record.branches.index("unloading")  # the turning point's state stands in both branches
     gained = -record.slice(0, turn).work(problem)
     max_penetration = turning_point
@@ -282,7 +295,7 @@ def result_of(
         load_steps=load_steps,
         loss=loss,
         loss_dimensionless=loss / problem.loss_scale,
-        loss_error=estimated_error(record, loss - fields["loss_from_drops"], problem),
+        loss_error=error,
         work_gained=gained,
         work_spent=loss + gained,
         **fields,

@@ -322,7 +322,8 @@ def test_a_loop_prints_itself_in_a_few_lines():
     result = run_loop(exact(0.3), max_penetration=0.5, load_steps=10)
     lines = str(result).splitlines()
     words = [line.split()[0] for line in lines]
-    assert words == ["profile", "loop", "loss", "range", "jumps", "pull-off", "states"]
+    names = ["profile", "loop", "loss", "range", "jumps", "pull-off", "states"]
+    assert words == names + ["WARNING"] * len(result.warnings)
     assert f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²" in lines[2]
     assert "(no tension inside patches; at edges: " in lines[3]
     assert lines[4].endswith("2 (1 snap-in, 1 pull-off)")
