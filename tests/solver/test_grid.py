@@ -16,7 +16,7 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.grid.method import GridMethod
-from adhesis.solver.method import ContactState
+from adhesis.solver.method import ContactState, PathError
 from adhesis.solver.references.single_wave import SingleWave
 from tests.support.grids import grid_of
 from tests.support.scenes import HALF_SPACE
@@ -352,3 +352,32 @@ def test_a_state_of_another_method_is_refused():
     foreign = ContactState(0.5 * AMPLITUDE, np.array([[0.1, 0.2]]) * PERIOD, 0.0, 0.0, 0.0, 0.1)
     with pytest.raises(ValueError, match="not made by"):
         method.follow(foreign, 0.4 * AMPLITUDE)
+
+
+@pytest.mark.parametrize(("seed", "share"), [(10, 6.7e-3), (12, 7.1e-3), (15, 3.6e-3)])
+def test_drops_that_a_weakly_adhesive_patch_loses_on_the_grid_count_in_its_error(seed, share):
+    """With 64 nodes a wave; or the loss is refused, where nothing of it is left."""
+    problem = weak(seed, share)
+    exact = run_loop(make_method("sharp", problem), max_penetration=0.7, load_steps=10)
+    try:
+        grid = run_loop(
+            make_method("grid", problem, nodes_per_wave=64), max_penetration=0.7, load_steps=10
+        )
+    except PathError as refused:
+        assert "the loss is not resolved" in str(refused)
+    else:
+        assert abs(grid.loss - exact.loss) < grid.loss_error + exact.loss_error
+
+
+def weak(seed, share):
+    """Adhesion is weak beside the roughness: γ in units of E* h_rms² q0 n0."""
+    profile = self_affine_profile(0.6, period=2e-3, n0=2, ratio=5, seed=seed, h_rms=1e-6)
+    unit = HALF_SPACE.modulus * 1e-12 * profile.q0 * 2
+    return Problem(profile, HALF_SPACE, share * unit)
+
+
+def test_a_loss_that_is_not_resolved_is_refused():
+    """Patches of less than a node: what is left is the error of two works."""
+    problem = weak(0, 6e-5)
+    with pytest.raises(PathError, match="the loss is not resolved: .* as large as itself"):
+        run_loop(make_method("grid", problem, nodes_per_wave=32), max_penetration=0.7, load_steps=5)
