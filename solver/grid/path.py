@@ -171,8 +171,8 @@ class Steps:
         With adhesion none comes or goes without one: where a few nodes make a patch it does so
         smoothly, and its drop is lost.
         """
-        counts = (patch_ranges(contact.mask)[0].size for contact in (before, after))
-        return self.least_drop * abs(int(np.subtract(*counts)))
+        one, other = (patch_ranges(contact.mask)[0].size for contact in (before, after))
+        return self.least_drop * abs(one - other)
 
     def _open(self, contact: Contact) -> tuple[float, Contact]:
         """Open patches inside where the tension has reached the strength, one after the other.

@@ -354,30 +354,30 @@ def test_a_state_of_another_method_is_refused():
         method.follow(foreign, 0.4 * AMPLITUDE)
 
 
-@pytest.mark.parametrize(("seed", "share"), [(10, 6.7e-3), (12, 7.1e-3), (15, 3.6e-3)])
-def test_drops_that_a_weakly_adhesive_patch_loses_on_the_grid_count_in_its_error(seed, share):
-    """With 64 nodes a wave; or the loss is refused, where nothing of it is left."""
-    problem = weak(seed, share)
-    exact = run_loop(make_method("sharp", problem), max_penetration=0.7, load_steps=10)
-    try:
-        grid = run_loop(
-            make_method("grid", problem, nodes_per_wave=64), max_penetration=0.7, load_steps=10
-        )
-    except PathError as refused:
-        assert "the loss is not resolved" in str(refused)
-    else:
-        assert abs(grid.loss - exact.loss) < grid.loss_error + exact.loss_error
-
-
-def weak(seed, share):
+def weak(seed: int, share: float) -> Problem:
     """Adhesion is weak beside the roughness: γ in units of E* h_rms² q0 n0."""
     profile = self_affine_profile(0.6, period=2e-3, n0=2, ratio=5, seed=seed, h_rms=1e-6)
-    unit = HALF_SPACE.modulus * 1e-12 * profile.q0 * 2
-    return Problem(profile, HALF_SPACE, share * unit)
+    return Problem(profile, HALF_SPACE, share * HALF_SPACE.modulus * 1e-12 * profile.q0 * 2)
 
 
-def test_a_loss_that_is_not_resolved_is_refused():
-    """Patches of less than a node: what is left is the error of two works."""
-    problem = weak(0, 6e-5)
-    with pytest.raises(PathError, match="the loss is not resolved: .* as large as itself"):
-        run_loop(make_method("grid", problem, nodes_per_wave=32), max_penetration=0.7, load_steps=5)
+@pytest.mark.parametrize(("seed", "share"), [(3, 5e-3), (12, 7.1e-3), (19, 2e-3)])
+def test_drops_that_a_weakly_adhesive_patch_loses_on_the_grid_count_in_its_error(seed, share):
+    """With 64 nodes a wave; the error was 1.3 to 2.2 times too small."""
+    problem = weak(seed, share)
+    grid, exact = (
+        run_loop(method, max_penetration=0.7, load_steps=10)
+        for method in (
+            make_method("grid", problem, nodes_per_wave=64),
+            make_method("sharp", problem),
+        )
+    )
+    assert len(grid.jumps) < len(exact.jumps)
+    assert abs(grid.loss - exact.loss) < grid.loss_error + exact.loss_error
+
+
+@pytest.mark.parametrize(("seed", "share", "nodes"), [(6, 3e-3, 64), (0, 6e-5, 32)])
+def test_a_loss_that_is_not_resolved_is_refused(seed, share, nodes):
+    """What is left of it is the error of two works; with 3e-3 it was 3.5 times what was stated."""
+    method = make_method("grid", weak(seed, share), nodes_per_wave=nodes)
+    with pytest.raises(PathError, match=r"the loss is not resolved: .* as large as itself"):
+        run_loop(method, max_penetration=0.7, load_steps=10)
