@@ -91,6 +91,8 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
     assert "unloading" in text.err
 
 
+DEPTHS = "it must be a positive number from 1e-12 to 0.999999"
+
 # Units of what a JSON document may hold; a number that is none of these is dimensionless.
 DIMENSIONAL = {
     "m": {"h_max", "h_rms", "period", "separation", "patch_length"}
@@ -378,8 +380,10 @@ def no_computing(monkeypatch):
         ((*OK, "--work-of-adhesion", "inf"), "--work-of-adhesion is inf: it must be 0 or"),
         ((*OK, "--young", 0), "--young is 0.0: it must be a positive number"),
         ((*OK, "--poisson", 0.6), "--poisson is 0.6: it must be a number above -1 and at most 0.5"),
-        ((*OK, "--max-penetration", 1), "--max-penetration is 1.0: it must be a number between"),
-        ((*OK, "--max-penetration", 0), "--max-penetration is 0.0: it must be a number between"),
+        *(
+            ((*OK, "--max-penetration", value), f"--max-penetration is {float(value)}: {DEPTHS}")
+            for value in (1, 0, 1e-15, 1 - 2**-53)
+        ),
         ((*OK, "--load-steps", 0), "--load-steps is 0: it must be a whole number from 1 to 100000"),
         ((*OK, "--method", "magic"), "--method is 'magic': it must be one of grid"),
         ((*OK, "--accuracy", 0), "--accuracy is 0.0: it must be a number of at least 1e-10"),
