@@ -16,10 +16,9 @@ import pytest
 from matplotlib.image import imread
 
 import adhesis
+from adhesis.ensemble import exit_codes
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.command.campaigns import run
-from adhesis.ensemble.command.main import COMMANDS, INTERRUPTED, TERMINATED, main, parser_of
-from adhesis.ensemble.run import launch
+from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from tools import commands as commands_page
 from tools import transcripts
 
@@ -403,17 +402,16 @@ def yaml_lines(text: str) -> list[str]:
     return [value.strip('"') for value in found]
 
 
-def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
+def test_exit_codes_stand_on_one_page_and_are_those_of_the_commands() -> None:
     tables = {
         str(page.relative_to(ROOT)): {
             int(code) for code in re.findall(r"^\| (\d+) \|", page.read_text(), re.MULTILINE)
         }
         for page in PAGES
     }
-    codes = {run.DONE, run.SOME_FAILED, run.BAD_INPUT, run.OUR_ERROR, run.WRITE_FAILED, run.RESUME}
-    signals = {launch.KILLED, INTERRUPTED, TERMINATED}
-    assert tables.pop("docs/troubleshooting.md") == codes | signals
-    assert [name for name, reported in tables.items() if run.RESUME in reported] == []
+    codes = {int(code) for name, code in vars(exit_codes).items() if name.isupper()}
+    assert tables.pop("docs/troubleshooting.md") == codes
+    assert [name for name, found in tables.items() if exit_codes.RESUME in found] == []
 
 
 # ---------------------------------------------------------------------- links and images
