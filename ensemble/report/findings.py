@@ -145,10 +145,7 @@ def precision(data: Aggregate) -> list[str]:
 
 
 def missing(data: Aggregate) -> list[str]:
-    """Sentences on tasks that are not in the averages; none if the campaign is complete.
-
-    Damaged rows are not, and of a file without checksums it is not known which are.
-    """
+    """Sentences on tasks that are not in the averages; none if the campaign is complete."""
     out = [f"{doubt}." for doubt in data.doubts]
     total = data.done + data.failed + data.pending + data.damaged
     if data.pending:

@@ -19,16 +19,7 @@ from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.quantities import AXIS_UNITS, with_error
-from adhesis.ensemble.results.read import (
-    NO_CHECKSUMS,
-    NO_RANGES,
-    NO_TOUCH_RANGES,
-    TOUCH_RANGE,
-    VALID_RANGE,
-    Results,
-    mixture,
-    named_rows,
-)
+from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from adhesis.ensemble.task.doubt import doubtful, why_beyond
 from adhesis.solver.checks import counted
@@ -51,8 +42,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     -------
     dict
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
-        dict for each row that does not have its checksum (it counts as nothing else), and
-        ``checksums``, ``valid_ranges`` and ``touch_ranges``, whether the file has any;
+        dict for each row that does not have its checksum (it counts as nothing else);
         ``computed_by``, the number of done rows by the versions and the processor that computed
         them; ``seconds`` per done task (``mean``, ``median``, ``max``, ``sum``; None without any);
         ``groups``, one dict for each cell (a value of each of the ``axes``, in the ``axis_units``)
@@ -97,9 +87,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
         damaged = results.damaged()
-        has_checksums, origins = results.has_checksums, results.origins()
-        has_ranges = VALID_RANGE not in results.lacking
-        has_touch_ranges = TOUCH_RANGE not in results.lacking
+        origins = results.origins()
     times = column["wall_time"][state == DONE]
     failures = [
         {
@@ -117,9 +105,6 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "failed": len(failed),
         "not_needed": int(np.sum(state == NOT_NEEDED)),
         "damaged": named(column, damaged),
-        "checksums": has_checksums,
-        "valid_ranges": has_ranges,
-        "touch_ranges": has_touch_ranges,
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
@@ -228,9 +213,9 @@ def _groups(
         now = precision(values, stop.relative_error, stop.quantity, finished=finished)
         return {
             "quantity": now.quantity,
-            "relative_error": _finite(now.relative_error),
-            "interval_low": _finite(now.low),
-            "interval_high": _finite(now.high),
+            "relative_error": finite(now.relative_error),
+            "interval_low": finite(now.low),
+            "interval_high": finite(now.high),
             "wanted_relative_error": now.wanted,
             "met": now.met,
             "precision": str(now),
@@ -253,10 +238,6 @@ def _groups(
     ]
 
 
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
-
-
 def as_text(status: dict[str, Any], pace: str = "") -> str:
     """Return a status as lines for people; ``pace`` is added to the first."""
     lines = [
@@ -266,12 +247,6 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         + (f", {len(status['damaged'])} damaged" if status["damaged"] else "")
         + pace
     ]
-    if not status["checksums"]:
-        lines.append(f"the file {NO_CHECKSUMS}")
-    if not status["valid_ranges"]:
-        lines.append(f"the file {NO_RANGES}")
-    elif not status["touch_ranges"]:
-        lines.append(f"the file {NO_TOUCH_RANGES}")
     if mixed := mixture(status["computed_by"]):
         lines.append(f"the file {mixed}")
     if seconds := status["seconds"]:
