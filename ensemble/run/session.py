@@ -321,7 +321,6 @@ class _Session:
         self._writer = writer
         self._options = options
         self._signals = signals
-        self._engine = engine
         self._started = time.monotonic()
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Counts(total=total, done_before=plan.done)
