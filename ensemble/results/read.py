@@ -319,7 +319,7 @@ class Results:
         """Whether rows that are not pending cannot be what was written."""
         written = self.column(CHECKSUM.name, rows)
         held = row_checksums(self.column, self._sizes, self.column(KEPT), rows)
-        return (status > NOT_NEEDED) | (written != held)
+        return np.asarray((status > NOT_NEEDED) | (written != held))
 
     def tasks(self) -> Tasks:
         """Return every task, row by row."""
