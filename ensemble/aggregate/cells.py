@@ -112,6 +112,11 @@ class Cell:
     curves: dict[str, Curve]
 
     @property
+    def point(self) -> tuple[float, ...]:
+        """Values on the axes of the campaign: H, γ, and those of further axes."""
+        return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
+
+    @property
     def least_range(self) -> Array:
         """Least of the three ranges of adhesion of each done task, in m, shape (done,)."""
         return least_range(
