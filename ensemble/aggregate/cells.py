@@ -15,6 +15,7 @@ from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
+from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
 from adhesis.ensemble.task.fields import FieldPlan, field_plan
 from adhesis.solver.loading.zero_range import least_range
 from adhesis.solver.model import problem
@@ -122,6 +123,16 @@ class Cell:
         return least_range(
             *(self.values[name] for name in ("valid_range", "edge_range", "touch_range"))
         )
+
+    @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """Which done tasks have a doubtful loss by their own account, shape (done,)."""
+        return doubtful(self.values, self.campaign.solver.accuracy)
+
+    @property
+    def beyond_zero_range(self) -> NDArray[np.bool_]:
+        """Which done tasks have a loss that a finite range may not have, shape (done,)."""
+        return beyond_zero_range({**self.values, "work_of_adhesion": self.work_of_adhesion})
 
     @property
     def precision(self) -> Precision | None:

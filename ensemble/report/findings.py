@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,8 +16,8 @@ from adhesis.ensemble.quantities import with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import cell_name, lines_along, place, together
 from adhesis.ensemble.report.tables.loss_tables import least
-from adhesis.ensemble.task.doubt import bound, doubtful, why_beyond
-from adhesis.solver.loading.zero_range import beyond_limit, stress_text
+from adhesis.ensemble.task.doubt import why_beyond
+from adhesis.solver.loading.zero_range import stress_text
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
@@ -108,22 +107,18 @@ def _statistical(data: Aggregate) -> str:
 def _numerical(data: Aggregate) -> str:
     loss, audit = _all(data, "loss"), np.abs(_all(data, "audit_residual"))
     error, races = _all(data, "loss_error"), _all(data, "races")
-    parts = [f"the energy audit of each loop closes within {100 * audit.max():.2g} %"]
-    if np.isfinite(error).all():
-        share = np.divide(error, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
-        parts.insert(
-            0, f"the estimated numerical error of a loss is at most {100 * share.max():.2g} % of it"
-        )
-    if np.isfinite(races).all():
-        raced = int(np.sum(races > 0))
-        stake = _all(data, "energy_at_stake")
-        most = np.max(np.divide(stake, np.abs(loss), out=np.zeros_like(loss), where=loss != 0))
-        parts.append(
-            f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
-            f"elsewhere (at most {100 * most:.2g} % of a loop's loss at stake)"
-            if raced
-            else "no jump would have ended elsewhere by another rule of descent"
-        )
+    share = np.divide(error, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
+    raced = int(np.sum(races > 0))
+    stake = _all(data, "energy_at_stake")
+    most = np.max(np.divide(stake, np.abs(loss), out=np.zeros_like(loss), where=loss != 0))
+    parts = [
+        f"the estimated numerical error of a loss is at most {100 * share.max():.2g} % of it",
+        f"the energy audit of each loop closes within {100 * audit.max():.2g} %",
+        f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
+        f"elsewhere (at most {100 * most:.2g} % of a loop's loss at stake)"
+        if raced
+        else "no jump would have ended elsewhere by another rule of descent",
+    ]
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
 
@@ -221,12 +216,12 @@ def quality(data: Aggregate) -> list[str]:
         f"{100 * np.sqrt(np.mean(audit**2)):.2g} % of the loss (root mean square over loops), "
         f"{100 * np.max(np.abs(audit)):.2g} % in the worst loop."
     ]
-    most = bound(data.campaign.solver.accuracy)
     wrong = doubts(data)
     if wrong:
         out.append(
             f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
-            f"their estimated error exceeds the accuracy asked for, {100 * most:.2g} % of the "
+            f"their estimated error exceeds the accuracy asked for, "
+            f"{100 * data.campaign.solver.accuracy:.2g} % of the "
             f"loss: {_listed(wrong)}."
         )
     out += _limit(data)
@@ -285,22 +280,7 @@ def _limit(data: Aggregate) -> list[str]:
             "valid_range, edge_range or touch_range of all loops, at "
             f"{cell_name(cell)}."
         )
-    beyond = [
-        (int(wrong.sum()), cell)
-        for cell in data.cells
-        if (
-            wrong := beyond_limit(
-                cell.values["valid_range"],
-                cell.values["loss"],
-                cell.work_of_adhesion,
-                cell.values["largest_contact_fraction"],
-                cell.values["opening_strength"] if opens else math.inf,
-                cell.values["barrier"],
-                cell.values["edge_range"],
-                cell.values["touch_range"],
-            )
-        ).any()
-    ]
+    beyond = [(count, cell) for cell in data.cells if (count := int(cell.beyond_zero_range.sum()))]
     if beyond:
         count = sum(number for number, _ in beyond)
         out.append(
@@ -316,9 +296,8 @@ def doubts(data: Aggregate) -> list[str]:
     for cell in data.cells:
         loss = cell.values["loss"]
         audit = np.abs(cell.values["audit_residual"])
-        error = np.nan_to_num(cell.values["loss_error"])
-        wrong = doubtful(data.campaign.solver.accuracy, loss, audit, error)
-        for k in np.flatnonzero(wrong):
+        error = cell.values["loss_error"]
+        for k in np.flatnonzero(cell.doubtful):
             share = max(audit[k], error[k] / abs(loss[k]) if loss[k] else np.inf)
             text = f"row {cell.rows[k]}, {cell_name(cell)} ({100 * share:.2g} %)"
             found.append((-share, text))

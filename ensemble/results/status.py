@@ -21,16 +21,14 @@ from adhesis.ensemble.escape import one_line, printable
 from adhesis.ensemble.quantities import AXIS_UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from adhesis.ensemble.task.doubt import doubtful, why_beyond
+from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, why_beyond
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.zero_range import beyond_limit, least_range
+from adhesis.solver.loading.zero_range import least_range
 from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
-_LIMIT = ("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction")
-_STRENGTH = ("opening_strength", "barrier")
 _RANGES = ("valid_range", "edge_range", "touch_range")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
@@ -53,7 +51,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         sentence (``precision``); ``failures``, one dict for each failed task; ``doubtful``, one for
         each loss whose own checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the
         worst first; ``beyond_limit``, one for each loss that is beyond what zero range describes
-        (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least range first; ``opens``,
+        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`), the least range first; ``opens``,
         whether patches may open from inside; ``under_load``, whether the loops are those of a
         weight, and ``preload_not_reached``, the number of loops that did not reach their preload
         (None without one); ``last_row``, when the file was last written to (as ``time.time()``
@@ -74,13 +72,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         units = dict(zip(axes, ["1", "J m-2", *(dataset.unit for dataset in further)], strict=True))
         state = results.status()
         names = (
-            *dict.fromkeys((*_TASK, *axes)),
+            *dict.fromkeys((*_TASK, *axes, *OF_DOUBT)),
             "wall_time",
-            "loss",
             "loss_dimensionless",
-            "audit_residual",
-            "loss_error",
-            *(*_RANGES, "largest_contact_fraction", *(_STRENGTH if opens else ())),
             *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
@@ -115,7 +109,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
             if "preload_reached" in column
             else None
         ),
-        "beyond_limit": _beyond_limit(state, column, opens=opens),
+        "beyond_limit": _beyond_limit(state, column),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
         "axis_units": units,
@@ -134,8 +128,7 @@ def named(column: Mapping[str, NDArray[Any]], rows: NDArray[np.intp]) -> list[di
 def _doubtful(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]], accuracy: float
 ) -> list[dict[str, Any]]:
-    wrong = doubtful(accuracy, column["loss"], column["audit_residual"], column["loss_error"])
-    rows = np.flatnonzero(wrong & (state == DONE))
+    rows = np.flatnonzero(doubtful(column, accuracy) & (state == DONE))
     rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
     return [
         {
@@ -150,12 +143,9 @@ def _doubtful(
 
 
 def _beyond_limit(
-    state: NDArray[np.uint8], column: dict[str, NDArray[Any]], *, opens: bool
+    state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
 ) -> list[dict[str, Any]]:
-    names = (*_LIMIT, *(_STRENGTH if opens else ()))
-    further = {name: column[name] for name in ("edge_range", "touch_range")}
-    beyond = beyond_limit(*(column[name] for name in names), **further)
-    rows = np.flatnonzero(beyond & (state == DONE))
+    rows = np.flatnonzero(beyond_zero_range(column) & (state == DONE))
     least = least_range(*(column[name][rows] for name in _RANGES))
     rows = rows[np.argsort(least, kind="stable")]
     return [
