@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.mean_curves import Curve
-from adhesis.ensemble.aggregate.statistics import Estimate, estimates
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
 from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful

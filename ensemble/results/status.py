@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import AXIS_UNITS, with_error
 from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
@@ -29,6 +30,7 @@ from adhesis.solver.values import finite
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
+_AVERAGED = ("wall_time", "loss", "loss_dimensionless")
 _RANGES = ("valid_range", "edge_range", "touch_range")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
@@ -72,9 +74,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         units = dict(zip(axes, ["1", "J m-2", *(dataset.unit for dataset in further)], strict=True))
         state = results.status()
         names = (
-            *dict.fromkeys((*_TASK, *axes, *OF_DOUBT)),
-            "wall_time",
-            "loss_dimensionless",
+            *dict.fromkeys((*_TASK, *axes, *_AVERAGED, *OF_DOUBT)),
             *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
@@ -183,23 +183,15 @@ def _groups(
         name: np.bincount(group_of[state == code], minlength=size) for name, code in _CODES.items()
     }
 
-    def mean_and_error(name: str) -> list[tuple[float | None, float | None]]:
-        values, group = column[name][done], group_of[done]
-        n = count["done"]
-        mean = np.bincount(group, values, size) / np.maximum(n, 1)
-        square = np.bincount(group, (values - mean[group]) ** 2, size)
-        error = np.sqrt(square / np.maximum(n - 1, 1) / np.maximum(n, 1))
-        return [
-            (float(mean[i]) if n[i] else None, float(error[i]) if n[i] > 1 else None)
-            for i in range(size)
-        ]
+    rows = np.flatnonzero(done)
+    rows = rows[np.argsort(group_of[rows], kind="stable")]
+    rows_of = np.split(rows, np.cumsum(count["done"])[:-1])
 
-    def known(i: int) -> dict[str, Any]:
+    def known(rows: NDArray[np.intp], finished: bool) -> dict[str, Any]:
         """Return the precision of the steered quantity of a cell, and the wanted one."""
         if stop.relative_error is None:
             return {}
-        values = column[stop.quantity][done & (group_of == i)]
-        finished = not count["pending"][i]
+        values = column[stop.quantity][rows]
         now = precision(values, stop.relative_error, stop.quantity, finished=finished)
         return {
             "quantity": now.quantity,
@@ -211,21 +203,23 @@ def _groups(
             "precision": str(now),
         }
 
-    seconds = mean_and_error("wall_time")
-    loss, scaled = mean_and_error("loss"), mean_and_error("loss_dimensionless")
-    return [
-        {
-            **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
-            **{name: int(values[i]) for name, values in count.items()},
-            "mean_seconds": seconds[i][0],
-            "loss": loss[i][0],
-            "loss_standard_error": loss[i][1],
-            "loss_dimensionless": scaled[i][0],
-            "loss_dimensionless_standard_error": scaled[i][1],
-            **known(i),
-        }
-        for i in range(size)
-    ]
+    groups = []
+    for i, rows in enumerate(rows_of):
+        values = np.array([column[name][rows] for name in _AVERAGED])
+        seconds, loss, scaled = estimates(values, with_interval=False)
+        groups.append(
+            {
+                **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
+                **{name: int(cells[i]) for name, cells in count.items()},
+                "mean_seconds": finite(seconds.mean),
+                "loss": finite(loss.mean),
+                "loss_standard_error": finite(loss.sem),
+                "loss_dimensionless": finite(scaled.mean),
+                "loss_dimensionless_standard_error": finite(scaled.sem),
+                **known(rows, not count["pending"][i]),
+            }
+        )
+    return groups
 
 
 def as_text(status: dict[str, Any], pace: str = "") -> str:
