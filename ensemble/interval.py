@@ -34,14 +34,13 @@ def interval_method(n: int) -> str:
     return "transformed" if n >= FEWEST_FOR_SKEWNESS else "student" if n >= 2 else "none"
 
 
-def interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
+def interval(values: ArrayLike) -> tuple[Array, Array]:
     """Interval of the mean over the last axis.
 
     Parameters
     ----------
     values : array, shape (…, n)
         Finite.
-    confidence : float
 
     Returns
     -------
@@ -61,7 +60,7 @@ def interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[Array, 
     std = np.where(spread, np.sqrt(square * n / (n - 1)), 0.0)
     from scipy.special import stdtrit  # here: most commands have no use for it, and it takes long
 
-    t = float(stdtrit(n - 1, 0.5 + confidence / 2)) / np.sqrt(n)
+    t = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) / np.sqrt(n)
     low, high = mean - std * t, mean + std * t
     if n < FEWEST_FOR_SKEWNESS:
         return low, high

@@ -21,6 +21,7 @@ from adhesis.solver.loading.zero_range import stress_text
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
+_MOST_LISTED = 4
 
 
 def verdict(data: Aggregate) -> list[str]:
@@ -505,10 +506,11 @@ def area_ratio(cell: Cell) -> float | None:
     return float(np.min(unloading / area_up[wanted]))
 
 
-def _listed(texts: Sequence[str], between: str = "; ", most: int = 4) -> str:
+def _listed(texts: Sequence[str], between: str = "; ") -> str:
     """The first of a list, and how many more there are."""
-    rest = len(texts) - most
-    return between.join(texts) if rest <= 0 else f"{between.join(texts[:most])} and {rest} more"
+    rest = len(texts) - _MOST_LISTED
+    shown = between.join(texts[:_MOST_LISTED])
+    return f"{shown} and {rest} more" if rest > 0 else shown
 
 
 def _all(data: Aggregate, name: str) -> NDArray[np.float64]:
