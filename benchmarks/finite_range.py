@@ -2,7 +2,7 @@
 
     python benchmarks/finite_range.py [--profiles 40] [--seed 1]
 
-Of random even profiles whose loops have one patch throughout, the loss of the zero-range limit (by ``sharp``
+Of random even profiles whose loops have one patch throughout, the zero-range loss (by ``sharp``
 and by the formulas here) and the exact one at half of the least of ``valid_range``, ``edge_range``
 and ``touch_range``: it must be less than a tenth off. Exit code 1 if one is.
 
@@ -75,7 +75,7 @@ class OnePatch:
         sigma = self.gamma / delta
 
         def beyond(log_zone):
-            x, from_a, weights, slope = self._piece(a, np.exp(log_zone), sigma, in_zone=True)
+            _, weights, slope = self._piece(a, np.exp(log_zone), sigma, in_zone=True)
             return weights @ slope - delta
 
         low, high = np.log(1e-9 * (np.pi - a)), np.log((1 - 1e-9) * (np.pi - a))
@@ -84,7 +84,7 @@ class OnePatch:
         zone = np.exp(brentq(beyond, low, high, xtol=1e-11))
         separation = sum(
             _mean(x, weights, slope)
-            for x, _, weights, slope in (
+            for x, weights, slope in (
                 self._piece(a, zone, sigma, in_zone=True),
                 self._piece(a, zone, sigma, in_zone=False),
             )
@@ -94,7 +94,7 @@ class OnePatch:
         return separation, pressed - 2 * sigma * float(phi) / np.pi
 
     def _piece(self, a, zone, sigma, in_zone):
-        """Nodes, their distances from a, weights and slope of the gap, in the zone or beyond."""
+        """Nodes, weights, and slope of the gap there, in the zone or beyond it."""
         c = a + zone
         near, far, weights = _graded(zone if in_zone else np.pi - c)
         from_a, from_c = (near, far) if in_zone else (zone + near, near)
@@ -105,7 +105,7 @@ class OnePatch:
         apart = np.sin(from_c / 2) * np.sin((c + x) / 2) * np.cos(a / 2) ** 2
         apart = apart / (np.cos(x / 2) * np.cos(c / 2)) ** 2
         slope = self.free_slope(x, from_a) + 2 * sigma / np.pi * np.log((t + end) ** 2 / apart)
-        return x, from_a, weights, slope
+        return x, weights, slope
 
     def loss(self, deepest, delta=0.0):
         """Loss of one loop at fixed separation down to a penetration, per area; and its patch."""

@@ -18,6 +18,8 @@ goes.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -32,14 +34,13 @@ def interval_method(n: int) -> str:
     return "transformed" if n >= FEWEST_FOR_SKEWNESS else "student" if n >= 2 else "none"
 
 
-def interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
+def interval(values: ArrayLike) -> tuple[Array, Array]:
     """Interval of the mean over the last axis.
 
     Parameters
     ----------
     values : array, shape (…, n)
         Finite.
-    confidence : float
 
     Returns
     -------
@@ -59,7 +60,7 @@ def interval(values: ArrayLike, confidence: float = CONFIDENCE) -> tuple[Array, 
     std = np.where(spread, np.sqrt(square * n / (n - 1)), 0.0)
     from scipy.special import stdtrit  # here: most commands have no use for it, and it takes long
 
-    t = float(stdtrit(n - 1, 0.5 + confidence / 2)) / np.sqrt(n)
+    t = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) / np.sqrt(n)
     low, high = mean - std * t, mean + std * t
     if n < FEWEST_FOR_SKEWNESS:
         return low, high
@@ -89,3 +90,53 @@ def untransformed(x: float, skewness: Array, n: int) -> Array:
     g = np.where(np.abs(skewness) < 1e-6, 1e-6, skewness)
     solved: Array = 3 / g * (np.cbrt(1 + g * (x - g / (6 * n))) - 1)
     return solved
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean over realisations and how well it is known; NaN where n is too small.
+
+    Attributes
+    ----------
+    n : int
+        Realisations.
+    mean, std : float
+        Mean, and standard deviation of one realisation (n - 1 in the denominator; n ≥ 2).
+    sem : float
+        Standard error of the mean, std/sqrt(n); n ≥ 2.
+    low, high : float
+        Interval of the mean at :data:`CONFIDENCE`; n ≥ 2.
+    """
+
+    n: int
+    mean: float
+    std: float
+    sem: float
+    low: float
+    high: float
+
+    @property
+    def relative_error(self) -> float:
+        """Distance of the further end of the interval over the mean; infinite without one."""
+        return relative_error(self.mean, self.low, self.high)
+
+
+def estimates(values: Array, with_interval: bool = True) -> list[Estimate]:
+    """One :class:`Estimate` for each row of ``values``, shape (quantities, n)."""
+    values = np.atleast_2d(np.asarray(values, dtype=float))
+    count, n = values.shape
+    nothing = np.full(count, np.nan)
+    mean = values.mean(axis=1) if n else nothing
+    std = values.std(axis=1, ddof=1) if n > 1 else nothing
+    low, high = interval(values) if with_interval and n else (nothing, nothing)
+    return [
+        Estimate(
+            n=n,
+            mean=float(mean[k]),
+            std=float(std[k]),
+            sem=float(std[k] / np.sqrt(n)) if n else float("nan"),
+            low=float(low[k]),
+            high=float(high[k]),
+        )
+        for k in range(count)
+    ]

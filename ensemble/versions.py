@@ -50,14 +50,14 @@ def installed() -> dict[str, str]:
     }
 
 
-def first_lines(text: str, count: int = 4) -> str:
-    """Join the first lines of a message that hold letters or digits, as a launcher's page."""
-    return _joined(text, slice(count))
+def first_lines(text: str) -> str:
+    """Join the first four lines of a message that hold letters or digits, as a launcher's page."""
+    return _joined(text, slice(4))
 
 
-def last_lines(text: str, count: int = 2) -> str:
-    """Join the last lines of a message that hold letters or digits."""
-    return _joined(text, slice(-count, None))
+def last_lines(text: str) -> str:
+    """Join the last two lines of a message that hold letters or digits."""
+    return _joined(text, slice(-2, None))
 
 
 def _joined(text: str, chosen: slice) -> str:

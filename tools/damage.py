@@ -9,7 +9,6 @@ damaged copy is
   these rows are pending; ``run`` computes them again, after which the file is the undamaged one;
 - *pending*: rows count as pending though nothing is named, else as before (a status byte became 0);
 - *harmless*: every command gives what it gives for the undamaged file;
-- *unseen*: a file of version 1.0 gives other numbers, which it has nothing to find out by;
 - *WRONG*: anything else, with what was wrong.
 """
 
@@ -41,7 +40,6 @@ from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.session import Options, run_campaign
 from tests.support.campaign_support import differences, write_campaign
 from tests.support.fake_run import fake_engine
-from tests.support.synthetic_results import age
 
 
 class Damage:
@@ -51,12 +49,10 @@ class Damage:
     ----------
     folder : path
         For the files.
-    old : bool
-        Whether the file is one of version 1.0, without checksums.
     """
 
-    def __init__(self, folder: Path, *, old: bool = False) -> None:
-        self.folder, self.old = folder, old
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         toml = write_campaign(folder, realisations="2", load_steps="10")
         self.campaign = load_campaign(toml)
         self.sound = folder / "sound.h5"
@@ -66,8 +62,6 @@ class Damage:
                 (file[d.name].id.get_offset(), file[d.name].id.get_storage_size())
                 for d in ROW_DATASETS
             ]
-        if old:
-            age(self.sound)
         self.content = self.sound.read_bytes()
         self.answer = cache(self._answer)
 
@@ -133,8 +127,6 @@ class Damage:
         wrong = [c for c in ("status", "averages") if commands[c]() != expected[c]]
         wrong += ["merge"] if self._merged(path, expected["path"]) else []
         wrong += ["run"] if self._resumed(path) else []
-        if wrong and self.old:
-            return "unseen", ", ".join(wrong)
         if wrong:
             raise Wrong(f"{', '.join(wrong)} differ; named {named}, pending {pending}")
         if named:
@@ -144,7 +136,7 @@ class Damage:
     def _answer(self, without: tuple[int, ...]) -> dict[str, Any]:
         """Return what the commands give for the sound file with some rows pending."""
         path = self.folder / f"answer{'-'.join(map(str, without))}.h5"
-        shutil.copy(self._whole(), path)
+        shutil.copy(self.sound, path)
         with Writer(path) as writer:
             writer.reset(without)
         source = path if without else self.sound
@@ -163,17 +155,7 @@ class Damage:
         self._run(copy)
         with Results(copy) as results:
             unsound = [f"row {row} is damaged" for row in results.damaged().tolist()]
-        return unsound + differences(copy, self._whole())
-
-    def _whole(self) -> Path:
-        """Return the undamaged file, in the present version."""
-        if not self.old:
-            return self.sound
-        whole = self.folder / "whole.h5"
-        if not whole.exists():
-            shutil.copy(self.sound, whole)
-            self._run(whole)
-        return whole
+        return unsound + differences(copy, self.sound)
 
 
 class Wrong(Exception):

@@ -22,9 +22,9 @@ from adhesis.ensemble.aggregate.companions import Companion, read_companion
 from adhesis.ensemble.aggregate.jumps import JumpStatistics, aggregate_jumps
 from adhesis.ensemble.aggregate.mean_curves import average_curves
 from adhesis.ensemble.aggregate.mean_fields import FieldStatistics, aggregate_fields
-from adhesis.ensemble.aggregate.statistics import Estimate, estimates
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import FAILED
 from adhesis.solver.method import BRANCHES

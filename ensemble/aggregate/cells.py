@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.aggregate.mean_curves import Curve
-from adhesis.ensemble.aggregate.statistics import Estimate, estimates
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
+from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
 from adhesis.ensemble.task.fields import FieldPlan, field_plan
+from adhesis.ensemble.task.row import JUMP_COUNT, NUMBERS, TIMES
 from adhesis.solver.loading.zero_range import least_range
 from adhesis.solver.model import problem
 from adhesis.solver.model.half_space import HalfSpace
@@ -23,20 +25,14 @@ from adhesis.solver.model.profile import Array
 
 Rows = NDArray[np.intp]
 
-_PER_TASK = (
-    *("h_max", "h_rms", "m0", "m2", "m4"),
-    *("loss", "loss_dimensionless", "loss_from_drops", "loss_small_scale", "loss_large_scale"),
-    *("audit_residual", "pull_off_penetration", "pull_off_stress"),
-    *("largest_contact_fraction", "work_gained", "work_spent", "full_contact_energy"),
-    *("wall_time", "cpu_time", "states", "jump_count"),
-    *("loss_error", "races", "energy_at_stake"),
-    *("valid_range", "edge_range", "touch_range", "largest_interior_tension"),
-    *("opening_strength", "openings", "barrier"),
-    *("turning_penetration", "turning_stress", "preload_reached"),
-)
-# Of these the least or the largest of a cell counts; a range or a strength may be infinite.
+_PER_TASK = tuple(dataset.name for dataset in (*TIMES, *NUMBERS, JUMP_COUNT))
+# Of these the least or the largest of a cell counts, as a range or a strength may be infinite; or
+# they belong to the place of one tension.
 _NOT_AVERAGED = frozenset(
-    ("valid_range", "edge_range", "touch_range", "largest_interior_tension", "opening_strength")
+    (
+        *("valid_range", "edge_range", "touch_range", "opening_strength"),
+        *("largest_interior_tension", "interior_tension_position", "interior_tension_penetration"),
+    )
 )
 _WITH_INTERVAL = (
     "loss",
@@ -87,8 +83,8 @@ class Cell:
         ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
         spent per largest contact area, in J/m²).
     estimates : dict of Estimate
-        Means of these, but not of ranges of adhesion, ``largest_interior_tension`` and
-        ``opening_strength``. Only losses, pull-off and largest contact have an interval.
+        Means of these, but not of ranges of adhesion, the largest interior tension and its place,
+        and ``opening_strength``. Only losses, pull-off and largest contact have an interval.
     curves : dict of Curve
         ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
         (σ~), ``mean_stress_over_slope`` (σ~/sqrt(m2)), ``contact_fraction``, ``patches``,
@@ -112,11 +108,26 @@ class Cell:
     curves: dict[str, Curve]
 
     @property
+    def point(self) -> tuple[float, ...]:
+        """Values on the axes of the campaign: H, γ, and those of further axes."""
+        return (self.hurst, self.work_of_adhesion, *(value for _, value in self.others))
+
+    @property
     def least_range(self) -> Array:
         """Least of the three ranges of adhesion of each done task, in m, shape (done,)."""
         return least_range(
             *(self.values[name] for name in ("valid_range", "edge_range", "touch_range"))
         )
+
+    @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """Which done tasks have a doubtful loss by their own account, shape (done,)."""
+        return doubtful(self.values, self.campaign.solver.accuracy)
+
+    @property
+    def beyond_zero_range(self) -> NDArray[np.bool_]:
+        """Which done tasks have a loss that a finite range may not have, shape (done,)."""
+        return beyond_zero_range({**self.values, "work_of_adhesion": self.work_of_adhesion})
 
     @property
     def precision(self) -> Precision | None:

@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 
 from adhesis.ensemble.aggregate.cells import Cell, read_cells
-from adhesis.ensemble.aggregate.statistics import Estimate, estimates
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.compare import differing
 from adhesis.ensemble.campaign.rules import shown
 from adhesis.ensemble.campaign.tables import Campaign
+from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.results.read import Results
 
 Kind = Literal["resolution", "load steps", "penetration", "spectrum", "other"]

@@ -151,17 +151,12 @@ def benchmark(
     return lines
 
 
-def growth(
-    scenes: Sequence[Scene] = GROWTH,
-    *,
-    seconds: float = 360.0,
-    on_line: Callable[[Line], None] | None = None,
-) -> list[Line]:
+def growth(*, seconds: float = 360.0, on_line: Callable[[Line], None] | None = None) -> list[Line]:
     """Measure the growth of cost; these lines have no reference and no error."""
     unknown = Reference(math.nan, "none")
     lines: list[Line] = []
     _fill_caches()
-    for scene in scenes:
+    for scene in GROWTH:
         settings: list[tuple[Measured, Sequence[float]]] = [
             ("sharp", scene.accuracies),
             ("grid", scene.grids),

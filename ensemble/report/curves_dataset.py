@@ -11,7 +11,6 @@ import xarray as xr
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.mean_curves import QUANTILES
 from adhesis.ensemble.outputs import write_netcdf
-from adhesis.ensemble.report.tables.key import key
 from adhesis.solver.method import BRANCHES
 
 # curve -> (unit, what it is)
@@ -36,7 +35,7 @@ def curves_dataset(data: Aggregate) -> xr.Dataset:
         **{axis.name: sorted(set(axis.values)) for axis in data.further},
     }
     place = [
-        tuple(values.index(value) for values, value in zip(axes.values(), key(cell), strict=True))
+        tuple(values.index(value) for values, value in zip(axes.values(), cell.point, strict=True))
         for cell in data.cells
     ]
     key_dims, shape = tuple(axes), tuple(map(len, axes.values()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,11 +16,11 @@ from adhesis.ensemble.quantities import percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import cell_name, lines_along, together
 from adhesis.ensemble.report.tables.loss_tables import least
-from adhesis.ensemble.task.doubt import bound, doubtful, why_beyond
-from adhesis.solver.loading.zero_range import beyond_limit
+from adhesis.ensemble.task.doubt import why_beyond
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
+_MOST_LISTED = 4
 
 
 def verdict(data: Aggregate) -> list[str]:
@@ -99,22 +98,18 @@ def _statistical(data: Aggregate) -> str:
 def _numerical(data: Aggregate) -> str:
     loss, audit = _all(data, "loss"), np.abs(_all(data, "audit_residual"))
     error, races = _all(data, "loss_error"), _all(data, "races")
-    parts = [f"the energy audit of each loop closes within {percent(audit.max())}"]
-    if np.isfinite(error).all():
-        share = np.divide(error, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
-        parts.insert(
-            0, f"the estimated numerical error of a loss is at most {percent(share.max())} of it"
-        )
-    if np.isfinite(races).all():
-        raced = int(np.sum(races > 0))
-        stake = _all(data, "energy_at_stake")
-        most = np.max(np.divide(stake, np.abs(loss), out=np.zeros_like(loss), where=loss != 0))
-        parts.append(
-            f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
-            f"elsewhere (at most {percent(most)} of a loop's loss at stake)"
-            if raced
-            else "no jump would have ended elsewhere by another rule of descent"
-        )
+    share = np.divide(error, np.abs(loss), out=np.zeros_like(loss), where=loss != 0)
+    raced = int(np.sum(races > 0))
+    stake = _all(data, "energy_at_stake")
+    most = np.max(np.divide(stake, np.abs(loss), out=np.zeros_like(loss), where=loss != 0))
+    parts = [
+        f"the estimated numerical error of a loss is at most {percent(share.max())} of it",
+        f"the energy audit of each loop closes within {percent(audit.max())}",
+        f"in {raced} of {loss.size} loops another rule of descent would have ended a jump "
+        f"elsewhere (at most {percent(most)} of a loop's loss at stake)"
+        if raced
+        else "no jump would have ended elsewhere by another rule of descent",
+    ]
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
 
@@ -136,10 +131,7 @@ def precision(data: Aggregate) -> list[str]:
 
 
 def missing(data: Aggregate) -> list[str]:
-    """Sentences on tasks that are not in the averages; none if the campaign is complete.
-
-    Damaged rows are not, and of a file without checksums it is not known which are.
-    """
+    """Sentences on tasks that are not in the averages; none if the campaign is complete."""
     out = [f"{doubt}." for doubt in data.doubts]
     total = data.done + data.failed + data.pending + data.damaged
     if data.pending:
@@ -215,12 +207,12 @@ def quality(data: Aggregate) -> list[str]:
         f"{percent(np.sqrt(np.mean(audit**2)))} of the loss (root mean square over loops), "
         f"{percent(np.max(np.abs(audit)))} in the worst loop."
     ]
-    most = bound(data.campaign.solver.accuracy)
     wrong = doubts(data)
     if wrong:
         out.append(
             f"WARNING: {len(wrong)} of {data.done} losses are doubtful, as their audit residual or "
-            f"their estimated error exceeds the accuracy asked for, {percent(most)} of the "
+            "their estimated error exceeds the accuracy asked for, "
+            f"{percent(data.campaign.solver.accuracy)} of the "
             f"loss: {_listed(wrong)}."
         )
     out += _limit(data)
@@ -279,22 +271,7 @@ def _limit(data: Aggregate) -> list[str]:
             "valid_range, edge_range or touch_range of all loops, at "
             f"{cell_name(cell)}."
         )
-    beyond = [
-        (int(wrong.sum()), cell)
-        for cell in data.cells
-        if (
-            wrong := beyond_limit(
-                cell.values["valid_range"],
-                cell.values["loss"],
-                cell.work_of_adhesion,
-                cell.values["largest_contact_fraction"],
-                cell.values["opening_strength"] if opens else math.inf,
-                cell.values["barrier"],
-                cell.values["edge_range"],
-                cell.values["touch_range"],
-            )
-        ).any()
-    ]
+    beyond = [(count, cell) for cell in data.cells if (count := int(cell.beyond_zero_range.sum()))]
     if beyond:
         count = sum(number for number, _ in beyond)
         out.append(
@@ -310,9 +287,8 @@ def doubts(data: Aggregate) -> list[str]:
     for cell in data.cells:
         loss = cell.values["loss"]
         audit = np.abs(cell.values["audit_residual"])
-        error = np.nan_to_num(cell.values["loss_error"])
-        wrong = doubtful(data.campaign.solver.accuracy, loss, audit, error)
-        for k in np.flatnonzero(wrong):
+        error = cell.values["loss_error"]
+        for k in np.flatnonzero(cell.doubtful):
             share = max(audit[k], error[k] / abs(loss[k]) if loss[k] else np.inf)
             text = f"row {cell.rows[k]}, {cell_name(cell)} ({percent(share)})"
             found.append((-share, text))
@@ -520,10 +496,11 @@ def area_ratio(cell: Cell) -> float | None:
     return float(np.min(unloading / area_up[wanted]))
 
 
-def _listed(texts: Sequence[str], between: str = "; ", most: int = 4) -> str:
+def _listed(texts: Sequence[str], between: str = "; ") -> str:
     """The first of a list, and how many more there are."""
-    rest = len(texts) - most
-    return between.join(texts) if rest <= 0 else f"{between.join(texts[:most])} and {rest} more"
+    rest = len(texts) - _MOST_LISTED
+    shown = between.join(texts[:_MOST_LISTED])
+    return f"{shown} and {rest} more" if rest > 0 else shown
 
 
 def _all(data: Aggregate, name: str) -> NDArray[np.float64]:

@@ -166,7 +166,7 @@ def _footnote(data: Aggregate) -> str:
             "± method: the difference from the campaign with another accuracy or method beside it"
         )
     parts.append("audit: largest |loop integral - sum of drops| / loss")
-    if any(np.nansum(cell.values["races"]) for cell in data.cells):
+    if any(np.sum(cell.values["races"]) for cell in data.cells):
         parts.append(
             "races: jumps that another rule of descent would have ended elsewhere, all loops"
         )

@@ -73,8 +73,8 @@ class CampaignResults:
     Warns
     -----
     UserWarning
-        If rows are damaged, which are left out as if they were pending, or if the file was written
-        before rows had checksums.
+        If rows are damaged, which are left out as if they were pending, or if rows were computed by
+        several versions or processors.
 
     Raises
     ------

@@ -86,7 +86,7 @@ def m2(hurst: float) -> float | None:
 
 def is_cell_of(cell: Cell) -> bool:
     """Whether profile, material and path of a cell are a reading of the paper's."""
-    return _is_reading(cell.campaign, [cell.hurst] if cell.others else cell.campaign.sweep.hurst)
+    return is_reading(cell.campaign, [cell.hurst] if cell.others else cell.campaign.sweep.hurst)
 
 
 def are_its_cells(cells: Sequence[Cell]) -> bool:
@@ -94,12 +94,8 @@ def are_its_cells(cells: Sequence[Cell]) -> bool:
     return all(is_cell_of(cell) for cell in cells)
 
 
-def is_the_papers(campaign: Campaign) -> bool:
+def is_reading(campaign: Campaign, hursts: Sequence[float]) -> bool:
     """Whether profile, material and path of a campaign are a reading of the paper's."""
-    return not campaign.lists and _is_reading(campaign, campaign.sweep.hurst)
-
-
-def _is_reading(campaign: Campaign, hursts: Sequence[float]) -> bool:
     profile, material, cycle = campaign.profile, campaign.material, campaign.cycle
     low, high = _TURNING_POINTS
     return (

@@ -94,8 +94,6 @@ class Plots:
         """Loss against the Hurst exponent, a panel for each work of adhesion, with intervals."""
         return self._draw("loss_against_hurst")
 
-    loss_against_adhesion = loss_against_hurst  # its earlier name
-
     def loss_against_slope(self) -> Panels:
         """Loss against mean square slope, a panel for each work of adhesion, with intervals."""
         return self._draw("loss_against_slope")

@@ -54,7 +54,6 @@ def row_checksums(
     sizes: Mapping[str, int],
     kept: NDArray[np.intp],
     rows: NDArray[np.intp],
-    without: frozenset[str] = frozenset(),
 ) -> NDArray[np.uint32]:
     """Compute the checksums of some rows from what they hold; a block is in memory at a time.
 
@@ -67,18 +66,15 @@ def row_checksums(
         Rows of the tasks that keep their fields, ascending.
     rows : int array
         Ascending.
-    without : set of str
-        Datasets that the file does not hold.
     """
-    of_tasks = [d for d in OF_TASKS if d.name not in without]
     out = np.zeros(rows.size, np.uint32)
-    widths = [prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in of_tasks]
+    widths = [prod(row_shape(d, sizes)) * np.dtype(d.dtype).itemsize for d in OF_TASKS]
     step = max(1, _BLOCK_BYTES // sum(widths))
     done = 0
     while done < rows.size:
         first = int(rows[done])
         last = done + int(np.searchsorted(rows[done:], first + step))
-        block = _side_by_side(read, of_tasks, slice(first, int(rows[last - 1]) + 1), widths)
+        block = _side_by_side(read, OF_TASKS, slice(first, int(rows[last - 1]) + 1), widths)
         for place in range(done, last):
             row = int(rows[place])
             value = zlib.crc32(block[row - first].data)

@@ -40,7 +40,7 @@ def reserve_head(file: h5py.File) -> None:
 def write_head(path: Path) -> None:
     """Fill the attribute of a file that is laid out."""
     with h5py.File(path, "r", locking=False) as file:
-        found = [file[d.name].id for d in ROW_DATASETS if d.name in file]
+        found = [file[d.name].id for d in ROW_DATASETS]
         rows = [
             (place, dataset.get_storage_size())
             for dataset in found
@@ -61,8 +61,8 @@ def write_head(path: Path) -> None:
         handle.write(text)
 
 
-def check_head(path: Path) -> bool | None:
-    """Return whether a file has the checksum of its head; None if there is none to compare.
+def check_head(path: Path) -> bool:
+    """Return whether a file has the checksum of its head.
 
     Raises
     ------
@@ -70,11 +70,13 @@ def check_head(path: Path) -> bool | None:
         If it is a pipe, device or directory.
     OSError
         If it cannot be read.
+    ValueError
+        If it has no head: it is no results file.
     """
     with open_regular(path) as handle:
         place = handle.read(_NEAR).find(_MARK)
         if place < 0:
-            return None
+            raise ValueError(f"{path} has no '{HEAD}'")
         handle.seek(place)
         text = handle.read(_LENGTH).removeprefix(_MARK)
         try:

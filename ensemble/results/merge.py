@@ -60,7 +60,8 @@ class Merged:
     Attributes
     ----------
     doubts : tuple of str
-        A sentence about each file with damaged rows, which are left out, or without checksums.
+        A sentence about each file with damaged rows, which are left out, or with rows of several
+        versions or processors.
     """
 
     total: int
@@ -136,9 +137,6 @@ def merge(parts: Sequence[Path | str], out: Path | str) -> Merged:
         if there is None:
             create(out, campaign, versions=_versions(opened[0]))
         else:
-            if there.lacking:
-                doubts += there.doubts()
-                create(out, campaign, versions=_versions(there), grown_from=there)
             there.close()
         _copy(sources, out)
     return Merged(
@@ -209,8 +207,6 @@ def _compare(source: _Source, row: int, other: Results, there: int) -> None:
             continue
         one = source.results.column(dataset.name, slice(row, row + 1))
         two = other.column(dataset.name, slice(there, there + 1))
-        if dataset.since > (1, 0) and np.isnan([*one, *two]).any():
-            continue  # one of them was computed before rows had it
         if one.tobytes() != two.tobytes():
             raise InputError(
                 f"{source.results.path} and {other.path} both hold {source.results.tasks()[row]}, "

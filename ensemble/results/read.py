@@ -25,7 +25,6 @@ from adhesis.ensemble.results.schema import (
     DONE,
     NOT_NEEDED,
     ORIGIN,
-    ORIGIN_LENGTH,
     PENDING,
     ROOT_ATTRIBUTES,
     STATUS,
@@ -34,12 +33,8 @@ from adhesis.ensemble.results.schema import (
     check_version,
     datasets,
     description,
-    encode_text,
     file_size,
     fixed_attributes,
-    has_checksums,
-    lacking,
-    origin_of,
     scales,
     shape_of,
 )
@@ -49,28 +44,14 @@ from adhesis.solver.checks import shown
 _MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
 _LONGEST_ATTRIBUTE = 2**16  # bytes of a root attribute, of a text those of a reference to it
 _NUMBERS = ("file_version", "seed")  # root attributes that are no texts
-# Attributes that may differ between versions of adhesis that read each other's files.
-_WORDING = frozenset(("file_version", "title", "long_name"))
+# Attributes that may differ between versions of adhesis that write the same file version.
+_WORDING = frozenset(("title", "long_name"))
 # Attributes by which HDF5 joins datasets to the scales of their dimensions.
 _OF_HDF5 = frozenset(("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIMENSION_LABELS"))
 # Exponential functions of numpy differ between processors by the last bits.
 _SCALE_ROUNDING = 1e-12
 _LOOKS = 3
 _MOST_NAMED = 10
-# What is wrong with a file of version 1.0, after its name.
-NO_CHECKSUMS = "was written before rows had checksums: damage of its rows cannot be found"
-VALID_RANGE = "valid_range"
-# What a file of version 1.1 does not say, after its name.
-NO_RANGES = (
-    f"was written before rows had {VALID_RANGE}: below which ranges of adhesion its losses hold is "
-    "not known"
-)
-TOUCH_RANGE = "touch_range"
-# What a file of version 1.2 or 1.3 does not say, after its name.
-NO_TOUCH_RANGES = (
-    f"was written before rows had {TOUCH_RANGE}: whether earlier touches would change its losses "
-    "is not known"
-)
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 
@@ -93,10 +74,6 @@ class Results:
         Which rows of the campaign it holds; part 1 of 1 is the whole.
     attributes : dict
         The root attributes (docs/results-file.md).
-    has_checksums : bool
-        Whether damage of its rows can be found; not so in files of version 1.0.
-    lacking : set of str
-        Datasets of the present version that the file does not hold: it was written before them.
 
     Raises
     ------
@@ -109,8 +86,7 @@ class Results:
         self._status: NDArray[np.uint8] | None = None
         with _damage(self.path):
             # HDF5 can crash over damaged bytes of its own: it reads none that are known to be.
-            sound = check_head(self.path)
-            if sound is False:
+            if not check_head(self.path):
                 raise InputError(
                     f"{self.path} is damaged or truncated, or another program has changed it: the "
                     f"bytes beside its rows do not have their checksum; {_INSTEAD}"
@@ -121,12 +97,9 @@ class Results:
                 self._check_members()
                 self._check_size()
                 self.attributes = self._root_attributes()
-                version = check_version(
+                check_version(
                     self.path, self.attributes.get("file_type"), self.attributes["file_version"]
                 )
-                self.has_checksums, self.lacking = has_checksums(version), lacking(version)
-                if self.has_checksums != (sound is True):
-                    raise ValueError("head")
                 self.campaign = parse_campaign(self.attributes["campaign"], str(self.path))
                 self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
                 self._datasets = datasets(self.campaign)
@@ -179,27 +152,13 @@ class Results:
 
     def _check_layout(self) -> None:
         """Compare shapes and types with those of the campaign, before anything of them is read."""
-        if file_size(self.campaign, self.part, self.lacking) > os.path.getsize(self.path):
+        if file_size(self.campaign, self.part) > os.path.getsize(self.path):
             raise ValueError("truncated")
         wanted = scales(self.campaign, self.part)
-        known = [d for d in self._datasets if d.name not in self.lacking]
-        names = [scale.name for scale in wanted] + [d.name for d in known]
-        missing = [name for name in names if name not in self._file]
-        if missing:
-            by = str(self.attributes.get("adhesis_version", "an unknown version"))
-            commit = str(self.attributes.get("commit", "unknown"))
-            if commit != "unknown":
-                by += f" (commit {commit[:12]})"
-            more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
-            raise InputError(
-                f"{self.path} was written by adhesis {by}, whose results files do not hold "
-                f"{', '.join(missing[:3])}{more}: read it with that version, or compute the "
-                "campaign again into another file"
-            )
         self._sizes = sizes_of(wanted)
         for scale in wanted:
             self._check_dataset(scale.name, scale.values.shape, scale.values.dtype)
-        for column in known:
+        for column in self._datasets:
             self._check_dataset(column.name, shape_of(column, self._sizes), np.dtype(column.dtype))
 
     def _check_dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
@@ -221,8 +180,6 @@ class Results:
                     f"{self.path} is damaged: its attribute {name} is {shown(found)}, and that of "
                     f"its campaign is {shown(value)}; {_INSTEAD}"
                 )
-        if self.lacking:
-            return  # an earlier version described its datasets in other words
         wanted = {s.name: description(s) for s in scales(self.campaign, self.part)}
         for column in self._datasets:
             wanted[column.name] = description(column)
@@ -291,28 +248,12 @@ class Results:
     def column(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
         """Return a dataset, or some rows of it.
 
-        What the file lacks, as it was written before, is made up: the fill value, the origin from
-        the root attributes, and the checksum as a file of the present version would have it.
-
         Parameters
         ----------
         name : str
         rows : slice or ascending int array, optional
             All rows if not given. Memory is that of the result.
         """
-        if name in self.lacking or (self.lacking and name == CHECKSUM.name):
-            every = np.arange(len(self))
-            chosen = every if rows is None else every[rows]
-            if name == CHECKSUM.name:
-                return self._checksums(chosen)
-            if name == ORIGIN.name:
-                return self._origins(chosen)
-            dataset = next(d for d in self._datasets if d.name == name)
-            return np.full(chosen.size, dataset.fill, dataset.dtype)
-        return self._stored(name, rows)
-
-    def _stored(self, name: str, rows: slice | NDArray[np.intp] | None = None) -> NDArray[Any]:
-        """Return a dataset, or some rows of it, as the file holds it."""
         with _damage(self.path):
             dataset = self._file[name]
             if rows is None or isinstance(rows, slice):
@@ -353,20 +294,11 @@ class Results:
 
     def doubts(self) -> tuple[str, ...]:
         """Return a sentence for each reason not to take the rows for sound, whole, and alike."""
-        out = list(self.age())
+        out = []
         if damage := self.damage():
             out.append(f"{damage}; damaged rows are not used")
         if mixed := mixture(self.origins()):
             out.append(f"{self.path} {mixed}")
-        return tuple(out)
-
-    def age(self) -> tuple[str, ...]:
-        """Return a sentence for each thing that the file lacks, as it was written before it."""
-        out = [] if self.has_checksums else [f"{self.path} {NO_CHECKSUMS}"]
-        if VALID_RANGE in self.lacking:
-            out.append(f"{self.path} {NO_RANGES}")
-        elif TOUCH_RANGE in self.lacking:
-            out.append(f"{self.path} {NO_TOUCH_RANGES}")
         return tuple(out)
 
     def _checked_status(self) -> NDArray[np.uint8]:
@@ -385,28 +317,9 @@ class Results:
 
     def _differ(self, rows: NDArray[np.intp], status: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Whether rows that are not pending cannot be what was written."""
-        out = status > NOT_NEEDED
-        if self.has_checksums:
-            out |= self._stored(CHECKSUM.name, rows) != self._checksums(rows, self.lacking)
-            return out
-        for dataset in self._datasets:
-            names = dataset.attributes.get("flag_values")
-            if names is not None and dataset is not STATUS:
-                values = self.column(dataset.name, rows)
-                out |= np.any((values < dataset.fill) | (values >= len(names)), axis=1)
-        return out
-
-    def _checksums(
-        self, rows: NDArray[np.intp], without: frozenset[str] = frozenset()
-    ) -> NDArray[np.uint32]:
-        """Compute the checksums of some rows (ascending) from what they hold."""
-        kept = self.column(KEPT)
-        return row_checksums(self.column, self._sizes, kept, rows, without)
-
-    def _origins(self, rows: NDArray[np.intp]) -> NDArray[np.bytes_]:
-        """Take the versions that laid the file out for those that computed its rows."""
-        text = encode_text(origin_of(self.attributes), ORIGIN_LENGTH)
-        return np.full(rows.size, text, ORIGIN.dtype)
+        written = self.column(CHECKSUM.name, rows)
+        held = row_checksums(self.column, self._sizes, self.column(KEPT), rows)
+        return np.asarray((status > NOT_NEEDED) | (written != held))
 
     def tasks(self) -> Tasks:
         """Return every task, row by row."""

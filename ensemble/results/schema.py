@@ -29,11 +29,9 @@ from adhesis.ensemble.task.dataset import (
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_scales
 
 FILE_TYPE = "adhesis-results"
-FILE_VERSION = (1, 4)
+FILE_VERSION = 1
 # Versions, beside that of adhesis, on which the last bits of a loop depend.
 _COMPUTING = ("numpy", "scipy", "numba", "llvmlite", "fftw", "processor")
-# Files of this version and later ones have checksums.
-_WITH_CHECKSUMS = (1, 1)
 
 PENDING, DONE, FAILED, NOT_NEEDED = 0, 1, 2, 3
 _STATES = ("pending", "done", "failed", "not needed")
@@ -50,16 +48,8 @@ ROOT_ATTRIBUTES = (
 )
 
 
-def _task(
-    name: str,
-    dtype: str,
-    unit: str,
-    meaning: str,
-    *,
-    since: tuple[int, int] = (1, 0),
-    **attributes: object,
-) -> Dataset:
-    return Dataset(name, ("task",), dtype, unit, meaning, attributes, since=since)
+def _task(name: str, dtype: str, unit: str, meaning: str, **attributes: object) -> Dataset:
+    return Dataset(name, ("task",), dtype, unit, meaning, attributes)
 
 
 # What the task is, known before it runs.
@@ -70,13 +60,10 @@ TASK_DATASETS: tuple[Dataset, ...] = (
     _task("seed", "i8", "1", "seed of the profile's phases"),
 )
 STATUS = _task("status", "u1", "1", "state of the task", **flags(_STATES, "u1"))
-CHECKSUM = _task(
-    *("checksum", "u4", "1", "CRC-32 of the row; not of a pending one"), since=_WITH_CHECKSUMS
-)
+CHECKSUM = _task("checksum", "u4", "1", "CRC-32 of the row; not of a pending one")
 ORIGIN = _task(
     *("computed_by", f"S{ORIGIN_LENGTH}", "1"),
     "versions and processor that computed the task (UTF-8)",
-    since=_WITH_CHECKSUMS,
 )
 # How it went; the status is written last.
 RUN_DATASETS: tuple[Dataset, ...] = (
@@ -91,16 +78,6 @@ ROW_DATASETS: tuple[Dataset, ...] = RUN_DATASETS + RESULT_DATASETS
 # The datasets of every campaign; one for each further axis comes to them.
 DATASETS: tuple[Dataset, ...] = TASK_DATASETS + RUN_DATASETS + RESULT_DATASETS
 _NAMES = frozenset(dataset.name for dataset in DATASETS)
-
-
-def lacking(version: tuple[int, int]) -> frozenset[str]:
-    """Return the datasets that files of a version do not hold yet."""
-    return frozenset(dataset.name for dataset in DATASETS if dataset.since > version)
-
-
-def has_checksums(version: tuple[int, int]) -> bool:
-    """Return whether files of a version have checksums."""
-    return version >= _WITH_CHECKSUMS
 
 
 def axis_datasets(campaign: Campaign) -> tuple[Dataset, ...]:
@@ -158,13 +135,12 @@ def shape_of(dataset: Dataset, sizes: Mapping[str, int]) -> tuple[int, ...]:
     return (sizes[dataset.dims[0]], *row_shape(dataset, sizes))
 
 
-def file_size(campaign: Campaign, part: Part = WHOLE, without: frozenset[str] = frozenset()) -> int:
-    """Bytes of a campaign's results file, without headers and the datasets ``without``."""
+def file_size(campaign: Campaign, part: Part = WHOLE) -> int:
+    """Bytes of a campaign's results file, without headers."""
     sizes = sizes_of(scales(campaign, part))
     return sum(
         int(np.prod(shape_of(dataset, sizes), dtype=object)) * np.dtype(dataset.dtype).itemsize
         for dataset in datasets(campaign)
-        if dataset.name not in without
     )
 
 
@@ -172,7 +148,7 @@ def fixed_attributes(campaign: Campaign, part: Part = WHOLE) -> dict[str, Any]:
     """Return the root attributes that a campaign decides, and the same for every file of it."""
     return {
         "file_type": FILE_TYPE,
-        "file_version": np.array(FILE_VERSION, "i4"),
+        "file_version": np.int32(FILE_VERSION),
         "Conventions": "CF-1.11",
         "title": "Loading-unloading hysteresis loops of rough adhesive contacts",
         "campaign": campaign.text,
@@ -196,21 +172,13 @@ def origin_of(versions: Mapping[str, Any]) -> str:
     return ", ".join((by, *others))
 
 
-def check_version(path: object, file_type: object, version: object) -> tuple[int, int]:
-    """Return the version of a file.
-
-    Raises
-    ------
-    InputError
-        If it is of another type, or of a version that this code does not know.
-    """
+def check_version(path: object, file_type: object, version: object) -> None:
+    """Refuse a file of another type, or of a version that this code does not know (InputError)."""
     if file_type != FILE_TYPE:
         raise InputError(f"{path} is not a results file of adhesis")
-    numbers = tuple(np.ravel(np.asarray(version)).tolist())
-    if len(numbers) != 2 or numbers[0] != FILE_VERSION[0] or not 0 <= numbers[1] <= FILE_VERSION[1]:
-        shown = ".".join(str(n) for n in numbers[:4])
+    if not np.array_equal(np.asarray(version), FILE_VERSION):
+        shown = ".".join(str(n) for n in np.ravel(np.asarray(version))[:4].tolist())
         raise InputError(
-            f"{path} has file version {shown}: this adhesis reads versions {FILE_VERSION[0]}.0 to "
-            f"{FILE_VERSION[0]}.{FILE_VERSION[1]}"
+            f"{path} has file version {shown}, and this adhesis reads version {FILE_VERSION}: read "
+            "it with the adhesis that wrote it, or compute the campaign again into another file"
         )
-    return (numbers[0], numbers[1])

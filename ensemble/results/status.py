@@ -18,28 +18,19 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.precision import precision
 from adhesis.ensemble.campaign.tables import StopTable
 from adhesis.ensemble.escape import one_line, printable
+from adhesis.ensemble.interval import estimates
 from adhesis.ensemble.quantities import AXIS_UNITS, percent, with_error
-from adhesis.ensemble.results.read import (
-    NO_CHECKSUMS,
-    NO_RANGES,
-    NO_TOUCH_RANGES,
-    TOUCH_RANGE,
-    VALID_RANGE,
-    Results,
-    mixture,
-    named_rows,
-)
+from adhesis.ensemble.results.read import Results, mixture, named_rows
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
-from adhesis.ensemble.task.doubt import doubtful, why_beyond
+from adhesis.ensemble.task.doubt import OF_DOUBT, beyond_zero_range, doubtful, why_beyond
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.zero_range import beyond_limit, least_range
+from adhesis.solver.loading.zero_range import least_range
 from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
 _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
-_LIMIT = ("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction")
-_STRENGTH = ("opening_strength", "barrier")
+_AVERAGED = ("wall_time", "loss", "loss_dimensionless")
 _RANGES = ("valid_range", "edge_range", "touch_range")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
@@ -51,8 +42,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     -------
     dict
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
-        dict for each row that does not have its checksum (it counts as nothing else), and
-        ``checksums``, ``valid_ranges`` and ``touch_ranges``, whether the file has any;
+        dict for each row that does not have its checksum (it counts as nothing else);
         ``computed_by``, the number of done rows by the versions and the processor that computed
         them; ``seconds`` per done task (``mean``, ``median``, ``max``, ``sum``; None without any);
         ``groups``, one dict for each cell (a value of each of the ``axes``, in the ``axis_units``)
@@ -63,7 +53,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         sentence (``precision``); ``failures``, one dict for each failed task; ``doubtful``, one for
         each loss whose own checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the
         worst first; ``beyond_limit``, one for each loss that is beyond what zero range describes
-        (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least range first; ``opens``,
+        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`), the least range first; ``opens``,
         whether patches may open from inside; ``under_load``, whether the loops are those of a
         weight, and ``preload_not_reached``, the number of loops that did not reach their preload
         (None without one); ``last_row``, when the file was last written to (as ``time.time()``
@@ -84,22 +74,14 @@ def read_status(path: Path | str) -> dict[str, Any]:
         units = dict(zip(axes, ["1", "J m-2", *(dataset.unit for dataset in further)], strict=True))
         state = results.status()
         names = (
-            *dict.fromkeys((*_TASK, *axes)),
-            "wall_time",
-            "loss",
-            "loss_dimensionless",
-            "audit_residual",
-            "loss_error",
-            *(*_RANGES, "largest_contact_fraction", *(_STRENGTH if opens else ())),
+            *dict.fromkeys((*_TASK, *axes, *_AVERAGED, *OF_DOUBT)),
             *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
         errors = results.errors(failed)
         damaged = results.damaged()
-        has_checksums, origins = results.has_checksums, results.origins()
-        has_ranges = VALID_RANGE not in results.lacking
-        has_touch_ranges = TOUCH_RANGE not in results.lacking
+        origins = results.origins()
     times = column["wall_time"][state == DONE]
     failures = [
         {
@@ -117,9 +99,6 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "failed": len(failed),
         "not_needed": int(np.sum(state == NOT_NEEDED)),
         "damaged": named(column, damaged),
-        "checksums": has_checksums,
-        "valid_ranges": has_ranges,
-        "touch_ranges": has_touch_ranges,
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
@@ -130,7 +109,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
             if "preload_reached" in column
             else None
         ),
-        "beyond_limit": _beyond_limit(state, column, opens=opens),
+        "beyond_limit": _beyond_limit(state, column),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
         "axis_units": units,
@@ -149,8 +128,7 @@ def named(column: Mapping[str, NDArray[Any]], rows: NDArray[np.intp]) -> list[di
 def _doubtful(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]], accuracy: float
 ) -> list[dict[str, Any]]:
-    wrong = doubtful(accuracy, column["loss"], column["audit_residual"], column["loss_error"])
-    rows = np.flatnonzero(wrong & (state == DONE))
+    rows = np.flatnonzero(doubtful(column, accuracy) & (state == DONE))
     rows = rows[np.argsort(-np.abs(column["audit_residual"][rows]), kind="stable")]
     return [
         {
@@ -165,12 +143,9 @@ def _doubtful(
 
 
 def _beyond_limit(
-    state: NDArray[np.uint8], column: dict[str, NDArray[Any]], *, opens: bool
+    state: NDArray[np.uint8], column: dict[str, NDArray[Any]]
 ) -> list[dict[str, Any]]:
-    names = (*_LIMIT, *(_STRENGTH if opens else ()))
-    further = {name: column[name] for name in ("edge_range", "touch_range")}
-    beyond = beyond_limit(*(column[name] for name in names), **further)
-    rows = np.flatnonzero(beyond & (state == DONE))
+    rows = np.flatnonzero(beyond_zero_range(column) & (state == DONE))
     least = least_range(*(column[name][rows] for name in _RANGES))
     rows = rows[np.argsort(least, kind="stable")]
     return [
@@ -208,53 +183,43 @@ def _groups(
         name: np.bincount(group_of[state == code], minlength=size) for name, code in _CODES.items()
     }
 
-    def mean_and_error(name: str) -> list[tuple[float | None, float | None]]:
-        values, group = column[name][done], group_of[done]
-        n = count["done"]
-        mean = np.bincount(group, values, size) / np.maximum(n, 1)
-        square = np.bincount(group, (values - mean[group]) ** 2, size)
-        error = np.sqrt(square / np.maximum(n - 1, 1) / np.maximum(n, 1))
-        return [
-            (float(mean[i]) if n[i] else None, float(error[i]) if n[i] > 1 else None)
-            for i in range(size)
-        ]
+    rows = np.flatnonzero(done)
+    rows = rows[np.argsort(group_of[rows], kind="stable")]
+    rows_of = np.split(rows, np.cumsum(count["done"])[:-1])
 
-    def known(i: int) -> dict[str, Any]:
+    def known(rows: NDArray[np.intp], finished: bool) -> dict[str, Any]:
         """Return the precision of the steered quantity of a cell, and the wanted one."""
         if stop.relative_error is None:
             return {}
-        values = column[stop.quantity][done & (group_of == i)]
-        finished = not count["pending"][i]
+        values = column[stop.quantity][rows]
         now = precision(values, stop.relative_error, stop.quantity, finished=finished)
         return {
             "quantity": now.quantity,
-            "relative_error": _finite(now.relative_error),
-            "interval_low": _finite(now.low),
-            "interval_high": _finite(now.high),
+            "relative_error": finite(now.relative_error),
+            "interval_low": finite(now.low),
+            "interval_high": finite(now.high),
             "wanted_relative_error": now.wanted,
             "met": now.met,
             "precision": str(now),
         }
 
-    seconds = mean_and_error("wall_time")
-    loss, scaled = mean_and_error("loss"), mean_and_error("loss_dimensionless")
-    return [
-        {
-            **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
-            **{name: int(values[i]) for name, values in count.items()},
-            "mean_seconds": seconds[i][0],
-            "loss": loss[i][0],
-            "loss_standard_error": loss[i][1],
-            "loss_dimensionless": scaled[i][0],
-            "loss_dimensionless_standard_error": scaled[i][1],
-            **known(i),
-        }
-        for i in range(size)
-    ]
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    groups = []
+    for i, rows in enumerate(rows_of):
+        values = np.array([column[name][rows] for name in _AVERAGED])
+        seconds, loss, scaled = estimates(values, with_interval=False)
+        groups.append(
+            {
+                **{name: float(value) for name, value in zip(axes, points[:, i], strict=True)},
+                **{name: int(cells[i]) for name, cells in count.items()},
+                "mean_seconds": finite(seconds.mean),
+                "loss": finite(loss.mean),
+                "loss_standard_error": finite(loss.sem),
+                "loss_dimensionless": finite(scaled.mean),
+                "loss_dimensionless_standard_error": finite(scaled.sem),
+                **known(rows, not count["pending"][i]),
+            }
+        )
+    return groups
 
 
 def as_text(status: dict[str, Any], pace: str = "") -> str:
@@ -266,12 +231,6 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         + (f", {len(status['damaged'])} damaged" if status["damaged"] else "")
         + pace
     ]
-    if not status["checksums"]:
-        lines.append(f"the file {NO_CHECKSUMS}")
-    if not status["valid_ranges"]:
-        lines.append(f"the file {NO_RANGES}")
-    elif not status["touch_ranges"]:
-        lines.append(f"the file {NO_TOUCH_RANGES}")
     if mixed := mixture(status["computed_by"]):
         lines.append(f"the file {mixed}")
     if seconds := status["seconds"]:

@@ -350,7 +350,6 @@ class _Launched:
         # What happens to a launcher that hangs, and when.
         self._started = time.monotonic()
         self._ended: float | None = None  # when the exit code of the ranks was seen
-        self._announced = False
         self._kill_at: float | None = None
 
     def follow(self) -> None:

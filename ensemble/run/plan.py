@@ -193,12 +193,9 @@ def prepare(
                 "spectra would change (they follow the highest n0 · ratio of the campaign)"
             )
         before = len(old)
-        for sentence in old.age():
-            say(f"{sentence}; the run copies its rows into a file of the present version")
         if difference.grown:
             check_space(path, campaign, part)
             check_cells(tasks)
-        if difference.grown or old.lacking:
             create(path, campaign, part=part, versions=versions(), grown_from=old)
             if old.damaged().size:
                 say(f"{old.damage()}{_AGAIN}")

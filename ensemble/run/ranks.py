@@ -11,7 +11,7 @@ import os
 import pickle
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Self, TypeVar
 
 from adhesis.ensemble.errors import InputError, RankError
@@ -65,14 +65,14 @@ class OneRank:
         """Leave the end to the caller: there are no other ranks."""
 
 
-def launched(environ: Mapping[str, str] = os.environ) -> tuple[int, int, str]:
+def launched() -> tuple[int, int, str]:
     """Return (number of processes, this one's place, launcher) from the launcher's variables.
 
     (1, 0, "") without a launcher.
     """
     for size, rank, name in _LAUNCHERS:
         try:
-            return int(environ[size]), int(environ.get(rank, "0")), name
+            return int(os.environ[size]), int(os.environ.get(rank, "0")), name
         except (KeyError, ValueError):
             continue
     return 1, 0, ""

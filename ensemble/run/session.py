@@ -40,11 +40,10 @@ from adhesis.ensemble.run.ranks import MpiChannel, OneRank, one_a_node_first, to
 from adhesis.ensemble.run.schedule import Schedule
 from adhesis.ensemble.run.units import Units
 from adhesis.ensemble.task.compute import Runner, check_task, methods_of
-from adhesis.ensemble.task.doubt import doubtful
+from adhesis.ensemble.task.doubt import beyond_zero_range, doubtful
 from adhesis.ensemble.task.row import Row
 from adhesis.ensemble.versions import processor, versions
 from adhesis.solver.loading.loop import Progress
-from adhesis.solver.loading.zero_range import beyond_limit
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class RowSummary:
     steered : float
         The quantity of ``[stop]``.
     beyond_limit : bool
-        See :func:`adhesis.solver.loading.zero_range.beyond_limit`.
+        See :func:`adhesis.ensemble.task.doubt.beyond_zero_range`.
     """
 
     loss: float
@@ -69,7 +68,7 @@ class RowSummary:
     loss_error: float
     doubtful: bool
     steered: float
-    beyond_limit: bool = False
+    beyond_limit: bool
 
 
 class RowWriter(Protocol):
@@ -160,7 +159,7 @@ class Summary:
         (:mod:`adhesis.ensemble.task.doubt`).
     beyond_limit : int
         Losses, of those computed now, that are those of the zero-range limit alone
-        (:func:`adhesis.solver.loading.zero_range.beyond_limit`).
+        (:func:`adhesis.ensemble.task.doubt.beyond_zero_range`).
     stopped : str or None
         Why it stopped before the last task.
     precisions : tuple of (str, Precision)
@@ -322,7 +321,6 @@ class _Session:
         self._writer = writer
         self._options = options
         self._signals = signals
-        self._engine = engine
         self._started = time.monotonic()
         total = plan.done + plan.failed + len(plan.rows)
         self._counts = Counts(total=total, done_before=plan.done)
@@ -419,16 +417,15 @@ class _Session:
     def _summarise(self, row: Row | None, task: Task) -> RowSummary | None:
         if row is None:
             return None
-        loss, residual = float(row["loss"]), float(row["audit_residual"])
-        error = float(row["loss_error"])
-        wrong = doubtful(self._campaign.solver.accuracy, loss, residual, error)
-        steered = float(row[self._campaign.stop.quantity])
-        contact = row["largest_contact_fraction"]
-        beyond = beyond_limit(
-            *(row["valid_range"], loss, task.work_of_adhesion, contact),
-            *(row["opening_strength"], row["barrier"], row["edge_range"], row["touch_range"]),
+        values = {**row, "work_of_adhesion": task.work_of_adhesion}
+        return RowSummary(
+            loss=float(row["loss"]),
+            audit_residual=float(row["audit_residual"]),
+            loss_error=float(row["loss_error"]),
+            doubtful=bool(doubtful(values, self._campaign.solver.accuracy)),
+            steered=float(row[self._campaign.stop.quantity]),
+            beyond_limit=bool(beyond_zero_range(values)),
         )
-        return RowSummary(loss, residual, error, bool(wrong), steered, bool(beyond))
 
     def _count(self, outcome: Outcome, progress: ProgressLine, schedule: Schedule) -> None:
         if outcome.error is None:

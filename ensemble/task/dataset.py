@@ -33,8 +33,6 @@ class Dataset:
         For the attribute ``long_name``.
     attributes : mapping
         Further attributes.
-    since : tuple of int
-        Version of the first results files that hold it.
     value : callable, optional
         How its row is taken from a loop (:mod:`adhesis.ensemble.task.row`); None where it is not.
     """
@@ -46,7 +44,6 @@ class Dataset:
     meaning: str
     attributes: Mapping[str, Any] = field(default_factory=dict)
     value: Callable[..., Any] | None = field(default=None, compare=False)
-    since: tuple[int, int] = (1, 0)
 
     @property
     def fill(self) -> Any:

@@ -7,16 +7,27 @@ with actual errors (docs/methods.md, "Error of the loss"), and is used without a
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesis.solver.loading.zero_range import (
     DOUBTFUL_BARRIER,
     DOUBTFUL_EXCESS,
     DOUBTFUL_LOSS,
     DOUBTFUL_RANGE,
+    beyond_limit,
 )
+
+# Numbers of a row from which beyond_zero_range decides, in the order of beyond_limit.
+_OF_LIMIT = (
+    *("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction"),
+    *("opening_strength", "barrier", "edge_range", "touch_range"),
+)
+OF_DOUBT = ("audit_residual", "loss_error", *_OF_LIMIT)
+"""Numbers of a row from which its loss is judged."""
 
 BEYOND_LIMIT = (
     f"valid_range, edge_range or touch_range is below {DOUBTFUL_RANGE:g} m, or the loss above "
@@ -39,25 +50,26 @@ def why_beyond(opens: bool) -> str:
     return BEYOND_STRENGTH if opens else BEYOND_LIMIT
 
 
-def bound(accuracy: float) -> float:
-    """Return the relative error above which a loss is doubtful: the requested accuracy."""
-    return accuracy
-
-
-def doubtful(
-    accuracy: float, loss: Any, audit_residual: Any, loss_error: Any = 0.0
-) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return which losses are doubtful; values or arrays of one shape.
+def doubtful(values: Mapping[str, Any], accuracy: float) -> NDArray[np.bool_]:
+    """Return which losses have a larger error than was asked for, by their own account.
 
     Parameters
     ----------
+    values : mapping
+        Numbers or columns of rows, by the names of the results file.
     accuracy : float
         Requested relative error.
-    loss, loss_error : float or array
-        In J/m².
-    audit_residual : float or array
-        (loss - loss_from_drops) / loss.
     """
-    largest = bound(accuracy)
-    error = np.asarray(loss_error) > largest * np.abs(np.asarray(loss))
-    return np.asarray((np.abs(np.asarray(audit_residual)) > largest) | error)
+    error = np.asarray(values["loss_error"]) > accuracy * np.abs(values["loss"])
+    return np.asarray((np.abs(values["audit_residual"]) > accuracy) | error)
+
+
+def beyond_zero_range(values: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Return which losses an adhesion of finite range may not have.
+
+    Parameters
+    ----------
+    values : mapping
+        Numbers or columns of rows, by the names of the results file.
+    """
+    return beyond_limit(*(values[name] for name in _OF_LIMIT))

@@ -30,9 +30,8 @@ def _task(
     unit: str,
     meaning: str,
     value: Callable[[LoopResult], Any] | None = None,
-    since: tuple[int, int] = (1, 0),
 ) -> Dataset:
-    return Dataset(name, ("task",), dtype, unit, meaning, {}, value, since)
+    return Dataset(name, ("task",), dtype, unit, meaning, {}, value)
 
 
 def _curves(branch: Branch) -> tuple[Dataset, ...]:
@@ -84,47 +83,38 @@ _RANGES = (
     _task(
         *("valid_range", FLOAT, "m", "range of adhesion below which no patch opens from inside"),
         lambda loop: loop.valid_range,
-        since=(1, 2),
     ),
     _task(
         *("edge_range", FLOAT, "m", "range whose cohesive zone is as long as what pins edges"),
         lambda loop: loop.edge_range,
-        since=(1, 2),
     ),
     _task(
         *("touch_range", FLOAT, "m", "range that changes the loss by 0.01 by earlier touches"),
         lambda loop: loop.touch_range,
-        since=(1, 4),
     ),
     _task(
         *("largest_interior_tension", FLOAT, "Pa", "largest tension inside patches"),
         lambda loop: loop.largest_interior_tension,
-        since=(1, 2),
     ),
     _task(
         *("interior_tension_position", FLOAT, "m", "position of that tension"),
         lambda loop: np.nan if loop.interior is None else loop.interior.position,
-        since=(1, 2),
     ),
     _task(
         *("interior_tension_penetration", FLOAT, "1", "penetration/h_max at that tension"),
         lambda loop: np.nan if loop.interior is None else loop.interior.penetration,
-        since=(1, 2),
     ),
     _task(
         *("opening_strength", FLOAT, "Pa", "strength at which patches open from inside"),
         lambda loop: loop.problem.strength,
-        since=(1, 3),
     ),
     _task(
         *("openings", FLOAT, "1", "jumps that begin with a gap that opens inside a patch"),
         lambda loop: loop.openings,
-        since=(1, 3),
     ),
     _task(
         *("barrier", FLOAT, "J m-2", "energy up to the cracks that open patches"),
         lambda loop: loop.barrier,
-        since=(1, 3),
     ),
 )
 # Where each loop turned.
@@ -132,17 +122,14 @@ _TURNS = (
     _task(
         *("turning_penetration", FLOAT, "1", "penetration/h_max at the turning point"),
         lambda loop: loop.max_penetration,
-        since=(1, 4),
     ),
     _task(
         *("turning_stress", FLOAT, "Pa", "mean stress at the turning point"),
         lambda loop: loop.turning_stress,
-        since=(1, 4),
     ),
     _task(
         *("preload_reached", FLOAT, "1", "1 if the mean stress reached the preload, 0 if not"),
         lambda loop: np.nan if loop.preload_reached is None else float(loop.preload_reached),
-        since=(1, 4),
     ),
 )
 # Of each loop, one number.

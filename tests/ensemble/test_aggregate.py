@@ -14,10 +14,9 @@ from adhesis.ensemble.aggregate.average import aggregate
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES
 from adhesis.ensemble.aggregate.mean_curves import QUANTILES
 from adhesis.ensemble.aggregate.mean_fields import fitted_slope
-from adhesis.ensemble.aggregate.statistics import estimates
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.interval import interval, interval_method, untransformed
+from adhesis.ensemble.interval import estimates, interval, interval_method, untransformed
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.task.fields import field_plan
 from adhesis.solver.model.jump import JUMP_KINDS

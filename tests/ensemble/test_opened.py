@@ -125,7 +125,6 @@ def test_every_figure_of_the_report_has_a_method_that_returns_its_axes(results):
         assert axes[0].lines
     axes = results.plot.loss_against_hurst()
     assert axes[-1].get_xlabel() == "Hurst exponent $H$"
-    assert Plots.loss_against_adhesion is Plots.loss_against_hurst  # its earlier name
 
 
 def test_bad_files_are_refused(tmp_path):

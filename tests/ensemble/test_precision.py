@@ -9,7 +9,6 @@ import shutil
 import numpy as np
 import pytest
 
-from adhesis.ensemble.aggregate.statistics import estimates
 from adhesis.ensemble.campaign.compare import Changes, compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.precision import (
@@ -22,7 +21,7 @@ from adhesis.ensemble.campaign.precision import (
     precision_lines,
 )
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.interval import interval
+from adhesis.ensemble.interval import estimates, interval
 from adhesis.ensemble.report import findings
 from adhesis.ensemble.report.write_report import write_report
 from adhesis.ensemble.results.read import Results

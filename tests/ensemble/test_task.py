@@ -313,5 +313,10 @@ def test_a_real_task_repeats_to_the_bit_and_has_the_shape_of_its_row():
 
 def test_a_loss_is_doubtful_where_it_misses_the_accuracy_asked_for():
     """The estimated error is calibrated (docs/methods.md), so it is held against it as it is."""
-    flags = doubtful(1e-3, -np.ones(4), [0, 0, 2e-3, -2e-3], [9e-4, 1.1e-3, 0, 0])
+    values = {
+        "loss": -np.ones(4),
+        "audit_residual": [0, 0, 2e-3, -2e-3],
+        "loss_error": [9e-4, 1.1e-3, 0, 0],
+    }
+    flags = doubtful(values, 1e-3)
     assert flags.tolist() == [False, True, True, True]

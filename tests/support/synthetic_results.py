@@ -10,9 +10,9 @@ import numpy as np
 from adhesis.ensemble.campaign.file import parse_campaign
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.results.checksum import row_checksums
-from adhesis.ensemble.results.head import HEAD, write_head
+from adhesis.ensemble.results.head import write_head
 from adhesis.ensemble.results.layout import create
-from adhesis.ensemble.results.schema import axis_datasets, has_checksums, kept_rows, lacking
+from adhesis.ensemble.results.schema import axis_datasets, kept_rows
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.fields import GAP_EDGES, field_plan
 from adhesis.solver.model.jump import JUMP_KINDS
@@ -184,25 +184,13 @@ def write(path: Path, campaign: Campaign, rows: dict[str, np.ndarray]) -> Path:
     return sign(path)
 
 
-def sign(path: Path, without: frozenset[str] = frozenset()) -> Path:
+def sign(path: Path) -> Path:
     """Give a results file and its rows the checksums of what they hold, as if all were written."""
     with h5py.File(path, "r+") as file:
         sizes = {name: data.size for name, data in file.items() if data.is_scale}
         file["checksum"][...] = row_checksums(
             lambda name, rows: file[name][rows],
-            *(sizes, file[KEPT][:], np.arange(file["task"].size), without),
+            *(sizes, file[KEPT][:], np.arange(file["task"].size)),
         )
     write_head(path)
     return path
-
-
-def age(path: Path, version: tuple[int, int] = (1, 0)) -> Path:
-    """Make a results file one of an earlier version; before 1.1 there were no checksums."""
-    without = lacking(version)
-    with h5py.File(path, "r+") as file:
-        for name in without:
-            del file[name]
-        file.attrs["file_version"] = np.array(version, "i4")
-        if not has_checksums(version):
-            del file.attrs[HEAD]
-    return sign(path, without) if has_checksums(version) else path

@@ -1,6 +1,6 @@
 """Damage results files at random, and judge what every command makes of them (tools/damage.py).
 
-    python tools/fuzz/damage.py --seed N [--seconds T] [--old]
+    python tools/fuzz/damage.py --seed N [--seconds T]
                                 [--rows 300] [--head 300] [--cuts 100]
 
 Bits of a random byte are inverted, in bytes that rows hold and in all others, and the file is cut
@@ -79,7 +79,6 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, help="draw cases for so long")
     for kind, count in zip(KINDS, (300, 300, 100), strict=True):
         parser.add_argument(f"--{kind}", type=int, default=count, help="number of cases")
-    parser.add_argument("--old", action="store_true", help="a file of version 1.0")
     args = parser.parse_args()
     most = {kind: 10**9 if args.seconds else getattr(args, kind) for kind in KINDS}
     end = time.monotonic() + args.seconds if args.seconds else float("inf")
@@ -87,7 +86,7 @@ def main() -> int:
     wrong = 0
     print(f"seed {args.seed}", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        damage = Damage(Path(folder), old=args.old)
+        damage = Damage(Path(folder))
         for rows in [(), *((row,) for row in range(damage.campaign.task_count))]:
             damage.answer(rows)  # once, and not in every process
         for number in range(max(most.values())):

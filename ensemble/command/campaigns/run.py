@@ -255,7 +255,7 @@ def _report_end(
 ) -> None:
     """Report what a run has left in its results file."""
     from adhesis.ensemble.campaign.precision import precision_lines
-    from adhesis.ensemble.task.doubt import bound, why_beyond
+    from adhesis.ensemble.task.doubt import why_beyond
 
     failed = f", {summary.failed} failed" if summary.failed else ""
     say(
@@ -269,7 +269,7 @@ def _report_end(
     if summary.doubtful:
         say(
             f"{summary.doubtful} losses are doubtful: by their own account they may be off by "
-            f"more than {100 * bound(campaign.solver.accuracy):g} %, the accuracy asked for "
+            f"more than {100 * campaign.solver.accuracy:g} %, the accuracy asked for "
             f"(adhesis status {path})"
         )
     if summary.beyond_limit:

@@ -27,24 +27,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print what is damaged; returns 0, or 1 if rows are."""
-    from adhesis.ensemble.results.read import NO_CHECKSUMS
     from adhesis.ensemble.results.status import damage_lines, read_status
 
     status = read_status(args.file)
     damaged = status["damaged"]
     if args.json:
-        names = ("file", "tasks", "done", "failed", "not_needed", "pending", "damaged", "checksums")
+        names = ("file", "tasks", "done", "failed", "not_needed", "pending", "damaged")
         print(json.dumps({name: status[name] for name in names}, indent=1, ensure_ascii=False))
         return SOME_DAMAGED if damaged else SOUND
     sound = status["done"] + status["failed"] + status["not_needed"]
     if damaged:
         print(f"{args.file}: {len(damaged)} of {sound + len(damaged)} written rows are damaged")
         print("\n".join(damage_lines(damaged)))
-    elif status["checksums"]:
+    else:
         print(
             f"{args.file} is sound: {sound} rows have their checksum ({status['done']} done, "
             f"{status['failed']} failed), {status['pending']} are pending"
         )
-    else:
-        print(f"{args.file} {NO_CHECKSUMS}; its head, axes and tasks are sound")
     return SOME_DAMAGED if damaged else SOUND

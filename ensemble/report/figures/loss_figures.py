@@ -14,7 +14,7 @@ from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell, stress_scale
 from adhesis.ensemble.aggregate.companions import Companion
 from adhesis.ensemble.aggregate.jumps import BIN_EDGES, BINS_PER_DECADE
-from adhesis.ensemble.aggregate.statistics import Estimate, estimates
+from adhesis.ensemble.interval import Estimate, estimates
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures.style import (
     LINES,

@@ -46,21 +46,20 @@ LINE_OF_BRANCH: dict[str, Any] = {"loading": "-", "unloading": LINES[1]}
 
 @dataclass(frozen=True)
 class Look:
-    """Colour, marker and hatch of one curve."""
+    """Colour and marker of one curve."""
 
     colour: str
     marker: str
-    hatch: str
 
 
 # Okabe & Ito's colours, in an order in which the darkness of neighbours differs.
 LOOKS = (
-    Look("#E69F00", "o", ""),
-    Look("#0072B2", "s", "////"),
-    Look("#000000", "^", "...."),
-    Look("#CC79A7", "D", "xxxx"),
-    Look("#009E73", "v", "\\\\\\\\"),
-    Look("#56B4E9", "P", "++++"),
+    Look("#E69F00", "o"),
+    Look("#0072B2", "s"),
+    Look("#000000", "^"),
+    Look("#CC79A7", "D"),
+    Look("#009E73", "v"),
+    Look("#56B4E9", "P"),
 )
 
 

@@ -1,43 +1,71 @@
-"""The first columns of a table: where a row stands on the axes of the campaign."""
+"""The columns that tables share: places on the axes of the campaign, and means over a cell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.quantities import AXIS_UNITS, shown_unit
-from adhesis.ensemble.report.tables.table import KEY, TableColumn, Value
+from adhesis.ensemble.report.tables.table import TableColumn, Value
 
 
-def key_columns(data: Aggregate) -> tuple[TableColumn, ...]:
-    """Return the columns of what a row is about: H, γ, and every further axis."""
-    return (*KEY, *axis_columns(data.further))
+def _itself(entry: Any) -> Any:
+    return entry
 
 
-def axis_columns(axes: Iterable[Axis]) -> tuple[TableColumn, ...]:
-    """One column for each axis."""
+def key_columns(
+    data: Aggregate, cell_of: Callable[[Any], Cell] = _itself
+) -> tuple[TableColumn, ...]:
+    """Return the columns of what a row is about: H, γ, and every further axis.
+
+    Parameters
+    ----------
+    data : Aggregate
+    cell_of : callable, optional
+        Returns the cell that a row belongs to, if the row is not about the cell itself.
+    """
+    return (
+        TableColumn("hurst", lambda entry: cell_of(entry).hurst, "H"),
+        TableColumn(
+            "work_of_adhesion [J/m^2]", lambda entry: cell_of(entry).work_of_adhesion, "γ (J/m²)"
+        ),
+        *axis_columns(data.further, cell_of),
+    )
+
+
+def axis_columns(
+    axes: Sequence[Axis], cell_of: Callable[[Any], Any] = _itself
+) -> tuple[TableColumn, ...]:
+    """One column for each axis, from the ``others`` of what a row is about."""
     columns = []
     for axis in axes:
         shown, size = shown_unit(axis.name, max(axis.values))
-        si = AXIS_UNITS.get(axis.unit, "")
-        unit = shown or si
+        unit = AXIS_UNITS.get(axis.unit, "")
+        shown = shown or unit
         columns.append(
             TableColumn(
-                f"{axis.name} [{si.replace('²', '^2')}]" if si else axis.name,
-                f"{axis.name} ({unit})" if unit else axis.name,
+                f"{axis.name} [{unit.replace('²', '^2')}]" if unit else axis.name,
+                partial(_at, axis.name, cell_of),
+                f"{axis.name} ({shown})" if shown else axis.name,
                 partial(_in_unit, size),
             )
         )
     return tuple(columns)
 
 
+def _at(name: str, cell_of: Callable[[Any], Any], entry: Any) -> Value:
+    others: dict[str, Value] = dict(cell_of(entry).others)
+    return others[name]
+
+
 def _in_unit(size: float, value: float) -> str:
     return f"{value / size:g}"
 
 
-def key(cell: Cell) -> list[Value]:
-    """Return the place of a cell on the axes, under :func:`key_columns`."""
-    return [cell.hurst, cell.work_of_adhesion, *(value for _, value in cell.others)]
+def estimate(name: str, part: str = "mean") -> Callable[[Cell], float]:
+    """Return what takes a mean over a cell, or another part of its estimate, from the cell."""
+    return lambda cell: float(getattr(cell.estimates[name], part))

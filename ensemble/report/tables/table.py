@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -49,6 +49,8 @@ class TableColumn:
     ----------
     name : str
         In the CSV file, with its unit in brackets unless dimensionless.
+    value : callable
+        Takes its value from what a row is about.
     heading : str
         For people; empty if the column is for the CSV file only.
     show : callable
@@ -60,14 +62,11 @@ class TableColumn:
     """
 
     name: str
+    value: Callable[[Any], Value]
     heading: str = ""
     show: Format = plain
     only_if_any: bool = False
     last: bool = False
-
-
-# What a row is about.
-KEY = (TableColumn("hurst", "H"), TableColumn("work_of_adhesion [J/m^2]", "γ (J/m²)"))
 
 
 @dataclass(frozen=True)
@@ -125,14 +124,10 @@ class Table:
         return [[column.heading for _, column in kept], *body]
 
 
-def make_table(
-    title: str, columns: Sequence[TableColumn], rows: Sequence[Sequence[Value]]
-) -> Table:
-    """Build a table; every row must have as many values as there are columns."""
-    for row in rows:
-        if len(row) != len(columns):
-            raise ValueError(f"a row has {len(row)} values, and there are {len(columns)} columns")
-    return Table(title, tuple(columns), tuple(tuple(row) for row in rows))
+def make_table(title: str, columns: Sequence[TableColumn], of: Iterable[Any]) -> Table:
+    """Build a table with one row for each entry of ``of``, from which the columns take values."""
+    rows = (tuple(column.value(entry) for column in columns) for entry in of)
+    return Table(title, tuple(columns), tuple(rows))
 
 
 def _missing(value: Value) -> bool:

@@ -2,55 +2,43 @@
 
 from __future__ import annotations
 
-from adhesis.ensemble.aggregate.average import Aggregate
-from adhesis.ensemble.aggregate.cells import Cell
-from adhesis.ensemble.report.tables.key import key, key_columns
-from adhesis.ensemble.report.tables.table import Table, TableColumn, Value, make_table, number
+from operator import attrgetter
 
-_PER_CONTACT = ("effective_work_of_approach", "effective_work_of_separation", "loss_per_contact")
+from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.report.tables.key import estimate, key_columns
+from adhesis.ensemble.report.tables.table import Format, Table, TableColumn, make_table, number
 
 
 def works(data: Aggregate) -> Table:
     """One row for each cell; definitions in docs/theory.md, section 8."""
+    milli = number(unit=1e-3)
+
+    def mean(name: str, heading: str) -> TableColumn:
+        return TableColumn(f"{name}_mean [J/m^2]", estimate(name), heading, milli)
+
+    def with_interval(name: str, heading: str, show: Format, unit: str = "") -> list[TableColumn]:
+        return [
+            TableColumn(f"{name}_mean{unit}", estimate(name), heading, show),
+            TableColumn(f"{name}_ci_low{unit}", estimate(name, "low")),
+            TableColumn(f"{name}_ci_high{unit}", estimate(name, "high")),
+        ]
+
+    per_contact = {
+        "effective_work_of_approach": "per contact: approach (mJ/m²)",
+        "effective_work_of_separation": "separation (mJ/m²)",
+        "loss_per_contact": "loss (mJ/m²)",
+    }
     columns = (
         *key_columns(data),
-        TableColumn("n", "n"),
-        TableColumn("work_gained_mean [J/m^2]", "gained on approach (mJ/m²)", number(unit=1e-3)),
-        TableColumn("work_spent_mean [J/m^2]", "spent on separation (mJ/m²)", number(unit=1e-3)),
-        TableColumn("largest_contact_fraction_mean", "largest A/A0", number()),
-        TableColumn("largest_contact_fraction_ci_low"),
-        TableColumn("largest_contact_fraction_ci_high"),
+        TableColumn("n", attrgetter("done"), "n"),
+        mean("work_gained", "gained on approach (mJ/m²)"),
+        mean("work_spent", "spent on separation (mJ/m²)"),
+        *with_interval("largest_contact_fraction", "largest A/A0", number()),
         *(
             column
-            for name, title in zip(
-                _PER_CONTACT,
-                ("per contact: approach (mJ/m²)", "separation (mJ/m²)", "loss (mJ/m²)"),
-                strict=True,
-            )
-            for column in (
-                TableColumn(f"{name}_mean [J/m^2]", title, number(unit=1e-3)),
-                TableColumn(f"{name}_ci_low [J/m^2]"),
-                TableColumn(f"{name}_ci_high [J/m^2]"),
-            )
+            for name, heading in per_contact.items()
+            for column in with_interval(name, heading, milli, " [J/m^2]")
         ),
-        TableColumn("full_contact_energy_mean [J/m^2]", "full contact (mJ/m²)", number(unit=1e-3)),
+        mean("full_contact_energy", "full contact (mJ/m²)"),
     )
-    return make_table("Work of approach and separation", columns, [_row(c) for c in data.cells])
-
-
-def _row(cell: Cell) -> list[Value]:
-    found = cell.estimates
-    contact = found["largest_contact_fraction"]
-    return [
-        *key(cell),
-        cell.done,
-        found["work_gained"].mean,
-        found["work_spent"].mean,
-        *(contact.mean, contact.low, contact.high),
-        *(
-            value
-            for name in _PER_CONTACT
-            for value in (found[name].mean, found[name].low, found[name].high)
-        ),
-        found["full_contact_energy"].mean,
-    ]
+    return make_table("Work of approach and separation", columns, data.cells)
