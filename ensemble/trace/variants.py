@@ -14,6 +14,7 @@ from adhesis.ensemble.lengths import length_text
 from adhesis.ensemble.run.launch import cores
 from adhesis.ensemble.trace.job import Job
 from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.solver.checks import counted
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
@@ -30,6 +31,8 @@ _SECONDS_TO_HINT, _MIN_WAVES = 120.0, 50
 # CPU seconds of a loop by `sharp`, 40 load steps: measured from 320 waves and 6 patches (0.9 s) to
 # 20,000 waves and 8 patches (35 s); right within a factor of about three.
 _SECONDS, _WAVES_POWER, _MANY_PATCHES = 0.7e-3, 0.85, 20.0
+# Loop without the crests and troughs that stand far out of all others.
+WITHOUT_FEATURES = "without single features"
 _START = 2.0  # seconds for a process to start
 
 
@@ -227,6 +230,13 @@ def _doubts(prepared: Prepared) -> list[Run]:
     if prepared.degree > 1 and not prepared.form_is_sure:
         less = prepared.degree - 1
         variant(f"degree {less}", "form", "one degree less off", degree=less)
+    if prepared.features:
+        variant(
+            WITHOUT_FEATURES,
+            "single features",
+            f"{single_features_text(prepared.features)} bridged by straight lines",
+            without_features=True,
+        )
     if prepared.spectrum.noise > 0:
         for seed in (1, 2) if factor == 1 else (1,):
             runs.append(

@@ -339,6 +339,91 @@ def test_a_loss_that_is_hardly_known_names_its_largest_doubt(spoiled_answer: Ans
     )
 
 
+def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer: Answer) -> None:
+    losses = {"answer": 1.0, "cut-off × 4": 3.73, "cut-off × 1.41": 1.1, "noise 1": 0.98}
+    found = with_losses(spoiled_answer, losses, {"step": 1e-6})
+    found = dataclasses.replace(found, loss=answers._quantity(found, "loss"), warnings=("doubt",))
+    text = (
+        "most by “cut-off × 4” (): × 3.73, beyond the interval; of the other decisions by "
+        "“noise 1” (): × 0.98"
+    )
+    lines = summary(found).splitlines()
+    assert lines[3] == f"changes     {text}"
+    page = page_text(found, [])
+    assert page.index(f"**What changes the loss:** {text}.") < page.index("**Warning:** doubt")
+    assert answers.document(found)["largest_changes"][0] == {"name": "cut-off × 4", "factor": 3.73}
+    nothing = with_losses(spoiled_answer, losses | {"noise 1": 0.0}, {"step": 1e-6})
+    (change,) = nothing.largest_changes
+    assert (change.run.name, change.factor) == ("noise 1", 0.0)
+
+
+def test_loops_that_failed_are_named_last_in_one_warning(spoiled_answer: Answer) -> None:
+    losses = {"answer": 1.0, "cut-off × 1.41": 1.5, "noise 1": 1.0, "noise 2": 1.0}
+    found = with_losses(spoiled_answer, losses, {"step": 1e-6})
+    results = found.results | {"noise 1": "Reason: a", "noise 2": "Reason: b"}
+    found = dataclasses.replace(found, results=results)
+    *others, last = answers._warnings(found, answers._quantity(found, "loss"))
+    assert len(others) == 2
+    assert "“noise 1” did not end (Reason: a)" in last
+    assert "“noise 2” did not end (Reason: b)" in last
+
+
+def test_a_crest_that_carries_all_contact_is_warned_of_and_left_out_once(tmp_path: Path) -> None:
+    """A ridge of 9 µm on a roughness of 1 µm, pressed to half its height."""
+    x = 1e-6 * np.arange(1000)
+    z = PROFILE.at(x) + 9e-6 * np.exp(-(((x - 0.64e-3) / 12e-6) ** 2))
+    trace = prepare_trace(Trace(z, 1e-6, "t.txt"))
+    cycle = make_cycle(HALF_SPACE, 0.001, 0.5, 4, "auto", 1e-2)
+    plan = make_plan(trace, cycle, quick=True, processes=0)
+    kept = {"answer", "without single features"}
+    plan = dataclasses.replace(
+        plan,
+        runs=tuple(run for run in plan.runs if run.name in kept),
+        jobs=tuple(job for job in plan.jobs if job.name in kept),
+    )
+    answer = run_plan(trace, cycle, plan)
+    assert answer.warnings[0].startswith("a single crest at 640 µm stands")
+    assert answer.warnings[1].startswith("one crest at 640 µm carries all contact")
+    (change,) = answer.largest_changes
+    assert change.run.description == "crest at 640 µm bridged by straight lines"
+    assert change.factor > 5
+    # The loop without it is that of the trace from which it is excluded.
+    (feature,) = trace.features
+    clean = prepare_trace(Trace(z, 1e-6, "t.txt"), exclude=[(feature.begin, feature.end)])
+    np.testing.assert_allclose(
+        clean.profile(cut_off=trace.cut_off).coefficients,
+        trace.profile(without_features=True).coefficients,
+        atol=1e-15,
+    )
+    path = answer.page(tmp_path)
+    text = path.with_suffix(".md").read_text(encoding="utf-8")
+    assert "Shaded in orange: crest at 640 µm." in text
+    document = json.loads(path.with_suffix(".json").read_text())
+    assert document["single_features"][0]["position"] == pytest.approx(640e-6, abs=2e-6)
+
+
+def test_the_command_excludes_ranges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "t.txt"
+    np.savetxt(path, 1e6 * np.column_stack([X, PROFILE.at(X)]))
+    words = ["trace", str(path), *CONTACT, "--unit", "um", "--plan"]
+    assert main([*words, "--exclude", "0.2mm:230um", "--exclude", "900um:2mm"]) == 0
+    said = capsys.readouterr().out
+    assert "excluded    200 µm to 230 µm, as given: 13 heights treated as drop-outs" in said
+    assert "excluded    900 µm to 2 mm, as given: 40 heights" in said
+    assert "ends        cut off where heights are missing: 40" in said
+    for text, reported in (
+        ("1mm", "--exclude is '1mm': it must be two positions with a colon between them"),
+        ("0.1:0.2:0.3mm", "it must be two positions with a colon"),
+        ("1,2mm:1,3mm", "--exclude is '1,2mm:1,3mm': a position of it is '1,2mm': it must be a"),
+        ("200:300um", "a position of it is 200, which would be 200 m: give its unit"),
+        ("0.3mm:0.2mm", "--exclude holds the range from 300 µm to 200 µm: a range must begin"),
+    ):
+        assert main([*words, "--exclude", text]) == 2
+        assert reported in capsys.readouterr().err
+    assert main(["loop", "--hurst", "0.8", "--exclude", "1mm:2mm"]) == 2
+    assert "--exclude belongs to --trace" in capsys.readouterr().err
+
+
 def test_the_summary_states_the_scope(document: dict[str, Any], folder: Path) -> None:
     page = (folder / "trace.md").read_text(encoding="utf-8")
     (scope,) = re.findall(r"^Scope: (.*)$", page, re.M)
