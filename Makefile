@@ -1,6 +1,6 @@
 # make help lists what there is. tools/setup.sh does nothing when nothing has changed.
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-test setup-slurm run test test-kills fuzz lint bench docs figures-of-docs check-package clean lock
+.PHONY: help setup setup-test setup-slurm run test test-kills fuzz lint study bench docs figures-of-docs check-package clean lock
 SHELL := /bin/bash
 # Byte code is kept, or each process compiles all that it imports: a second or two of CPU.
 unexport PYTHONDONTWRITEBYTECODE
@@ -41,6 +41,10 @@ test-kills: setup-test  ## 20 kills each of a worker, of rank 0 and of the whole
 
 fuzz: setup-test  ## new examples from a seed that is printed, for FOR=600 seconds
 	@$(bin)/python tools/fuzz.py --seconds $(FOR)
+
+study: setup-test  ## tables and figures of the study from its data, and its tests (minutes)
+	$(bin)/python -m study page
+	$(bin)/python -m pytest study
 
 bench: setup  ## speed against error of each method
 	$(bin)/adhesis bench

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import os
@@ -17,10 +16,12 @@ from typing import TYPE_CHECKING, Any
 from adhesis.solver import checks
 
 if TYPE_CHECKING:
+    from adhesis.ensemble.campaign.tables import Campaign as Tables
     from adhesis.ensemble.report.opened import CampaignResults
     from adhesis.ensemble.run.price import Price
 
 _RANKS = checks.Bounds(1, 100_000, whole=True)
+_DEEPEST = 8  # lists in lists; no key has more than two
 _PILOT = checks.Bounds(0.0, 1e6, without_low=True, unit="s")
 
 
@@ -36,7 +37,8 @@ class Campaign:
     Attributes
     ----------
     text : str
-        The campaign as TOML; the results file keeps it.
+        The campaign as TOML; the results file keeps it. Read-only: another campaign is another
+        object.
 
     Raises
     ------
@@ -63,20 +65,29 @@ class Campaign:
     """
 
     def __init__(self, source: Mapping[str, Any] | str | os.PathLike[str]) -> None:
-        from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
+        from adhesis.ensemble.campaign.file import load_campaign, read_campaign
 
         if isinstance(source, Mapping):
-            self.tables = parse_campaign(_toml(source))
+            self._tables = read_campaign(_toml(source))
         elif isinstance(source, str) and "\n" in source:
-            self.tables = parse_campaign(source)
+            self._tables = read_campaign(source)
         elif isinstance(source, str | os.PathLike):
-            self.tables = load_campaign(Path(source))
+            self._tables = load_campaign(checks.path("source", source))
         else:
             raise TypeError(
                 f"source is a {type(source).__name__}: it must be a dictionary of tables, TOML "
                 "text or the path of a campaign file"
             )
-        self.text: str = self.tables.text
+
+    @property
+    def tables(self) -> Tables:
+        """The checked tables, by name; what ``text`` means."""
+        return self._tables
+
+    @property
+    def text(self) -> str:
+        """The campaign as TOML."""
+        return self._tables.text
 
     def __repr__(self) -> str:
         cells, tasks = len(self.tables.cells), self.tables.task_count
@@ -119,11 +130,15 @@ class Campaign:
         """
         path = None if out is None else checks.path("out", out)
         seconds = checks.real("seconds", seconds, _PILOT)
+        from adhesis.ensemble.results.layout import check_results_file
+
+        if path is not None:
+            check_results_file("out", path)
         from adhesis.ensemble.run.price import price
         from adhesis.ensemble.task.compute import methods_of
         from adhesis.ensemble.warm import warm_up
 
-        warm_up(methods_of(self.tables, self.tables.tasks()), lambda text: None)
+        warm_up(methods_of(self.tables, self.tables.tasks().of_cells()), lambda text: None)
         return price(self.tables, path, seconds=seconds)
 
     def run(
@@ -134,6 +149,8 @@ class Campaign:
         progress: bool = False,
     ) -> CampaignResults:
         """Compute what is missing in the results file, and open it.
+
+        It runs in any thread; signals stop it in order in the main thread alone.
 
         Parameters
         ----------
@@ -167,10 +184,9 @@ class Campaign:
         path = checks.path("out", out)
         ranks = checks.whole("ranks", ranks, _RANKS)
         checks.flag("progress", progress)
-        from adhesis.ensemble.results.layout import check_new_file
+        from adhesis.ensemble.results.layout import check_results_file
 
-        if not path.exists():
-            check_new_file("out", path)
+        check_results_file("out", path)
         from adhesis.ensemble.errors import InputError
         from adhesis.ensemble.run import launch
 
@@ -195,9 +211,10 @@ class Campaign:
         from adhesis.ensemble.reporter import log
         from adhesis.ensemble.run.session import Options, run_campaign
 
-        with contextlib.nullcontext() if progress else contextlib.redirect_stderr(io.StringIO()):
-            options = Options(processes=processes)
-            summary = run_campaign(self.tables, path, options=options, say=log)
+        say = log if progress else lambda text: None
+        stream = None if progress else io.StringIO()  # stderr is that of all threads
+        options = Options(processes=processes)
+        summary = run_campaign(self.tables, path, options=options, say=say, stream=stream)
         if summary.stopped:
             raise RuntimeError(
                 f"the campaign stopped early: {summary.stopped}; {summary.pending} of "
@@ -213,18 +230,19 @@ class Campaign:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "campaign.toml")
             file.write_text(self.text, encoding="utf-8")
-            code, sentence = launch.run_ranks(
+            end = launch.run_ranks(
                 mpirun,
                 ranks,
                 ["run", str(file), "--out", str(path.absolute())],
                 output=log if progress else lambda line: None,
             )
-        if code == BAD_INPUT:
-            raise InputError(sentence.removeprefix("adhesis run: ") or "the ranks refused the run")
-        if code not in (DONE, SOME_FAILED):
+        sentence = "\n".join((*end.words, end.sentence.removeprefix("adhesis run: ")))
+        if end.code == BAD_INPUT:
+            raise InputError(sentence or "the ranks refused the run")
+        if end.code not in (DONE, SOME_FAILED):
             raise RuntimeError(
                 sentence
-                or f"the ranks ended with exit code {code}; what was done is kept in {path}"
+                or f"the ranks ended with exit code {end.code}; what was done is kept in {path}"
             )
 
 
@@ -242,14 +260,21 @@ def _warn_of_failures(path: Path) -> None:
 
 
 def _toml(source: Mapping[str, Any]) -> str:
-    """Return a dictionary of tables as TOML; what it cannot hold becomes a text that is refused."""
+    """Return a dictionary of tables as TOML; what it cannot hold becomes a text that is refused.
+
+    Raises
+    ------
+    InputError
+        If lists are nested deeper than those of any key, as in a list that contains itself.
+    """
     lines: list[str] = []
     for name, table in source.items():
         if not isinstance(table, Mapping):
-            lines.insert(0, f"{_key(name)} = {_value(table)}")
+            lines.insert(0, f"{_key(name)} = {_value(str(name), table)}")
             continue
         lines.append(f"[{_key(name)}]")
-        lines += [f"{_key(key)} = {_value(value)}" for key, value in table.items()]
+        for key, value in table.items():
+            lines.append(f"{_key(key)} = {_value(f'[{name}] {key}', value)}")
     return "\n".join(lines) + "\n"
 
 
@@ -258,13 +283,22 @@ def _key(name: object) -> str:
     return text if re.fullmatch(r"[\w-]+", text, re.ASCII) else json.dumps(text)
 
 
-def _value(value: Any) -> str:
+def _value(where: str, value: Any, depth: int = 0) -> str:
     if hasattr(value, "tolist"):  # numbers and arrays of NumPy
         value = value.tolist()
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, int | float):
-        return repr(value)
+    if isinstance(value, int):
+        return int.__repr__(value)  # a class of a user's own may print anything
+    if isinstance(value, float):
+        return float.__repr__(value)
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_value, value))}]"
+        if depth > _DEEPEST:
+            from adhesis.ensemble.errors import InputError
+
+            raise InputError(
+                f"campaign: {where} is {checks.shown(value)}: it must be a value or a list of "
+                "values, and no list in which lists are nested so deep"
+            )
+        return f"[{', '.join(_value(where, entry, depth + 1) for entry in value)}]"
     return json.dumps(str(value), ensure_ascii=False)

@@ -38,7 +38,9 @@ def loop_of(problem: Problem, share: float) -> LoopResult:
 
 def main() -> int:
     """Compare, and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = argparse.ArgumentParser(
+        description=__doc__.splitlines()[0] if __doc__ else None, allow_abbrev=False
+    )
     parser.add_argument("--seeds", type=int, default=30)
     seeds = parser.parse_args().seeds
     different = unflagged = loops = 0

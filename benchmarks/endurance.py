@@ -252,22 +252,24 @@ def real(options: argparse.Namespace) -> None:
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    one = commands.add_parser("empty", help="tasks that do nothing")
+    one = commands.add_parser("empty", help="tasks that do nothing", allow_abbrev=False)
     one.add_argument("--campaign", type=Path, default=ROOT / "jobs" / "paper.toml")
     one.add_argument("--tasks", type=int, default=10_000)
     one.add_argument("--workers", type=int, default=2)
     one.add_argument("--seconds", type=float, default=2.0, help="of a task for the idle master")
     one.add_argument("--dir", type=Path, help="folder for the results files")
     one.set_defaults(do=empty)
-    two = commands.add_parser("campaign", help="real tasks")
+    two = commands.add_parser("campaign", help="real tasks", allow_abbrev=False)
     two.add_argument("campaign", type=Path)
     two.add_argument("--workers", type=int, default=2)
     two.add_argument("--out", type=Path)
     two.set_defaults(do=real)
-    one_rank = commands.add_parser("rank")  # what mpirun starts
+    one_rank = commands.add_parser("rank", allow_abbrev=False)  # what mpirun starts
     one_rank.add_argument("campaign", type=Path)
     one_rank.add_argument("--out", type=Path, required=True)
     one_rank.add_argument("--pretend", type=float)

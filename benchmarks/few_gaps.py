@@ -24,7 +24,7 @@ from adhesis.solver.sharp.method import SharpMethod
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--work-of-adhesion", type=float, nargs="+", default=[0.07, 0.04, 0.01])
     parser.add_argument("--hurst", type=float, default=0.8)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])

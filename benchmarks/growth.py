@@ -64,7 +64,7 @@ def measure(gamma: float, ratio: float, periods: float, given: argparse.Namespac
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--work-of-adhesion", type=float, nargs="+", default=[0.04, 0.01, 0.0025])
     parser.add_argument("--ratio", type=float, nargs="+", default=[100])
     parser.add_argument("--periods", type=float, nargs="+", default=[1.0])

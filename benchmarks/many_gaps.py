@@ -60,7 +60,7 @@ def _dense_step(of: Solution) -> Array:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--gaps", type=int, nargs="+", default=[30, 100, 300, 1000, 3000])
     parser.add_argument("--contact", type=float, default=0.3)
     parser.add_argument("--tolerance", type=float, default=1e-5)

@@ -28,7 +28,7 @@ def wander(seed: int, work_of_adhesion: float) -> PathResult:
 
 def main() -> None:
     """Print how many minor loops close, and how much they lose."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--profiles", type=int, default=40)
     count = parser.parse_args().profiles
     for gamma in (0.005, 0.02):

@@ -57,7 +57,7 @@ SCENES = (
 
 def main() -> None:
     """Run the loops and print a row for each scene."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scenes", type=int, default=len(SCENES))
     parser.add_argument("--nodes-per-wave", type=int, nargs="+", default=[64, 256], help="of grid")

@@ -133,7 +133,7 @@ def shared(profiles: int, count: int) -> None:
 
 def main() -> None:
     """Measure."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--profiles", type=int, default=3)
     parser.add_argument("--turns", type=int, default=len(TURNS))
     args = parser.parse_args()

@@ -6,7 +6,7 @@
 
 Losses are made up, of known mean 1. The first table is of campaigns with ``[stop]``: each cell gets
 batches until the rule has enough, and the interval at that moment either holds 1 or does not. The
-second is the same for the losses of the study (``docs/study/loops.csv``): realisations are drawn,
+second is the same for the losses of the study (``study/data/loops.csv``): realisations are drawn,
 with replacement, from those of one of its large cells, whose mean therefore is the true one. It has
 W~ steered and W~ asked for, and then the loss in J/m² steered and W~ asked for. The third is of so
 many realisations and no rule, Student's interval beside the one that is used.
@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from adhesis.ensemble.campaign.precision import enough, looks, precision
 from adhesis.ensemble.interval import interval
 
-STUDY = Path(__file__).resolve().parent.parent / "docs" / "study" / "loops.csv"
+STUDY = Path(__file__).resolve().parent.parent / "study" / "data" / "loops.csv"
 FEWEST_OF_STUDY = 120
 
 Array = NDArray[np.float64]
@@ -179,7 +179,7 @@ def print_study(campaigns: int, batch: int, most: int) -> None:
 
 def main() -> None:
     """Print one of the three tables."""
-    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0], allow_abbrev=False)
     parser.add_argument("--campaigns", type=int, default=1000)
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--most", type=int, default=1000)

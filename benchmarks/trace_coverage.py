@@ -157,7 +157,7 @@ def judged(measured: Case, folder: Path, processes: int = 0) -> dict[str, Any]:
 
 def main() -> None:
     """Run the cases, print a line each and the count."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--waves", type=int, default=100, help="most waves a period")

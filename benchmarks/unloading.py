@@ -59,7 +59,7 @@ def row(name: str, states: list[ContactState], seconds: float) -> str:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--work-of-adhesion", type=float, default=0.0006)
     parser.add_argument("--waves", type=int, default=1020, help="lowest harmonic")
     parser.add_argument("--ratio", type=float, default=4.0, help="of highest to lowest harmonic")

@@ -60,7 +60,7 @@ def _told(drops: list[float]) -> str:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--gamma", type=float, nargs="+", default=[0.01, 0.005, 0.0025])
     parser.add_argument("--many", type=int, nargs="+", default=[8, 30, 30])
     parser.add_argument("--seed", type=int, default=1)

@@ -26,7 +26,6 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["README.md", "paper/README.md"]
 language = "en"
 smartquotes = False  # options begin with two hyphens
 
@@ -77,8 +76,9 @@ def plain(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[
 
 
 def start_page(app: Any, name: str, source: list[str]) -> None:
-    """Lead to the start page, which holds the README, where a page links to that."""
+    """Lead to the start page, which holds the README, and hand out files beside the pages."""
     source[0] = source[0].replace("](../README.md", "](index.md")
+    source[0] = source[0].replace("](../study/", "](path:../study/")
 
 
 def public_name(app: Any, env: Any, node: Any, content: Any) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
@@ -49,6 +51,35 @@ class RankError(InputError):
 
 class WriteError(_Printable):
     """An output could not be written: the disk is full, say. What was written before is sound."""
+
+
+_LACKS = (errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EAGAIN)
+# How libraries put it: Python's threads, and the loader of shared libraries.
+_WORDS = ("can't start new thread", "failed to map segment", *(map(os.strerror, _LACKS)))
+
+
+def lack(error: BaseException) -> str:
+    """Return a sentence on what the system did not grant, if an error is of that kind; or nothing.
+
+    Memory, threads, processes and open files are limited by ``ulimit``, a batch system or a
+    container.
+    """
+    seen: list[BaseException] = []
+    cause: BaseException | None = error
+    while cause is not None and cause not in seen:
+        seen.append(cause)
+        text = str(cause)
+        numbered = isinstance(cause, OSError) and cause.errno in _LACKS
+        worded = isinstance(cause, (OSError, RuntimeError, ImportError))
+        found = [words for words in _WORDS if words in text]
+        if isinstance(cause, MemoryError) or numbered or (worded and found):
+            what = found[0] if found else "Cannot allocate memory"
+            return (
+                f"the system gave too few resources ({what}): raise the limit of memory, processes "
+                "or open files (ulimit -a lists them)"
+            )
+        cause = cause.__cause__ or cause.__context__
+    return ""
 
 
 _of_a_command: ContextVar[bool] = ContextVar("of_a_command", default=False)

@@ -1,12 +1,14 @@
 """Output files of a command: checked before any work, written whole or not at all.
 
 A command lists its outputs, each with the option that names it, and has them checked before it
-computes. A regular file is written beside its place and renamed; a device or pipe (/dev/stdout) is
-written in place. A failure while writing does not keep the other outputs from being written.
+computes. A regular file is written beside its place and renamed. A stream of the process
+(/dev/stdout) and a character device (/dev/null) are written in place; a pipe is refused, as it
+would wait for a reader. A failure while writing does not keep the other outputs from being written.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -20,12 +22,14 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.regular_file import irregular
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # Other names of an open descriptor of this process; to rename a file over them would destroy them.
 _DESCRIPTOR = re.compile(r"/dev/(?:(stdin|stdout|stderr)|fd/(\d+))|/proc/self/fd/(\d+)")
+_MOST_LINKS = 40  # of a chain, as of Linux
 _STANDARD = {"stdin": 0, "stdout": 1, "stderr": 2}
 
 
@@ -33,9 +37,36 @@ def target_of(path: Path | str) -> Path:
     """Return the file that a path leads to: that of a symbolic link, or the path itself.
 
     Other paths stay as they were given, for messages.
+
+    Raises
+    ------
+    InputError
+        If the link leads in a circle, or another user has put it into a folder in which all may
+        write: it could lead to any file of this user.
     """
     path = Path(path)
-    return Path(os.path.realpath(path)) if path.is_symlink() else path
+    link = path
+    for _ in range(_MOST_LINKS):
+        try:
+            target = os.readlink(link)
+        except OSError:  # no link, or none at all
+            break
+        _check_link(path, link)
+        link = link.parent / target
+    else:
+        raise InputError(f"{path} is a link that leads in a circle: give another path")
+    return Path(os.path.realpath(path)) if link != path else path
+
+
+def _check_link(path: Path, link: Path) -> None:
+    """Refuse to follow a link as Linux does (protected_symlinks), which renaming would evade."""
+    folder, owner = os.stat(link.parent), os.lstat(link).st_uid
+    shared = folder.st_mode & stat.S_ISVTX and folder.st_mode & stat.S_IWOTH
+    if shared and owner not in (os.geteuid(), folder.st_uid):
+        raise InputError(
+            f"{path} is a link that another user has put into {link.parent}, where all may write: "
+            "it is not followed, so give another path"
+        )
 
 
 # ---------------------------------------------------------------------- before the work
@@ -95,6 +126,7 @@ def check_output_folder(
         One sentence with the option and the path.
     """
     with _refusing(option, folder):
+        target_of(folder)  # not through a link of another user
         place = Path(os.path.abspath(folder))
         while not os.path.lexists(place) and place.parent != place:
             _check_name(place)
@@ -132,11 +164,13 @@ def _check_file(option: str, path: Path) -> None:
     target = target_of(path)
     if target.is_dir():
         raise InputError(f"{option} is {path}: it is a directory, not a file to write")
+    if target.exists() and not (target.is_file() or target.is_char_device()):
+        kind = irregular(target.stat().st_mode)
+        raise InputError(f"{option} is {path}: it is {kind}, not a file to write")
     if not target.parent.is_dir():
         raise InputError(f"{option} is {path}: there is no directory {target.parent}")
     if _in_place(target):
-        if stat.S_ISCHR(target.stat().st_mode):
-            target.open("ab").close()
+        _open_device(target).close()
         return
     if target.exists() and not os.access(target, os.W_OK):
         raise InputError(f"{option} is {path}: the file is write-protected")
@@ -206,7 +240,7 @@ class Writing:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
-    """Open a file to write that appears whole or not at all; devices and pipes in place.
+    """Open a file to write that appears whole or not at all; streams and devices in place.
 
     A link is followed: the file that it points to is replaced.
 
@@ -224,7 +258,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         return
     target = target_of(path)
     if _in_place(target):
-        with target.open("wb") as file:
+        with _open_device(target) as file:
             yield file
         return
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=".writing-")
@@ -250,8 +284,8 @@ def write_netcdf(path: Path, dataset: xr.Dataset) -> None:
     It is made in memory: HDF5 reports a full disk when the file is closed, and ends the process
     with a segmentation fault where the library closes it at exit.
     """
-    data = dataset.to_netcdf(None, engine="h5netcdf")
-    with whole_file(path) as stream:
+    # Released at once: the view of a stream that an error keeps alive is reported at the exit.
+    with memoryview(dataset.to_netcdf(None, engine="h5netcdf")) as data, whole_file(path) as stream:
         stream.write(data)
 
 
@@ -283,8 +317,21 @@ def _umask() -> int:
 
 
 def _in_place(target: Path) -> bool:
-    """Whether a path is a device or pipe, which is written in place and not renamed over."""
+    """Whether a path is no file, which is written in place, if at all, and not renamed over."""
     return target.exists() and not target.is_file()
+
+
+def _open_device(target: Path) -> IO[bytes]:
+    """Open a character device to write (OSError, also for whatever else has taken its place)."""
+    descriptor = os.open(target, os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+    try:
+        if not stat.S_ISCHR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "it is neither a file nor a character device")
+        os.set_blocking(descriptor, True)
+        return os.fdopen(descriptor, "wb")
+    except BaseException:
+        os.close(descriptor)
+        raise
 
 
 def _descriptor(path: Path) -> int | None:

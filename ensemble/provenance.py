@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from adhesis.ensemble.quantities import units_of
+from adhesis.ensemble.regular_file import open_regular
 from adhesis.ensemble.versions import software
 
 
@@ -17,7 +18,7 @@ def input_record(path: Path | None) -> dict[str, Any] | None:
     """Return name, size and checksum of an input file; None for none."""
     if path is None:
         return None
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         checksum = hashlib.file_digest(file, "sha256").hexdigest()
         return {"file": str(path), "bytes": file.tell(), "sha256": checksum}
 

@@ -19,8 +19,7 @@ _NAMES = {
     "m³": "power floor",
     "rad/m": "wave_number",
     "Pa": "young strength preload modulus mean_stress pull_off_stress stress_change max_stress "
-    "tension "
-    "largest_interior_tension",
+    "tension largest_interior_tension turning_stress",
     "Pa/m": "stiffness",
     "J/m": "energy elastic_energy adhesion_energy potential hold_energy",
     "J/m²": "work_of_adhesion loss loss_from_drops loss_error energy_drop at_stake energy_at_stake "
@@ -120,10 +119,17 @@ def bytes_text(size: float) -> str:
     return f"{size / 1e6:.0f} MB" if size >= 1e7 else f"{size / 1e3:.0f} kB"
 
 
-def with_error(value: float, error: float) -> str:
+def with_error(value: float, error: float, least: float = -math.inf, most: float = math.inf) -> str:
     """Return "9700 ± 800" or "0.0351 ± 0.0012".
 
     The last digit is the first one of the error, or the second where the first is 1 or 2.
+
+    Parameters
+    ----------
+    value, error : float
+    least, most : float
+        Bounds of the quantity. Where the error reaches beyond them, the ends of the interval are
+        given instead: "0.995, from 0.975 to 1".
     """
     if not 0 < error < math.inf:
         return f"{value:.4g} ± {error:g}"
@@ -132,6 +138,10 @@ def with_error(value: float, error: float) -> str:
     if places > _MOST_PLACES:
         return f"{value:.4g} ± {error:.2g}"
     shown = max(places, 0)
+    low, high = max(value - error, least), min(value + error, most)
+    if least <= value <= most and high - low < 2 * error * (1 - 1e-9):
+        middle, *ends = (f"{round(part, places):.{shown}f}" for part in (value, low, high))
+        return f"{middle}, from {ends[0]} to {ends[1]}"
     return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f}"
 
 

@@ -45,12 +45,6 @@ def stress_with_unit(text: str) -> float:
     return number_with_unit(text, PASCALS, _unit_or_none, "a stress, as in 2e4 (Pa) or 20kPa")
 
 
-def stress_text(pascals: float, digits: int = 3) -> str:
-    """Format a stress in a unit of its size: "20 kPa"."""
-    unit = stress_unit(pascals)
-    return f"{pascals / PASCALS[unit]:.{digits}g} {unit}"
-
-
 def stress_unit(pascals: float) -> str:
     """Return the largest unit that is not larger than a stress; Pa for less."""
     return next((u for u in reversed(PASCALS) if abs(pascals) >= PASCALS[u]), "Pa")

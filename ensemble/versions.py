@@ -50,12 +50,21 @@ def installed() -> dict[str, str]:
     }
 
 
+def first_lines(text: str, count: int = 4) -> str:
+    """Join the first lines of a message that hold letters or digits, as a launcher's page."""
+    return _joined(text, slice(count))
+
+
 def last_lines(text: str, count: int = 2) -> str:
     """Join the last lines of a message that hold letters or digits."""
+    return _joined(text, slice(-count, None))
+
+
+def _joined(text: str, chosen: slice) -> str:
     lines = [" ".join(line.split()) for line in text.splitlines()]
     # A launcher's message ends with rulers and empty lines.
     filled = [line for line in lines if any(c.isalnum() for c in line)]
-    return " / ".join(filled[-count:])[:300] or "no message"
+    return " / ".join(filled[chosen])[:300] or "no message"
 
 
 def commit() -> str:

@@ -44,7 +44,7 @@ def write_made_up_measurement(path: Path, seed: int = 7) -> None:
 
 def main() -> None:
     """Read, prepare, answer, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("trace", nargs="?", type=Path, help="text or instrument's file")
     parser.add_argument("--to", type=Path, default=Path("."), metavar="DIR", help="for the files")
     args = parser.parse_args()

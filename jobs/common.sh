@@ -15,9 +15,10 @@ find_adhesis() {
     fi
 }
 
-# read_arguments CAMPAIGN.toml [FILE.h5] [OPTION…]: sets campaign, name, file, part and options
+# read_arguments CAMPAIGN.toml [FILE.h5] [OPTION…]: sets campaign, name, file, part, patience
+# and options
 read_arguments() {
-    campaign=$1 name=$(basename "$1" .toml) file='' part=''
+    campaign=$(path_of "$1") name=$(basename -- "$1" .toml) file='' part='' patience=10
     shift
     if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then
         file=$1
@@ -28,6 +29,8 @@ read_arguments() {
         case $1 in
             --part) part=${2:-} ;;
             --part=*) part=${1#*=} ;;
+            --patience) patience=${2:-} ;;
+            --patience=*) patience=${1#*=} ;;
             --out | --out=*)
                 echo "--out is not an option of this script: give FILE.h5 after CAMPAIGN.toml" >&2
                 exit 2
@@ -35,8 +38,12 @@ read_arguments() {
         esac
         shift
     done
-    file=${file:-$name${part:+.${part/\//-of-}}.h5}
+    file=$(path_of "${file:-$name${part:+.${part/\//-of-}}.h5}")
+    if [[ ! $patience =~ ^[0-9]+(\.[0-9]+)?$ ]]; then patience=10; fi # the run reports it
 }
+
+# path_of NAME: the same file, by a name that is no option
+path_of() { case $1 in -*) printf %s "./$1" ;; *) printf %s "$1" ;; esac; }
 
 # omit_redo: for a job that was restarted. Its first start has marked the tasks that --redo selects
 # as pending in the results file; marking them again would compute them anew at each restart.
@@ -121,40 +128,143 @@ script_of() {
     echo
 }
 
+# Staging. One job at a time holds FILE.h5.staging, from before it copies FILE.h5 to its folder below
+# $STAGING until after it has copied it back; the launcher inherits the lock, which lasts as long as
+# either of them. A file is copied back only when nobody writes to it, and removed only after that.
+
 # stage_in: sets results to where the run writes: the results file, or its copy below $STAGING
 stage_in() {
     results=$file
     if [ -z "${STAGING:-}" ]; then return 0; fi
-    target=$(readlink -f "$file")
+    if ! target=$(readlink -f "$file") || [ -z "$target" ]; then
+        refuse 2 "$file cannot be written: there is no folder $(dirname "$file")"
+    fi
+    hold "$target.staging"
+    if [ -e "$target" ] && [ ! -f "$target" ]; then refuse 2 "$file is no ordinary file"; fi
+    if is_written "$target"; then
+        refuse 2 "$file is being written by another run: wait until it has ended"
+    fi
     stage=$STAGING/adhesis-$(id -u)-$(printf %s "$target" | cksum | cut -d ' ' -f 1)
-    results=$stage/$(basename "$file")
-    if ! mkdir -p "$stage"; then exit 74; fi
+    own_folder
+    results=$stage/$(basename "$file") found=yes
     if [ ! -e "$results" ]; then
-        version >"$stage/version"
-        if [ -e "$target" ] && ! { cp "$target" "$results.part" && mv "$results.part" "$results"; }; then
-            echo "$file could not be copied to $results" >&2
-            exit 74
+        found=''
+        if ! version >"$stage/version"; then refuse 74 "$stage/version could not be written"; fi
+        if [ -e "$target" ] && ! copy "$target" "$results"; then
+            refuse 74 "$file could not be copied to $results"
         fi
-    elif [ "$(version)" != "$(cat "$stage/version")" ]; then # left by a job that was killed
-        echo "$results holds results that were not copied back, and $file has changed since:" \
-            "join them (adhesis merge $results --out $file) and remove $stage" >&2
-        exit 2
+    elif is_changed && ! cmp -s "$results" "$target"; then # left by a job that was killed
+        refuse 2 "$results holds results that were not copied back, and $file has changed since:" \
+            "join them (adhesis merge $results --out $file) and remove $stage"
+    elif ! version >"$stage/version"; then
+        refuse 74 "$stage/version could not be written"
     fi
 }
-version() { stat -c '%Y %s %i' "$target" 2>/dev/null || echo none; }
 
 # stage_out: copies the results back whole; if that fails they stay where they are, and code is 74
 stage_out() {
-    if [ -z "${STAGING:-}" ] || [ ! -e "$results" ]; then return 0; fi
-    if [ "$(version)" != "$(cat "$stage/version")" ]; then
-        note "$file was changed by somebody else; the results of this job stay in $results"
-    elif cp "$results" "$target.part" && mv "$target.part" "$target"; then
-        rm -rf "$stage"
-        return 0
+    if [ -z "${STAGING:-}" ]; then return 0; fi
+    if [ "$code" = 2 ] && [ -n "$found" ]; then
+        note "the run did nothing; $results stays as it was" # ranks of an earlier job may write to it
+    elif is_written "$results"; then
+        note "$results is being written by another run: it stays where it is"
+        code=74
+    elif [ ! -e "$results" ] || put_back; then
+        rm -f "$results" "$results".{copy,part,lock} "$stage/version"
+        rmdir "$stage" 2>/dev/null || true # another campaign may have a name of the same checksum
     else
-        note "$results could not be copied back to $file: it stays where it is"
+        code=74
     fi
-    code=74
+    release
+}
+
+# put_back: replaces the results file by its copy, unless somebody else has changed it
+put_back() {
+    if cmp -s "$results" "$target"; then return 0; fi
+    if ! copy_beside "$results" "$target"; then
+        note "$results could not be copied back to $file: it stays where it is"
+    elif is_changed || is_written "$target"; then
+        note "$file was changed by somebody else; the results of this job stay in $results"
+    elif mv -fT "$target.copy" "$target"; then
+        return 0
+    fi
+    rm -f "$target.copy"
+    return 1
+}
+
+# refuse CODE TEXT…: ends the job before it has begun
+refuse() {
+    echo "${*:2}" >&2
+    release
+    exit "$1"
+}
+
+# hold LOCK: takes the lock of this job, for which it waits as long as the run would (--patience)
+hold() {
+    local refused
+    lock=$1
+    while :; do
+        if [ -L "$lock" ] || { [ -e "$lock" ] && [ ! -f "$lock" ]; }; then
+            refuse 2 "$lock is a link or no ordinary file, and not the lock of a job: remove it"
+        fi
+        if ! { exec {held}<>"$lock"; } 2>/dev/null; then refuse 74 "$lock cannot be written"; fi
+        refused=0
+        flock -w "${patience:-10}" -E 99 "$held" || refused=$?
+        # its last holder may just have removed the file
+        if [ "$refused" = 0 ] && [ "$lock" -ef "/dev/fd/$held" ]; then return 0; fi
+        exec {held}>&-
+        held=''
+        case $refused in
+            0) ;;
+            99) refuse 2 "$file is held by another job with STAGING ($lock): wait until it has ended" ;;
+            *) refuse 2 "STAGING needs the command flock, and locks of files where $file is: leave it out" ;;
+        esac
+    done
+}
+
+# release: lets go of the lock, if it is held
+release() {
+    if [ -z "${held:-}" ]; then return 0; fi
+    rm -f "$lock"
+    exec {held}>&-
+    held=''
+}
+
+# own_folder: makes the folder $stage, or accepts it, if nobody else can write there
+own_folder() {
+    local problem=''
+    mkdir -p "$STAGING" && mkdir -m 700 "$stage" 2>/dev/null
+    if [ ! -d "$stage" ] && [ ! -L "$stage" ]; then refuse 74 "the folder $stage cannot be made"; fi
+    if [ -L "$stage" ]; then
+        problem="$stage is a link"
+    elif [ ! -O "$stage" ]; then
+        problem="$stage belongs to $(stat -c %U "$stage")"
+    elif [ $((8#$(stat -c %a "$stage") & 8#022)) != 0 ]; then
+        problem="others can write to $stage"
+    elif [ $((8#$(stat -Lc %a "$STAGING") & 8#1002)) = 2 ]; then
+        problem="others can replace the folders in $STAGING, which all can write to and which is not sticky"
+    else
+        return 0
+    fi
+    refuse 2 "$problem: remove it, or set STAGING to a folder where nobody else can write"
+}
+
+version() { stat -c '%.Y %s %i' "$target" 2>/dev/null || echo none; }
+
+# is_changed: whether the results file is another one than when it was copied
+is_changed() { [ "$(version)" != "$(cat "$stage/version" 2>/dev/null)" ]; }
+
+# is_written FILE: whether a run writes to a results file now
+is_written() { [ -e "$1" ] && "$ADHESIS" status "$1" --json 2>/dev/null | grep '^ "run": {' >/dev/null; }
+
+# copy FROM TO: whole or not at all
+copy() { copy_beside "$1" "$2" && mv -fT "$2.copy" "$2"; }
+
+# copy_beside FROM TO: to TO.copy, on disk; a link of that name is removed and not followed
+copy_beside() {
+    if cp --remove-destination "$1" "$2.copy" && sync "$2.copy"; then return 0; fi
+    rm -f "$2.copy"
+    return 1
 }
 
 # run_campaign [OPTION…]: runs the campaign under the launcher, on staged results; sets code
@@ -164,6 +274,9 @@ run_campaign() {
     follow "${launcher[@]}" "$ADHESIS" run "$campaign" --out "$results" "$@" ${options[@]+"${options[@]}"}
     note "adhesis run ended with $code"
     stage_out
+    if [ "$code" = 74 ]; then
+        note "results could not be written: this job does not come back; make space, and submit it again"
+    fi
     # srun ends with 0 although it could not start a single rank.
     if [ "$code" = 0 ] && ! is_complete; then
         note "tasks of $file are pending although the launcher (${launcher[0]}) ended with 0: did it start the ranks?"

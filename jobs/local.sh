@@ -13,11 +13,11 @@ set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # shellcheck source=jobs/common.sh
 . "$here/jobs/common.sh"
-campaign=${1:?which campaign? usage: jobs/local.sh CAMPAIGN.toml [RANKS [OPTION…]]}
+campaign=$(path_of "${1:?which campaign? usage: jobs/local.sh CAMPAIGN.toml [RANKS [OPTION…]]}")
 # nproc goes by OMP_NUM_THREADS, which says nothing of ranks
 ranks=${2:-$(($(env -u OMP_NUM_THREADS nproc 2>/dev/null || getconf _NPROCESSORS_ONLN) + 1))}
 name=$(basename "$campaign" .toml)
-out=${OUT:-out}
+out=$(path_of "${OUT:-out}")
 
 find_adhesis "$here"
 mkdir -p "$out"

@@ -9,7 +9,8 @@ set -u
 jobs=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 # shellcheck source=jobs/common.sh
 . "$jobs/common.sh"
-file=${1:?which results? usage: jobs/report.sh FILE.h5 [DIR [PARTS]]}
+file=$(path_of "${1:?which results? usage: jobs/report.sh FILE.h5 [DIR [PARTS]]}")
+folder=$(path_of "${2:-${file%.h5}}")
 find_adhesis "$jobs/.."
 if [ -n "${3:-}" ]; then
     files=()
@@ -26,4 +27,4 @@ if ! is_complete; then
     note "tasks of $file are pending: no report (adhesis status $file lists them)"
     exit 75
 fi
-exec "$ADHESIS" report "$file" --to "${2:-${file%.h5}}"
+exec "$ADHESIS" report "$file" --to "$folder"

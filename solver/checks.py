@@ -133,6 +133,8 @@ MAX_PENETRATION = Bounds(
     without_high=True,
     note=" (in units of h_max; at 1 the mean gap would be zero, and no such state exists)",
 )
+FULL_PENETRATION = 0.999
+"""Δ/h_max at which a loop turns that has not reached its preload: nearly full contact."""
 FAR_DISPLACEMENT = Bounds(1e-12, 1e12, unit="units of h_max")
 HURST = Bounds(0.0, 1.0, without_low=True, without_high=True)
 ROLLOFF = Bounds(1.0)
@@ -180,6 +182,8 @@ def shown(value: object) -> str:
         text = repr(value)
     except ValueError:  # an integer of thousands of digits
         text = "a number of thousands of digits"
+    except RecursionError:
+        text = f"a {type(value).__name__} that is nested too deep"
     text = "".join(c if c.isprintable() else " " for c in text)
     text = " ".join(text.split()) if "\n" in text or "  " in text else text
     return text if len(text) <= _LONGEST else f"{text[:60]} … {text[-10:]}"
@@ -285,10 +289,25 @@ def function(name: str, value: T) -> T:
 
 
 def path(name: str, value: object) -> Path:
-    """Return a path; TypeError for anything else."""
-    if not isinstance(value, str | os.PathLike):
+    """Return a path; TypeError for anything else.
+
+    Raises
+    ------
+    TypeError
+        If it is no path, or one of bytes.
+    ValueError
+        If no file can have this name: it is empty, or holds a NUL or half a character.
+    """
+    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise TypeError(_sentence(name, value, "a path"))
-    return Path(value)
+    text = os.fspath(value)
+    try:
+        possible = bool(text) and b"\0" not in os.fsencode(text)
+    except UnicodeEncodeError:
+        possible = False
+    if not possible:
+        raise ValueError(_sentence(name, text, "the name of a file"))
+    return Path(text)
 
 
 def row(

@@ -30,13 +30,24 @@ class NotebookDisplay:
 class ResultViews(NotebookDisplay):
     """Figure, film, tables and file of a loop or path."""
 
-    def plot(self) -> Any:
+    def plot(self, ax: Any = None) -> Any:
         """Draw mean stress and contact fraction against penetration.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, or two of them, optional
+            Where to draw: into two the mean stress (kPa) and the contact fraction, into one the
+            mean stress alone. By default a figure is made.
 
         Returns
         -------
         matplotlib.figure.Figure
-            With ``savefig``; a notebook shows it.
+            With ``savefig``; a notebook shows it. The figure of ``ax``, if that is given.
+
+        Raises
+        ------
+        TypeError
+            If ``ax`` is neither.
 
         References
         ----------
@@ -50,7 +61,7 @@ class ResultViews(NotebookDisplay):
         >>> len(loop.plot().axes)  # mean stress, contact fraction
         2
         """
-        return maker().plot(self)
+        return maker().plot(self, ax)
 
     def film(
         self,

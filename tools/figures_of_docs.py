@@ -46,12 +46,15 @@ class Part:
         Where that goes, below docs/.
     name : str
         Under which name, if it has another one there.
+    data : str
+        Where its CSV files go, below the checkout.
     """
 
     commands: tuple[str, ...]
     made: str
     folder: str
     name: str = ""
+    data: str = ""
 
 
 def _paper() -> tuple[str, ...]:
@@ -87,8 +90,7 @@ PARTS = {
         ("examples/measured_profile.py --to OUT",), "trace.png", "figures", "measured_profile.png"
     ),
     "bench": Part(("-m adhesis bench --budget 240 --to OUT",), "benchmark.png", "figures"),
-    "study": Part(("-m tools.study figures --to OUT",), "*.png", "study"),
-    "paper": Part(_paper(), "paper/*.*", "paper"),
+    "paper": Part(_paper(), "paper/*.*", "paper", data="study/paper"),
 }
 
 
@@ -147,7 +149,8 @@ def make(name: str, ranks: int) -> None:
         for path in sorted(Path(folder).glob(part.made)):
             if path.suffix not in KEPT:
                 continue
-            to = ROOT / "docs" / part.folder / (part.name or path.name)
+            place = Path(part.data) if path.suffix == ".csv" else Path("docs", part.folder)
+            to = ROOT / place / (part.name or path.name)
             shutil.copyfile(path, to)
             if to.suffix == ".md":  # links to what is not kept
                 to.write_text(re.sub(r" \(\[PDF\]\([^)]*\)\)", "", to.read_text("utf-8")), "utf-8")
@@ -171,7 +174,7 @@ def stamps() -> dict[str, str | None]:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Make or check; returns 1 if a check finds one without a stamp."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0], allow_abbrev=False)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="default: all")
     parser.add_argument("--ranks", type=int, default=1, help="ranks of the campaigns' runs")
     parser.add_argument("--check", action="store_true", help="only say of which commit each is")

@@ -48,7 +48,7 @@ def run(folder: Path, words: tuple[str, ...], sentence: str) -> tuple[int, int]:
 
 def main() -> int:
     """Run and count."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--case", action="append", choices=list(CASES))
     parser.add_argument("--busy", action="store_true")

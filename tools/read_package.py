@@ -47,6 +47,7 @@ def main(wheel: str, sdist: str, commit: str) -> None:
         assert name in held, name
     for name in ("docs/theory.md", "tests/conftest.py", "jobs/paper.toml", "tools/setup.sh"):
         assert name in held, name
+    assert not any(name.startswith(("study/", "benchmarks/")) for name in held)
     print(f"package: {len(names)} files in the wheel, {len(held)} in the source distribution")
 
 

@@ -212,7 +212,7 @@ def wrong(page: Path, done: list[tuple[Piece, str]]) -> list[str]:
 
 def main() -> int:
     """Run pages; returns 1 if one shows something else than is printed."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0], allow_abbrev=False)
     parser.add_argument("pages", nargs="+", type=Path)
     parser.add_argument("--renew", action="store_true", help="write what is printed into the pages")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="for the files that a page writes")

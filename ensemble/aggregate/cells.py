@@ -31,6 +31,7 @@ _PER_TASK = (
     *("loss_error", "races", "energy_at_stake"),
     *("valid_range", "edge_range", "largest_interior_tension"),
     *("opening_strength", "openings", "barrier"),
+    *("turning_penetration", "turning_stress", "preload_reached"),
 )
 # Of these the least or the largest of a cell counts; a range or a strength may be infinite.
 _NOT_AVERAGED = frozenset(

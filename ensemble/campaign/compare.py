@@ -10,8 +10,8 @@ from dataclasses import Field, dataclass, fields
 from typing import Any
 
 from adhesis.ensemble.campaign.rules import shown
-from adhesis.ensemble.campaign.tables import TABLES, Campaign
-from adhesis.ensemble.campaign.tasks import Task
+from adhesis.ensemble.campaign.tables import TABLES, TURNING_POINTS, Campaign
+from adhesis.ensemble.campaign.tasks import Tasks
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def _extends(key: str, was: Any, now: Any) -> bool:
     if key not in ("sweep.hurst", "sweep.work_of_adhesion") and not axis:
         return False
     # All turning points of a profile belong together: they do not become more.
-    if key in ("cycle.max_penetration", "cycle.max_stress"):
+    if key in [f"cycle.{name}" for name in TURNING_POINTS]:
         return False
     return _values(was) < _values(now)
 
@@ -85,6 +85,6 @@ def _values(value: Any) -> set[Any]:
     return set(value) if isinstance(value, list) else {value}
 
 
-def _firsts(campaign: Campaign) -> list[Task]:
+def _firsts(campaign: Campaign) -> Tasks:
     """One task of every cell."""
-    return campaign.tasks()[:: campaign.realisations]
+    return campaign.tasks().of_cells()

@@ -5,7 +5,9 @@ A file that breaks a rule is refused with the key, the value and the rule in one
 
 from __future__ import annotations
 
+import codecs
 import math
+import os
 import re
 import tomllib
 from collections.abc import Sequence
@@ -14,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
-from adhesis.ensemble.campaign.rules import list_of, shown
+from adhesis.ensemble.campaign.rules import list_of, number_in, shown
 from adhesis.ensemble.campaign.tables import TABLES, Campaign, SweepTable, Table
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.lengths import HIGHEST_IN_METRES, LONGEST_IN_METRES, parse_length
-from adhesis.solver.checks import MOST_WAVES
+from adhesis.ensemble.regular_file import open_regular
+from adhesis.solver.checks import MAX_PENETRATION, MOST_WAVES
 from adhesis.solver.model.problem import check_slope
 from adhesis.solver.model.profile import self_affine_profile
 from adhesis.solver.registry import check_nodes
@@ -38,20 +41,34 @@ def load_campaign(path: Path | str) -> Campaign:
         If it cannot be read or breaks a rule; one sentence.
     """
     try:
-        data = Path(path).read_bytes()
+        with open_regular(path) as stream:
+            data = stream.read(_LONGEST_TEXT + len(codecs.BOM_UTF8) + 1)
+            size = max(len(data), os.fstat(stream.fileno()).st_size)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    text = _decoded(data, str(path))
-    campaign = parse_campaign(text, str(path))
-    _ask_for_units(str(path), tomllib.loads(text))
+    _check_size(str(path), size, _LONGEST_TEXT + len(codecs.BOM_UTF8))
+    return read_campaign(_decoded(data, str(path)), str(path))
+
+
+def read_campaign(text: str, source: str = "campaign") -> Campaign:
+    """Read and check the text of a campaign that is to be computed.
+
+    Numbers that can hardly be in SI units are refused, as by the options of the command line. The
+    text in a results file is read by :func:`parse_campaign`, which takes them: its loops have been
+    computed.
+
+    Raises
+    ------
+    InputError
+        If it breaks a rule; one sentence.
+    """
+    campaign = parse_campaign(text, source)
+    _ask_for_units(source, tomllib.loads(text))
     return campaign
 
 
 def _ask_for_units(source: str, document: dict[str, Any]) -> None:
-    """Refuse numbers that can hardly be in SI units, as the options of the command line do.
-
-    The text of a campaign in a results file is not asked: its loops have been computed.
-    """
+    """Refuse numbers that can hardly be in SI units."""
     for table, key, read, largest in (
         ("profile", "period", parse_length, LONGEST_IN_METRES),
         ("profile", "h_rms", parse_length, HIGHEST_IN_METRES),
@@ -90,12 +107,14 @@ def parse_campaign(text: str, source: str = "campaign") -> Campaign:
     InputError
         If it breaks a rule; one sentence.
     """
-    size = len(text.encode("utf-8"))
-    if size > _LONGEST_TEXT:
+    try:
+        size = len(text.encode("utf-8"))
+    except UnicodeEncodeError as error:
         raise InputError(
-            f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
-            "results file keeps its text"
-        )
+            f"{source} is not valid TOML: {quoted(text[error.start])} on line "
+            f"{text.count(chr(10), 0, error.start) + 1} is half a character, so write it anew"
+        ) from None
+    _check_size(source, size)
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -145,6 +164,14 @@ def _foreign_sign(text: str, error: str) -> str | None:
                     f"has {_PLAIN[sign] if _PLAIN[sign] != ' ' else 'a plain blank'}"
                 )
     return None
+
+
+def _check_size(source: str, size: int, most: int = _LONGEST_TEXT) -> None:
+    if size > most:
+        raise InputError(
+            f"{source} has {size} bytes: a campaign file has at most {_LONGEST_TEXT}, since the "
+            "results file keeps its text"
+        )
 
 
 def _given_twice(text: str, error: str) -> str | None:
@@ -226,6 +253,11 @@ def _check_together(source: str, campaign: Campaign) -> None:
     """Check the rules that join several keys."""
     profile, cycle = campaign.profile, campaign.cycle
     given = list(profile.normalisation)
+    if campaign.task_count > _MOST_TASKS:
+        raise InputError(
+            f"{source}: [sweep] makes {campaign.task_count} tasks: "
+            f"it must make at most {_MOST_TASKS}"
+        )
     _check_turning_point(source, campaign)
     if len(given) != 1:
         raise InputError(
@@ -263,20 +295,18 @@ def _check_together(source: str, campaign: Campaign) -> None:
             f"{source}: [stop] most is {campaign.stop.most}: it must be at least realisations, the "
             f"number that every cell gets ({campaign.sweep.realisations})"
         )
-    if campaign.task_count > _MOST_TASKS:
-        raise InputError(
-            f"{source}: [sweep] makes {campaign.task_count} tasks: "
-            f"it must make at most {_MOST_TASKS}"
-        )
     if campaign.output.field_penetrations and campaign.has_axis("max_penetration"):
         raise InputError(
             f"{source}: [output] field_penetrations is given beside several max_penetration: it "
             "must be left out there (a third, two thirds and all of each are kept) or be empty"
         )
-    if campaign.output.field_penetrations and cycle.under_load:
+    if campaign.output.field_penetrations and cycle.turns_at_stress:
+        where, turn = ("under a load", "max_stress")
+        if cycle.preload is not None:
+            where, turn = "beside a preload", "preload"
         raise InputError(
-            f"{source}: [output] field_penetrations is given under a load: it must be left out "
-            "there (a third, two thirds and all of max_stress are kept) or be empty"
+            f"{source}: [output] field_penetrations is given {where}: it must be left out "
+            f"there (a third, two thirds and all of {turn} are kept) or be empty"
         )
     for value in campaign.output.field_penetrations or ():
         if not cycle.unloading_until <= value <= cycle.turning_point:
@@ -335,18 +365,46 @@ def _check_slope(names: Sequence[str], values: Sequence[float]) -> None:
 def _check_turning_point(source: str, campaign: Campaign) -> None:
     """Check that the path turns where its control lets it turn."""
     cycle = campaign.cycle
-    wanted, other = "max_penetration", "max_stress"
-    if cycle.under_load:
-        wanted, other = other, wanted
-    if getattr(cycle, wanted) is None:
+    if cycle.preload is not None:
+        _check_preload(source, campaign)
+    if cycle.max_stress is not None and not cycle.under_load:
+        stress = shown(cycle.max_stress)
+        raise InputError(
+            f'{source}: [cycle] max_stress is given: with control = "separation" a path turns at '
+            "max_penetration, so leave max_stress out. A weight or a machine? For a weight give "
+            'control = "load"; for a machine, which turns at that mean stress, give '
+            f"preload = {stress}"
+        )
+    wanted = "max_stress" if cycle.under_load else "max_penetration"
+    by_default = cycle.preload is not None and cycle.stiffness is None
+    if getattr(cycle, wanted) is None and not by_default:
         entry = next(f for f in fields(type(cycle)) if f.name == wanted)
         raise InputError(
             f"{source}: [cycle] {wanted} is missing ({entry.metadata['meaning']}): "
             f"it must be {entry.metadata['rule'].text}"
         )
-    for name in (other, *(["stiffness"] if cycle.under_load else [])):
+    if cycle.stiffness is None and not cycle.under_load:
+        largest = _largest(campaign, wanted, cycle.deepest)
+        number_in(MAX_PENETRATION)(f"{source}: [cycle] {wanted}", largest)
+    for name in ("max_penetration", "stiffness") if cycle.under_load else ():
         if getattr(cycle, name) is not None:
             raise InputError(
                 f'{source}: [cycle] {name} is given: with control = "{cycle.control}" a path '
                 f"turns at {wanted}, so leave {name} out"
             )
+
+
+def _check_preload(source: str, campaign: Campaign) -> None:
+    """Check that a preload stands where a machine presses, and goes to one depth at most."""
+    preload = shown(campaign.cycle.preload)
+    if campaign.cycle.under_load:
+        raise InputError(
+            f'{source}: [cycle] preload is {preload} with control = "load": a weight or a machine? '
+            f"For a weight give max_stress = {preload} instead; for a machine, which turns at that "
+            'mean stress, leave control = "load" out'
+        )
+    if campaign.has_axis("max_penetration"):
+        raise InputError(
+            f"{source}: [cycle] max_penetration has several values beside a preload: it must be "
+            "one number, at which a loop turns that has not reached its preload"
+        )

@@ -27,10 +27,12 @@ from adhesis.ensemble.campaign.rules import (
     positive_number,
     whole_number,
 )
-from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, task_seed
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.solver.checks import (
     ACCURACY,
     ADHESION_RANGE,
+    FAR_DISPLACEMENT,
+    FULL_PENETRATION,
     HARMONIC,
     HURST,
     LENGTH,
@@ -44,6 +46,7 @@ from adhesis.solver.checks import (
     STRENGTH,
     WORK_OF_ADHESION,
     YOUNG,
+    Bounds,
 )
 from adhesis.solver.model.profile import NORMALISATIONS, Amplitudes, Array
 from adhesis.solver.registry import METHOD_NAMES, MethodName
@@ -64,6 +67,10 @@ def _key(
     """
     metadata = {"rule": rule, "meaning": meaning, "free": free, "axis": axis}
     return field(default=default, metadata=metadata)
+
+
+# The far side of a stiffness may go beyond 1; at a fixed separation the file's rules refuse that.
+_DISPLACEMENT = Bounds(0.0, FAR_DISPLACEMENT.high, without_low=True)
 
 
 @dataclass(frozen=True)
@@ -152,14 +159,23 @@ class CycleTable:
     """``[cycle]``: the loading path."""
 
     max_penetration: float | None = _key(
-        number_in(MAX_PENETRATION),
-        "Δ~max, the penetration in units of h_max at which unloading starts",
+        Rule(number_in(MAX_PENETRATION).text, number_in(_DISPLACEMENT).read),
+        "Δ~max, the penetration in units of h_max at which unloading starts; with a preload, at "
+        "which it starts at the latest",
         None,
         axis="1",
     )
     max_stress: float | None = _key(
         number_in(MAX_STRESS),
         "mean stress in Pa at which unloading starts under a load, instead of max_penetration",
+        None,
+        axis="Pa",
+    )
+    preload: float | None = _key(
+        number_in(MAX_STRESS),
+        "mean stress in Pa that a machine reaches before it unloads; max_penetration is then the "
+        "latest turning point, and the end of the curves (by default 0.999; needed with a "
+        "stiffness)",
         None,
         axis="Pa",
     )
@@ -187,15 +203,22 @@ class CycleTable:
 
     @property
     def turning_point(self) -> float:
-        """Turning point: Δ/h_max, u_tot/h_max of a stiffness, p̄ in Pa under a load."""
-        point = self.max_stress if self.under_load else self.max_penetration
+        """Turning point: Δ/h_max, u_tot/h_max of a stiffness, p̄ in Pa of a load or preload."""
+        point = self.max_stress if self.under_load else self.preload or self.max_penetration
         assert point is not None  # the file is read so
         return point
 
     @property
+    def turns_at_stress(self) -> bool:
+        """Whether the turning point is a mean stress: under a load, or at a preload."""
+        return self.under_load or self.preload is not None
+
+    @property
     def deepest(self) -> float:
-        """Δ/h_max that the loop does not exceed: its turning point; 1 under a load."""
-        return 1.0 if self.under_load else self.turning_point
+        """Δ/h_max that the loop does not exceed: its latest turning point; 1 under a load."""
+        if self.under_load:
+            return 1.0
+        return FULL_PENETRATION if self.max_penetration is None else self.max_penetration
 
 
 @dataclass(frozen=True)
@@ -232,6 +255,9 @@ class OutputTable:
         whole_number(16, 65_536), "most nodes of a field that is kept (a power of two is)", 4096
     )
 
+
+TURNING_POINTS = ("max_penetration", "max_stress", "preload")
+"""Keys of the cycle of which one is the turning point."""
 
 Quantity = Literal["loss_dimensionless", "loss"]
 
@@ -339,7 +365,7 @@ class Campaign:
     @property
     def task_count(self) -> int:
         """Number of tasks."""
-        return len(self.cells) * self.realisations
+        return math.prod(len(group[0].values) for group in self._groups) * self.realisations
 
     @property
     def realisations(self) -> int:
@@ -369,7 +395,7 @@ class Campaign:
     def _turning(self) -> Axis | None:
         """The axis of turning points, unless other keys vary with it."""
         for group in self._groups:
-            if len(group) == 1 and group[0].name in ("max_penetration", "max_stress"):
+            if len(group) == 1 and group[0].name in TURNING_POINTS:
                 return group[0]
         return None
 
@@ -409,20 +435,14 @@ class Campaign:
         )
         return (task.hurst, task.work_of_adhesion, task.realisation, task.seed, rest)
 
-    def tasks(self, part: Part = WHOLE) -> list[Task]:
+    def tasks(self, part: Part = WHOLE) -> Tasks:
         """Return every task, or those of a part: by H, γ, what else is an axis, and realisation.
 
         The order does not depend on that of the file, so that a grown campaign has the rows of one
         that was this large from the start.
         """
-        seeds = [task_seed(self.sweep.seed, r) for r in range(self.realisations)]
-        names = [axis.name for axis in self.axes[2:]]
-        tasks = [
-            Task(hurst, gamma, realisation, seed, tuple(zip(names, others, strict=True)))
-            for hurst, gamma, *others in self.cells
-            for realisation, seed in enumerate(seeds)
-        ]
-        return tasks if part == WHOLE else [tasks[row] for row in self.rows(part).tolist()]
+        names = tuple(axis.name for axis in self.axes[2:])
+        return Tasks(self.cells, names, self.realisations, self.sweep.seed, self.rows(part))
 
     def rows(self, part: Part = WHOLE) -> NDArray[np.int64]:
         """Rows of the whole campaign that belong to a part, ascending.

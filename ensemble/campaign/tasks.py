@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import Self
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.errors import InputError, parameter
 
 
+@lru_cache(1 << 16)
 def task_seed(campaign_seed: int, realisation: int) -> int:
     """Return the seed of one realisation's phases.
 
@@ -61,6 +64,84 @@ class Task:
 
     def __str__(self) -> str:
         return f"{self.cell_name}, realisation {self.realisation}"
+
+
+@dataclass(frozen=True)
+class Tasks(Sequence[Task]):
+    """Tasks of a campaign by number; each is made when it is asked for.
+
+    So a campaign of millions of tasks can be refused, or priced, before they take memory.
+
+    Attributes
+    ----------
+    cells : sequence of tuple
+        Values on the axes: H, γ, and the others.
+    names : tuple of str
+        Of the others.
+    realisations : int
+        Of each cell.
+    seed : int
+        Of the campaign.
+    rows : int array
+        Numbers of these tasks in the whole campaign, cell by cell, ascending.
+    """
+
+    cells: Sequence[tuple[float, ...]]
+    names: tuple[str, ...]
+    realisations: int
+    seed: int
+    rows: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Return the number of tasks."""
+        return len(self.rows)
+
+    @overload
+    def __getitem__(self, place: int) -> Task: ...
+    @overload
+    def __getitem__(self, place: slice) -> Tasks: ...
+    def __getitem__(self, place: int | slice) -> Task | Tasks:
+        """Return a task, or some of them."""
+        if isinstance(place, slice):
+            return self.chosen(self.rows[place])
+        cell, realisation = divmod(int(self.rows[place]), self.realisations)
+        hurst, gamma, *others = self.cells[cell]
+        seed = task_seed(self.seed, realisation)
+        return Task(hurst, gamma, realisation, seed, tuple(zip(self.names, others, strict=True)))
+
+    def __eq__(self, other: object) -> bool:
+        """Compare task by task, also with a list."""
+        if not isinstance(other, Sequence) or len(self) != len(other):
+            return NotImplemented if not isinstance(other, Sequence) else False
+        return all(one == two for one, two in zip(self, other, strict=True))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def chosen(self, rows: NDArray[np.int64]) -> Tasks:
+        """Return the tasks with these numbers in the whole campaign."""
+        return replace(self, rows=rows)
+
+    def cell_of(self) -> NDArray[np.int64]:
+        """Return the number of each task's cell."""
+        return self.rows // self.realisations
+
+    def column(self, name: str) -> NDArray[Any]:
+        """Return a value of each task by its name: hurst, seed, or that of a further axis."""
+        realisation = self.rows % self.realisations
+        if name == "realisation":
+            return realisation
+        if name == "seed":
+            found, place = np.unique(realisation, return_inverse=True)
+            return np.array([task_seed(self.seed, r) for r in found.tolist()], np.int64)[place]
+        axis = ("hurst", "work_of_adhesion", *self.names).index(name)
+        return np.array([cell[axis] for cell in self.cells])[self.cell_of()]
+
+    def of_cells(self) -> Tasks:
+        """Return the first task of each cell."""
+        cells = self.cell_of()
+        changes = np.flatnonzero(cells[1:] != cells[:-1]) + 1  # a cell is one long stretch
+        starts = np.concatenate(([0], changes))[: cells.size]
+        return self.chosen(self.rows[starts[np.unique(cells[starts], return_index=True)[1]]])
 
 
 @dataclass(frozen=True)

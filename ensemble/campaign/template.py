@@ -30,6 +30,7 @@ EXAMPLES = {
     "material.adhesion_range": '"0.3 nm"',
     "material.strength": "1e8",
     "cycle.max_stress": "200",
+    "cycle.preload": '"0.5 kPa"',
     "cycle.stiffness": "1e9",
     "solver.nodes_per_wave": "64",
     "solver.time_limit": "3600.0",

@@ -34,8 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Print what was found; 0 if campaigns can run here."""
-    if args.directory is not None and not os.access(args.directory, os.W_OK | os.X_OK):
-        raise InputError(f"--in is {args.directory}: it must be a folder that can be written")
+    folder = args.directory
+    if folder is not None and not (os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)):
+        raise InputError(f"--in is {folder}: it must be a folder that can be written")
     diagnosis = examine(args.directory)
     if args.json:
         print(json.dumps(diagnosis.as_dict(), indent=2))

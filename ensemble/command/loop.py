@@ -17,6 +17,7 @@ from adhesis.ensemble.loop.heights import closure_warning, few_heights_warning, 
 from adhesis.ensemble.loop.loop_arguments import H_RMS, N0, PERIOD, RATIO
 from adhesis.ensemble.loop.record import (
     FieldStates,
+    fields_at_stresses,
     loop_summary,
     loops_document,
     path_document,
@@ -34,8 +35,10 @@ from adhesis.ensemble.trace.options import (
     what_was_read,
 )
 from adhesis.ensemble.warm import warm_missing
+from adhesis.solver.checks import plain
 from adhesis.solver.loading.loop import Progress, run_loop
 from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.loop_state import field_nodes
 from adhesis.solver.loading.path import PathResult, run_path
 from adhesis.solver.loading.turning_points import run_loops
 from adhesis.solver.method import Branch, ContactState, Method, PathError
@@ -55,6 +58,7 @@ _MOST_FIELD_VALUES = 2**26
 
 def execute(args: argparse.Namespace) -> int:
     """Run the loop, loops or path, and write what was asked for."""
+    taken = _defaults_taken(args)
     _set_material(args)
     _check_files(args)
     with refused_as_input(vars(args)):
@@ -67,16 +71,21 @@ def execute(args: argparse.Namespace) -> int:
         cycle.check(problem)
     _check_film(args, cycle)
     penetrations = _field_penetrations(args, cycle)
+    stresses = _field_stresses(args, cycle)
     with refused_as_input(vars(args)):
         method = make_method(
             args.method, problem, accuracy=args.accuracy, nodes_per_wave=args.nodes_per_wave
         )
-    nodes = _field_nodes(args, method, penetrations) if penetrations else 0
+    wanted = [*penetrations, *stresses]
+    nodes = _field_nodes(args, method, wanted) if wanted else 0
     warm_missing([method.name], quiet=args.quiet, many_gaps=False)
     picked = FieldStates(method, penetrations)
     try:
         results = _run(args, method, cycle, picked.visit if penetrations else None)
         fields = picked.collect(nodes) if penetrations else {}
+        if stresses:
+            assert isinstance(results, tuple)
+            fields = fields_at_stresses(results[0], stresses, nodes)
     except PathError as error:
         print(f"adhesis loop: {in_options(str(error), args)}", file=sys.stderr)
         return 1
@@ -108,6 +117,8 @@ def execute(args: argparse.Namespace) -> int:
     else:
         loops = results
         print("\n\n".join(map(loop_summary, results)))
+    if taken:
+        print(f"defaults    {' '.join(taken)}: taken as they are not given")
     for path in writing.written:
         print(f"wrote       {path}")
     doubts = list(dict.fromkeys([*warnings, *(text for loop in loops for text in loop.warnings)]))
@@ -123,9 +134,8 @@ def _run(
     cycle: Cycle,
     on_state: Callable[[Branch, ContactState], None] | None,
 ) -> tuple[LoopResult, ...] | PathResult:
-    progress = (
-        None if args.quiet else _progress(cycle.top / cycle.load_steps, cycle.control.is_load)
-    )
+    step = cycle.top(method.problem) / cycle.load_steps
+    progress = None if args.quiet else _progress(step, cycle.control.is_load)
     if cycle.is_path:
         return run_path(
             method,
@@ -135,11 +145,11 @@ def _run(
             progress=progress,
             on_state=on_state,
         )
-    name = "max_stress" if cycle.control.is_load else "max_penetration"
-    if len(cycle.turning_points) > 1:
-        turns: Any = {name: cycle.turning_points}
-        return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turns)
-    turn: Any = {name: cycle.turning_points[0]}
+    points, turns = cycle.turning_points, cycle.turns
+    if len(points) > 1:
+        turn = turns.arguments(points, cycle.control)
+        return run_loops(method, load_steps=cycle.load_steps, progress=progress, **turn)
+    turn = turns.arguments(points[0], cycle.control)
     loop = run_loop(
         method, load_steps=cycle.load_steps, progress=progress, on_state=on_state, **turn
     )
@@ -147,6 +157,20 @@ def _run(
 
 
 # ---------------------------------------------------------------------- input
+
+
+def _defaults_taken(args: argparse.Namespace) -> list[str]:
+    """Return the options whose defaults make the profile and the material of ``--hurst``."""
+    if args.hurst is None:
+        return []
+    taken: dict[str, Any] = {"period": f"{1e3 * PERIOD:.5g}mm", "n0": N0, "ratio": RATIO, "seed": 0}
+    if args.m2 is None and args.c0 is None:
+        taken["h_rms"] = f"{1e6 * H_RMS:g}um"
+    return [
+        f"--{name.replace('_', '-')} {plain(value) if isinstance(value, float) else value}"
+        for name, value in {**taken, **_MATERIAL}.items()
+        if getattr(args, name) is None
+    ]
 
 
 def _set_material(args: argparse.Namespace) -> None:
@@ -186,6 +210,7 @@ def _check_film(args: argparse.Namespace, cycle: Cycle) -> None:
         return
     if not cycle.is_path and len(cycle.turning_points) > 1:
         name = "--max-stress" if cycle.control.is_load else "--max-penetration"
+        name = "--preload" if cycle.turns.are_preloads else name
         raise InputError(
             f"--film is given with {len(cycle.turning_points)} turning points: a film shows one "
             f"loop, so give {name} one value"
@@ -258,37 +283,59 @@ def _self_affine(args: argparse.Namespace) -> Profile:
 
 
 def _field_penetrations(args: argparse.Namespace, cycle: Cycle) -> list[float]:
-    """Penetrations of the fields; empty if no fields are wanted."""
+    """Penetrations of the fields; empty if none are wanted there."""
     if args.fields is None:
-        for name in ("field_penetrations", "field_nodes"):
+        for name in ("field_penetrations", "field_stresses", "field_nodes"):
             if getattr(args, name) is not None:
                 option = "--" + name.replace("_", "-")
                 raise InputError(f"{option} needs --fields, the file to which fields are written")
         return []
-    if cycle.is_path or len(cycle.turning_points) > 1 or not cycle.control.is_fixed:
+    if cycle.is_path or len(cycle.turning_points) > 1:
+        raise InputError("--fields belongs to one loop: give one turning point, and no --path")
+    if args.field_stresses is not None:
+        if args.field_penetrations is not None:
+            raise InputError(
+                "--field-penetrations and --field-stresses are given: give one of them"
+            )
+        return []
+    if not cycle.control.is_fixed or cycle.turns.are_preloads:
+        if cycle.turns.are_preloads and args.field_penetrations is None:
+            return []
         raise InputError(
-            "--fields belongs to one loop at fixed separation: give one --max-penetration, and "
-            "neither --path nor --stiffness"
+            "--fields at penetrations belongs to one loop that turns at --max-penetration at fixed "
+            "separation: give --field-stresses, as 5kPa 10kPa, instead"
         )
+    (top,) = cycle.turning_points
     if args.field_penetrations is None:
-        return [part * cycle.top for part in _FIELD_PARTS]
+        return [part * top for part in _FIELD_PARTS]
     wanted = [float(value) for value in args.field_penetrations]
     for value in wanted:
-        if not (np.isfinite(value) and value <= cycle.top):
+        if not (np.isfinite(value) and value <= top):
             raise InputError(
-                f"--field-penetrations holds {value}: the loop goes no deeper than {cycle.top:g}"
+                f"--field-penetrations holds {value}: the loop goes no deeper than {top:g}"
             )
     return list(dict.fromkeys(wanted))
 
 
-def _field_nodes(args: argparse.Namespace, method: Method, penetrations: Sequence[float]) -> int:
+def _field_stresses(args: argparse.Namespace, cycle: Cycle) -> list[float]:
+    """Mean stresses of the fields in Pa; empty if none are wanted there."""
+    if args.fields is None or args.field_penetrations is not None:
+        return []
+    if args.field_stresses is None:
+        if not cycle.turns.are_preloads:
+            return []
+        return [part * cycle.turning_points[0] for part in _FIELD_PARTS]
+    wanted = [float(value) for value in args.field_stresses]
+    for value in wanted:
+        if not np.isfinite(value):
+            raise InputError(f"--field-stresses holds {value}: it must be a finite number, in Pa")
+    return list(dict.fromkeys(wanted))
+
+
+def _field_nodes(args: argparse.Namespace, method: Method, wanted: Sequence[float]) -> int:
     """Nodes of the fields: those asked for, else the method's own, else 32 per shortest wave."""
-    nodes = args.field_nodes
-    if nodes is None:
-        nodes = method.nodes
-    if nodes is None:
-        nodes = 1 << (32 * method.problem.profile.highest_harmonic - 1).bit_length()
-    states = 2 * len(penetrations)
+    nodes = field_nodes(method) if args.field_nodes is None else args.field_nodes
+    states = 2 * len(wanted)
     if nodes * states > _MOST_FIELD_VALUES:
         raise InputError(
             f"--field-nodes is {nodes}{'' if args.field_nodes else ' by default'}: with the fields "

@@ -11,7 +11,6 @@ import importlib
 import os
 import signal
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Iterator, Sequence
@@ -20,7 +19,8 @@ from types import FrameType
 
 from adhesis.ensemble.command.parser import Parser
 from adhesis.ensemble.command.streams import OutputError, standard_streams, write_line
-from adhesis.ensemble.errors import InputError, RankError, WriteError, naming_options
+from adhesis.ensemble.errors import InputError, RankError, WriteError, lack, naming_options
+from adhesis.ensemble.run.interrupt import in_main_thread
 from adhesis.ensemble.run.launch import ONE_THREAD, hand_over
 from adhesis.ensemble.run.ranks import launched
 
@@ -58,7 +58,7 @@ _INDEPENDENT = ("loop", "trace", "warm", "doctor")
 # How long a process waits for rank 0 to report the same error, whose end makes mpirun end all.
 _RANK_0_FIRST = 20.0  # s
 
-BAD_INPUT, OUR_ERROR, WRITE_FAILED = 2, 70, 74
+BAD_INPUT, OUR_ERROR, TOO_FEW_RESOURCES, WRITE_FAILED = 2, 70, 71, 74
 PIPE_CLOSED = 1
 INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
 
@@ -124,6 +124,8 @@ def _run(name: str, words: Sequence[str]) -> tuple[int, str, BaseException | Non
     except KeyboardInterrupt as error:
         return INTERRUPTED, "interrupted", error
     except Exception as error:
+        if sentence := lack(error):
+            return TOO_FEW_RESOURCES, sentence, error
         traceback.print_exc()
         return OUR_ERROR, "", error
 
@@ -154,8 +156,7 @@ def _execute(name: str, words: Sequence[str]) -> int:
 @contextmanager
 def _termination(*, enabled: bool) -> Iterator[None]:
     """Raise Terminated at SIGTERM, so that unfinished files are removed."""
-    in_main = threading.current_thread() is threading.main_thread()
-    if not (enabled and in_main and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL):
+    if not (enabled and in_main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL):
         yield
         return
 

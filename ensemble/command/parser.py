@@ -31,6 +31,8 @@ class Parser(argparse.ArgumentParser):
             epilog="\n  ".join(["examples:", *examples]),
             formatter_class=argparse.RawDescriptionHelpFormatter,
             exit_on_error=False,
+            # what passes options on, as the scripts of jobs/ do, knows them by their names
+            allow_abbrev=False,
         )
         for action in (None, "store"):
             self.register("action", action, _StoreOnce)
@@ -53,6 +55,8 @@ class Parser(argparse.ArgumentParser):
             delattr(args, _GIVEN)
             return args
         except argparse.ArgumentError as error:
+            if error.argument_name is None:  # of no single option, as newer Pythons have it
+                self.error(error.message)
             link = " " if error.message.startswith("is ") else ": "
             self.error(f"{error.argument_name}{link}{error.message}")
 
@@ -104,6 +108,8 @@ def _number(value: str) -> float:
 
 
 def _path(value: str) -> Path:
-    if not value:
-        raise argparse.ArgumentTypeError("is '': it must be the name of a file or directory")
+    if not value or "\0" in value:
+        raise argparse.ArgumentTypeError(
+            f"is {quoted(value)}: it must be the name of a file or directory"
+        )
     return Path(value)

@@ -6,6 +6,7 @@ It is synthetic: 1 mm in steps of 1 µm, rough down to 20 µm, with tilt, bow, n
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
@@ -25,9 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
-    if args.file.is_file():
-        raise InputError(f"FILE is {args.file}, which exists: give another name")
     check_outputs({"FILE": args.file}, {})
+    if os.path.isfile(args.file):
+        raise InputError(f"FILE is {args.file}, which exists: give another name")
     writing = Writing()
     with writing.output("FILE", args.file), whole_file(args.file) as stream:
         stream.write(SAMPLE.read_bytes())

@@ -7,7 +7,7 @@ import sys
 
 from adhesis.ensemble.adhesions import LARGEST_IN_JOULES, parse_work_of_adhesion
 from adhesis.ensemble.errors import InputError, refused_as_input
-from adhesis.ensemble.loop.cycle import control_of, in_options, turning_points_of
+from adhesis.ensemble.loop.cycle import control_of, in_options, turns_of
 from adhesis.ensemble.number_lists import words_of
 from adhesis.ensemble.outputs import Writing, check_output_folder, staged_folder, write_json
 from adhesis.ensemble.provenance import input_record, provenance
@@ -36,10 +36,10 @@ def execute(args: argparse.Namespace) -> int:
     with refused_as_input(vars(args)):
         half_space = HalfSpace(args.young, args.poisson)
         control = control_of(args, half_space)
-        turns = turning_points_of(args, control)
+        turns = turns_of(args, control)
         cycle = make_cycle(
-            half_space, gammas, turns, args.load_steps, args.method, args.accuracy, control,
-            args.adhesion_range, args.strength,
+            half_space, gammas, turns.points, args.load_steps, args.method, args.accuracy, control,
+            args.adhesion_range, args.strength, at_preload=turns.are_preloads, latest=turns.latest,
         )  # fmt: skip
     if args.to is not None:
         check_output_folder("--to", args.to, _FILES, {"the command": args.file})

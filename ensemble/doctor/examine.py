@@ -23,8 +23,9 @@ from adhesis.ensemble.run.launch import (
     launcher,
     python,
     python_environment,
+    settings,
 )
-from adhesis.ensemble.versions import installed, last_lines
+from adhesis.ensemble.versions import first_lines, installed, last_lines
 
 _RANKS = 2
 _TIME_LIMIT = 60.0  # s; the first load of the libraries from a cold network disk is slow
@@ -171,7 +172,9 @@ def _failure_of(command: list[str], env: dict[str, str]) -> str:
             process.communicate()
         return f"did not end within {_TIME_LIMIT:.0f} s"
     if process.returncode:
-        return f"ended with {process.returncode}: {last_lines(output)}"
+        # of several processes, the first page has the reason, of one its traceback's last lines
+        lines = first_lines(output) if "together" in command else last_lines(output)
+        return f"ended with {process.returncode}: {lines}"
     return ""
 
 
@@ -233,6 +236,8 @@ def _ranks(probe: _Probe, mpirun: str) -> Check:
         )
     else:
         text = f"{mpirun} -n {_RANKS} {probe.failure or f'gave {len(sizes)} ranks'}"
+        if given := ", ".join(settings()):
+            text += f"; settings of MPI: {given}"
     return Check("ranks", False, text)
 
 

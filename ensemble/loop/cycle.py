@@ -4,19 +4,44 @@ from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.number_lists import words_of
 from adhesis.ensemble.stresses import parse_stress
-from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.loading.loop import check_cycle, latest_turn, turn_arguments
 from adhesis.solver.loading.path import check_path
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
 
 _OUT = "out"
+_TURNS = ("max_penetration", "max_stress", "preload")
 _MAX_PENETRATION = 0.9
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Turning points of loops.
+
+    Attributes
+    ----------
+    points : tuple of float
+        Δ/h_max, u_tot/h_max, or Pa under a load; preloads in Pa, if ``are_preloads``.
+    are_preloads : bool
+    latest : float or None
+        Where a loop turns whose preload is not reached, if it is given.
+    """
+
+    points: tuple[float, ...]
+    are_preloads: bool = False
+    latest: float | None = None
+
+    def arguments(self, points: object, control: Control) -> dict[str, Any]:
+        """Return the arguments of ``run_loop`` or ``run_loops`` for some of the points."""
+        return turn_arguments(control, points, self.are_preloads, self.latest)
 
 
 @dataclass(frozen=True)
@@ -26,9 +51,8 @@ class Cycle:
     Attributes
     ----------
     control : Control
-    turning_points : tuple of float
-        One for each loop; those of one path, in order, if ``is_path``. Δ/h_max, u_tot/h_max, or
-        Pa under a load.
+    turns : Turns
+        One for each loop, ascending; those of one path, in order, if ``is_path``.
     is_path : bool
     out : bool
         Whether a path continues until contact is lost.
@@ -36,15 +60,22 @@ class Cycle:
     """
 
     control: Control
-    turning_points: tuple[float, ...]
+    turns: Turns
     is_path: bool
     out: bool
     load_steps: int
 
     @property
-    def top(self) -> float:
-        """Largest turning point."""
-        return max(self.turning_points)
+    def turning_points(self) -> tuple[float, ...]:
+        """The turning points, of loops or of the path."""
+        return self.turns.points
+
+    def top(self, problem: Problem) -> float:
+        """Return the prescribed value of the last load step; ValueError as in :meth:`check`."""
+        largest = max(self.turning_points)
+        if self.turns.are_preloads:
+            return latest_turn(problem, largest, self.turns.latest)
+        return largest
 
     def check(self, problem: Problem) -> None:
         """Check that the cycle can be followed.
@@ -56,8 +87,13 @@ class Cycle:
         """
         if self.is_path:
             check_path(self.turning_points, self.load_steps, problem, self.out)
-        for turn in () if self.is_path else self.turning_points:
-            check_cycle(turn, self.load_steps, self.control)
+        elif self.turns.are_preloads:
+            for preload in self.turning_points:
+                latest = latest_turn(problem, preload, self.turns.latest)
+                check_cycle(latest, self.load_steps, self.control)
+        else:
+            for turn in self.turning_points:
+                check_cycle(turn, self.load_steps, self.control)
 
 
 def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
@@ -71,18 +107,19 @@ def cycle_of(args: argparse.Namespace, half_space: HalfSpace) -> Cycle:
         If stiffness or layer break their rule.
     """
     control = control_of(args, half_space)
-    _refuse_several(args, "max_penetration", "max_stress", "path")
     if args.path is not None:
+        _refuse_several(args, "path", *_TURNS)
         words = _words("--path", args.path)
         out = words[-1] == _OUT
         rule = "numbers with commas between them"
         points = _numbers("--path", words[:-1] if out else words, rule)
-        return Cycle(control, points, True, out, args.load_steps)
-    points = turning_points_of(args, control)
-    return Cycle(control, tuple(sorted(points)), False, True, args.load_steps)
+        return Cycle(control, Turns(points), True, out, args.load_steps)
+    turns = turns_of(args, control)
+    turns = replace(turns, points=tuple(sorted(turns.points)))
+    return Cycle(control, turns, False, True, args.load_steps)
 
 
-def turning_points_of(args: argparse.Namespace, control: Control) -> tuple[float, ...]:
+def turns_of(args: argparse.Namespace, control: Control) -> Turns:
     """Read the turning points of a control, in the given order.
 
     Raises
@@ -90,23 +127,52 @@ def turning_points_of(args: argparse.Namespace, control: Control) -> tuple[float
     InputError
         If they belong to another control, are no numbers, or one is given twice.
     """
-    _refuse_several(args, "max_penetration", "max_stress")
-    if control.is_load != (args.max_stress is not None):
-        if control.is_load:
+    _refuse_several(args, "max_stress", "preload")
+    if control.is_load:
+        if args.preload is not None:
+            raise InputError(
+                f"--preload is {args.preload} with --stiffness 0: a weight or a machine? For a "
+                f"weight give --max-stress {args.preload} with --stiffness 0; for a machine, which "
+                "turns at that mean stress, leave --stiffness 0 out"
+            )
+        _refuse_several(args, "max_penetration", "max_stress")
+        if args.max_stress is None:
             raise InputError("load control (--stiffness 0) needs --max-stress, in Pa")
-        raise InputError("--max-stress belongs to load control: give --stiffness 0 with it")
-    text = args.max_stress if control.is_load else args.max_penetration
-    name = "--max-stress" if control.is_load else "--max-penetration"
-    if text is None:
-        points: tuple[float, ...] = (_MAX_PENETRATION,)
-    else:
-        words = _words(name, text)
-        rule = "one or more numbers, as 1.5 or 0.5,1.5"
-        if control.is_fixed:
-            rule = "one or more numbers between 0 and 1, as 0.9 or 0.3,0.6"
-        points = _stresses(name, words) if control.is_load else _numbers(name, words, rule)
+        return Turns(_distinct("--max-stress", args.max_stress, _stresses))
+    if args.max_stress is not None:
+        raise InputError(
+            "--max-stress belongs to load control, and --stiffness 0 is not given: a weight or a "
+            f"machine? For a weight give --stiffness 0 with --max-stress {args.max_stress}; for a "
+            f"machine, which turns at that mean stress, give --preload {args.max_stress} instead"
+        )
+    rule = "one or more numbers, as 1.5 or 0.5,1.5"
+    if control.is_fixed:
+        rule = "one or more numbers between 0 and 1, as 0.9 or 0.3,0.6"
+
+    def numbers(option: str, words: list[str]) -> tuple[float, ...]:
+        return _numbers(option, words, rule)
+
+    penetrations: tuple[float, ...] | None = None
+    if args.max_penetration is not None:
+        penetrations = _distinct("--max-penetration", args.max_penetration, numbers)
+    if args.preload is None:
+        return Turns((_MAX_PENETRATION,) if penetrations is None else penetrations)
+    if penetrations is not None and len(penetrations) > 1:
+        raise InputError(
+            f"--max-penetration is {args.max_penetration} beside --preload: it must be one number, "
+            "at which a loop turns that has not reached its preload"
+        )
+    preloads = _distinct("--preload", args.preload, _stresses)
+    return Turns(preloads, True, None if penetrations is None else penetrations[0])
+
+
+def _distinct(
+    option: str, text: str, read: Callable[[str, list[str]], tuple[float, ...]]
+) -> tuple[float, ...]:
+    """Read turning points with commas between them, all different."""
+    points = read(option, _words(option, text))
     if len(set(points)) < len(points):
-        raise InputError(f"{name} is {text}: turning points must differ")
+        raise InputError(f"{option} is {text}: turning points must differ")
     return points
 
 

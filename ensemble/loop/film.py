@@ -28,7 +28,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from adhesis.ensemble.errors import InputError, one_of
 from adhesis.ensemble.loop.film_page import BODY, STYLE
 from adhesis.ensemble.loop.film_scenes import Scene, Scenes, jump_places, scenes_of
-from adhesis.ensemble.outputs import whole_file
+from adhesis.ensemble.outputs import check_outputs, whole_file
 from adhesis.ensemble.report.figures.style import LINE_OF_BRANCH, new_figure, style
 from adhesis.ensemble.report.html import whole_page
 from adhesis.solver import checks
@@ -140,13 +140,15 @@ class Film:
         Raises
         ------
         InputError
-            If the ending is another, or ffmpeg is missing for ``.mp4``.
+            If the ending is another, ffmpeg is missing for ``.mp4``, or the path cannot be
+            written.
         OSError
-            If the file cannot be written.
+            If the writing fails.
         TypeError
             If ``path`` is no path, or ``progress`` no function.
         """
         path = check_film("path", path)
+        check_outputs({"path": path}, {})
         function("progress", progress)
         if path.suffix.lower() == ".html":
             data = self.page.encode()

@@ -102,6 +102,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="D",
         help="Δ/h_max of the fields on both branches (default: quarters of --max-penetration)",
     )
+    output.add_argument(
+        "--field-stresses",
+        nargs="+",
+        type=stress,
+        metavar="P",
+        help="instead, mean stresses of the fields on both branches: 10kPa, a tension in Pa alone: "
+        "-500 (default with --preload: its quarters)",
+    )
     output.add_argument("--field-nodes", type=int, metavar="N", help="nodes of the fields")
     output.add_argument("--strict", action="store_true", help="exit code 1 if the loss is doubtful")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")

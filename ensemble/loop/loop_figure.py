@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,60 +19,95 @@ from adhesis.ensemble.report.figures.style import (
 )
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.reading.measured_trace import Trace
+from adhesis.solver.checks import shown
 from adhesis.solver.loading.loop_result import LoopResult
+from adhesis.solver.loading.loop_state import LoopState
 from adhesis.solver.loading.path import PathResult
 from adhesis.solver.method import Fields, Opening
 from adhesis.solver.model.problem import Problem
-from adhesis.solver.model.profile import Profile
+from adhesis.solver.model.profile import Array, Profile
 
 
-def draw_loops(results: Sequence[LoopResult] | PathResult) -> Figure:
+def draw_loops(results: Sequence[LoopResult] | PathResult, ax: object = None) -> Figure:
     """Draw loops that share their loading branch, or one path.
 
     Parameters
     ----------
     results : sequence of LoopResult, ascending turning points; or PathResult
+    ax : Axes or sequence of Axes, optional
+        One for the mean stress, or two for mean stress and contact fraction.
+
+    Raises
+    ------
+    TypeError
+        If ``ax`` is neither.
     """
-    with style():
-        figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
-        stress, contact = figure.axes
-        if isinstance(results, PathResult):
-            _draw_path(stress, contact, results)
-        else:
-            _draw_each(stress, contact, results)
-        stress.axhline(0, color="0.7", lw=0.5, zorder=0)
-        depth = r"penetration $\Delta/h_{\max}$"
-        stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
+    if ax is None:
+        with style():
+            figure = new_figure(1, 2, TWO_COLUMNS, 62 * MM)
+            _draw(results, figure.axes)
+        return figure
+    panels = _panels_of(ax)
+    _draw(results, panels)
+    found = panels[0].get_figure(root=True)
+    assert found is not None
+    return found
+
+
+def _panels_of(ax: object) -> list[Axes]:
+    """Return one or two axes as a list."""
+    panels = [ax] if isinstance(ax, Axes) else list(ax) if isinstance(ax, Iterable) else []
+    found = [panel for panel in panels if isinstance(panel, Axes)]
+    if len(found) not in (1, 2) or len(found) < len(panels):
+        raise TypeError(f"ax is {shown(ax)}: it must be one Axes of matplotlib, or two of them")
+    return found
+
+
+def _draw(results: Sequence[LoopResult] | PathResult, panels: Sequence[Axes]) -> None:
+    """Draw the mean stress into the first of the panels, and the contact fraction into a second."""
+    if isinstance(results, PathResult):
+        _draw_path(panels, results)
+    else:
+        _draw_each(panels, results)
+    stress, depth = panels[0], r"penetration $\Delta/h_{\max}$"
+    stress.axhline(0, color="0.7", lw=0.5, zorder=0)
+    stress.set(xlabel=depth, ylabel=r"mean stress $\bar p$ (kPa)")
+    for contact in panels[1:]:
         contact.set(xlabel=depth, ylabel="contact fraction $A/A_0$", ylim=(0, None))
-        if len(stress.get_legend_handles_labels()[1]) > 1:
-            contact.legend()
-    return figure
+    if len(stress.get_legend_handles_labels()[1]) > 1:
+        panels[-1].legend()
 
 
-def _draw_path(stress: Axes, contact: Axes, path: PathResult) -> None:
+def _plot(panels: Sequence[Axes], x: Array, stress: Array, contact: Array, **options: Any) -> None:
+    for panel, y in zip(panels, (stress / 1e3, contact), strict=False):
+        panel.plot(x, y, **options)
+
+
+def _draw_path(panels: Sequence[Axes], path: PathResult) -> None:
     for leg in range(int(path.leg.max()) + 1):
         rows = path.leg == leg
         look = LOOKS[leg % len(LOOKS)]
         branch = str(path.branch[rows][0])
         label = f"leg {leg + 1}, {branch}"
         options = {"color": look.colour, "ls": LINE_OF_BRANCH[branch], "label": label}
-        stress.plot(path.penetration[rows], path.mean_stress[rows] / 1e3, **options)
-        contact.plot(path.penetration[rows], path.contact_fraction[rows], **options)
+        _plot(panels, *_curve(path, rows), **options)
 
 
-def _draw_each(stress: Axes, contact: Axes, loops: Sequence[LoopResult]) -> None:
+def _curve(path: LoopResult | PathResult, rows: Any) -> tuple[Array, Array, Array]:
+    return path.penetration[rows], path.mean_stress[rows], path.contact_fraction[rows]
+
+
+def _draw_each(panels: Sequence[Axes], loops: Sequence[LoopResult]) -> None:
     deepest = loops[-1]
     for k, loop in enumerate(loops):
         rows = loop.states("unloading")
         colour = LOOKS[k % len(LOOKS)].colour
         label = f"unloading from {loop.penetration[rows[0]]:.3g}"
         options = {"color": colour, "ls": LINE_OF_BRANCH["unloading"], "label": label}
-        stress.plot(loop.penetration[rows], loop.mean_stress[rows] / 1e3, **options)
-        contact.plot(loop.penetration[rows], loop.contact_fraction[rows], **options)
+        _plot(panels, *_curve(loop, rows), **options)
     rows = deepest.states("loading")
     options = {"color": "k", "ls": LINE_OF_BRANCH["loading"], "label": "loading"}
-    stress.plot(deepest.penetration[rows], deepest.mean_stress[rows] / 1e3, **options)
-    contact.plot(deepest.penetration[rows], deepest.contact_fraction[rows], **options)
+    _plot(panels, *_curve(deepest, rows), **options)
 
 
 _POINTS = 2000  # of a drawn profile
@@ -106,6 +141,8 @@ def _curves(shown: Any) -> list[tuple[str, Any, Any]]:
         level = shown.level()
         used = _curves(shown.profile())[0][1:]
         return [("level", shown.step * np.arange(level.size), level), ("used, one period", *used)]
+    if isinstance(shown, LoopState):
+        shown = shown.fields()
     if isinstance(shown, Fields):
         return [("profile", shown.x, shown.height), ("surface", shown.x, shown.height + shown.gap)]
     if isinstance(shown, Opening):

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import whole_file
 from adhesis.ensemble.quantities import in_works_of_adhesion
 from adhesis.solver.checks import counted
@@ -34,6 +35,7 @@ def loop_document(result: LoopResult | PathResult) -> dict[str, Any]:
         **result.numbers(),
         **_displacement(result),
         "interior_tension": None if interior is None else asdict(interior),
+        "loss_note": result.loss_note,
         "warnings": list(result.warnings),
         "method_details": {key: _plain(value) for key, value in details.items()},
         "jumps": result.jump_rows(),
@@ -87,7 +89,8 @@ def path_summary(result: PathResult) -> str:
         "to the largest",
         f"work        {result.work:.6g} J/m²"
         f"{in_works_of_adhesion(result.work, result.problem.work_of_adhesion)}, of which "
-        f"{result.energy_change:.6g} J/m² are stored",
+        f"{result.energy_change:.6g} J/m² are stored"
+        f"{f'; {result.loss_note}' if result.loss_note else ''}",
         _audit(result),
         _range(result),
     ]
@@ -123,7 +126,8 @@ def loop_summary(result: LoopResult) -> str:
             f"most patches {result.patches.max()}",
             f"loss        {result.loss:.6g} J/m²"
             f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)} "
-            f"(dimensionless {result.loss_dimensionless:.6g})",
+            f"(dimensionless {result.loss_dimensionless:.6g})"
+            f"{f'; {result.loss_note}' if result.loss_note else ''}",
             _range(result),
             _audit(result),
             f"error       {result.loss_error:.2g} J/m² (numerical); "
@@ -149,6 +153,10 @@ def _audit(result: LoopResult | PathResult) -> str:
 
 def _turn(result: LoopResult) -> str:
     control = result.problem.control
+    if result.preload is not None:
+        held = "" if control.is_fixed else f"held by {control.stiffness:.4g} Pa/m, "
+        reached = "" if control.is_fixed else f" (penetration {result.max_penetration:.4g} h_max)"
+        return f"{held}turning at {result.turning_text}{reached}"
     if control.is_load:
         return f"under a load to {result.turning_point:g} Pa"
     if control.is_fixed:
@@ -167,6 +175,10 @@ def _plain(value: Any) -> Any:
 
 
 # ---------------------------------------------------------------------- fields
+
+
+FieldsOfState = tuple[Branch, float, ContactState, Fields]
+"""Branch, penetration Δ/h_max, state and its fields."""
 
 
 @dataclass
@@ -203,27 +215,12 @@ class FieldStates:
         ``branch`` and ``penetration`` have shape (k,), ``x`` and ``height`` (n,), ``stress``,
         ``displacement`` and ``gap`` (k, n), ``edges`` (k, most patches, 2) with NaN for none.
         """
-        found: list[tuple[Branch, float, ContactState, Fields]] = []
+        found: list[FieldsOfState] = []
         for branch in BRANCHES:
             for wanted in self.penetrations:
                 state = self._state(branch, wanted)
                 found.append((branch, wanted, state, self.method.fields(state, n)))
-        edges = np.full((len(found), max(s.patches for _, _, s, _ in found), 2), np.nan)
-        for row, (_, _, state, _) in zip(edges, found, strict=True):
-            row[: state.patches] = state.edges
-        fields = [f for *_, f in found]
-        return {
-            "branch": np.array([branch for branch, *_ in found]),
-            "penetration": np.array([wanted for _, wanted, *_ in found]),
-            "separation": np.array([state.separation for _, _, state, _ in found]),
-            "mean_stress": np.array([state.mean_stress for _, _, state, _ in found]),
-            "x": fields[0].x,
-            "height": fields[0].height,
-            "stress": np.array([f.stress for f in fields]),
-            "displacement": np.array([f.displacement for f in fields]),
-            "gap": np.array([f.gap for f in fields]),
-            "edges": edges,
-        }
+        return _arrays(found)
 
     def _state(self, branch: Branch, wanted: float) -> ContactState:
         separation = self.method.problem.separation(wanted)
@@ -233,6 +230,50 @@ class FieldStates:
         if before.patches and before.separation == separation:
             return before
         return self.method.follow(before, separation).states[-1]
+
+
+def fields_at_stresses(loop: LoopResult, stresses: Sequence[float], n: int) -> dict[str, Any]:
+    """Return the fields on n nodes at mean stresses in Pa, as :meth:`FieldStates.collect` does.
+
+    A branch that does not have a mean stress is left out.
+
+    Raises
+    ------
+    InputError
+        If neither branch has it.
+    """
+    found: list[FieldsOfState] = []
+    absent = dict.fromkeys(stresses, 0)
+    for branch in BRANCHES:
+        for wanted in stresses:
+            try:
+                here = loop.at_stress(wanted, branch)
+            except ValueError as error:
+                absent[wanted] += 1
+                if absent[wanted] == len(BRANCHES):
+                    raise InputError(f"--field-stresses: {error}") from None
+                continue
+            found.append((branch, here.penetration, here.state, here.fields(n)))
+    return _arrays(found)
+
+
+def _arrays(found: Sequence[FieldsOfState]) -> dict[str, Any]:
+    edges = np.full((len(found), max(s.patches for _, _, s, _ in found), 2), np.nan)
+    for row, (_, _, state, _) in zip(edges, found, strict=True):
+        row[: state.patches] = state.edges
+    fields = [f for *_, f in found]
+    return {
+        "branch": np.array([branch for branch, *_ in found]),
+        "penetration": np.array([penetration for _, penetration, *_ in found]),
+        "separation": np.array([state.separation for _, _, state, _ in found]),
+        "mean_stress": np.array([state.mean_stress for _, _, state, _ in found]),
+        "x": fields[0].x,
+        "height": fields[0].height,
+        "stress": np.array([f.stress for f in fields]),
+        "displacement": np.array([f.displacement for f in fields]),
+        "gap": np.array([f.gap for f in fields]),
+        "edges": edges,
+    }
 
 
 def write_npz(path: Path, arrays: dict[str, Any]) -> None:

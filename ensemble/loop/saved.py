@@ -16,7 +16,8 @@ import xarray as xr
 
 from adhesis._version import __version__
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.outputs import check_outputs, whole_file, write_netcdf
+from adhesis.ensemble.loop.sealed_file import read_sealed, sealed
+from adhesis.ensemble.outputs import check_outputs, whole_file
 from adhesis.ensemble.quantities import UNITS, with_units
 from adhesis.solver import checks
 from adhesis.solver.loading.loop_result import LoopResult
@@ -33,7 +34,25 @@ Result = LoopResult | PathResult
 _KINDS: dict[str, type[Result]] = {"loop": LoopResult, "path": PathResult}
 _KIND = "adhesis_result"
 _NOT_KEPT = {"problem", "method", "contact_states", "new_method"}
+# Numbers that are computed anew may differ so much, relatively, on another processor.
+_ROUNDING = 1e-9
 _PARTS: dict[str, tuple[str, type]] = {"jumps": ("jump", Jump), "minor_loops": ("minor", MinorLoop)}
+
+
+_KIND_OF = {
+    "NDArray[np.str_]": "OU",
+    "NDArray[np.bool_]": "b",
+    "NDArray[np.int64]": "i",
+    "Array": "f",
+}
+# What a file may hold: variables of either kind of result, and their dimensions.
+_MEMBERS = frozenset(
+    (
+        *(entry.name for kind in _KINDS.values() for entry in fields(kind)),
+        *(f"{dim}_{entry.name}" for dim, part in _PARTS.values() for entry in fields(part)),
+        *("coefficient_real", "coefficient_imag", "harmonic", "state", "jump", "minor"),
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -93,17 +112,27 @@ def to_xarray(result: Result) -> xr.Dataset:
         elif value is not None:
             about[entry.name] = np.array(value) if isinstance(value, tuple) else value
     problem = result.problem
+    variables["tangent"][2]["units"] = "m/Pa" if problem.control.is_load else "Pa/m"
     coefficients = problem.profile.coefficients
     for name, values in (("real", coefficients.real), ("imag", coefficients.imag)):
         name = f"coefficient_{name}"
         variables[name] = _variable("harmonic", name, np.array(values))
-    about |= {name: value for name, value in result.numbers().items() if value is not None}
+    for name, value in result.numbers().items():
+        if value is not None:
+            about[name] = int(value) if isinstance(value, bool) else value  # netCDF has no booleans
     about |= {
         "stiffness": problem.control.stiffness,
         "strength": problem.strength,
-        "method": json.dumps(asdict(result.method), default=lambda v: v.tolist()),
+        "method": json.dumps(_as_json(result.method), default=lambda v: v.tolist()),
     }
     return xr.Dataset(variables, attrs=about)
+
+
+def _as_json(report: MethodReport) -> dict[str, Any]:
+    """Return a report as it was before it was first saved."""
+    values = asdict(report)
+    details: dict[str, Any] = values.pop("details", {})
+    return values | details
 
 
 def _typed(values: list[Any], part: type, name: str) -> Any:
@@ -123,15 +152,17 @@ def _variable(dim: str, name: str, values: Any) -> tuple[str, Any, dict[str, str
 def write_csv(path: Path, results: Sequence[LoopResult] | PathResult) -> None:
     """Write the states as a CSV, one row each, with units in the header (OSError).
 
-    Of several loops the first column is the turning point.
+    Of several loops the first column is the turning point, or the preload.
     """
     several = [results] if isinstance(results, PathResult) else results
     tables = [to_dataframe(result, "states") for result in several]
     units = tables[0].attrs["units"] | {"penetration": "h_max"}
     if not isinstance(results, PathResult) and len(results) > 1:
-        units["turning_point"] = "Pa" if results[0].problem.control.is_load else "h_max"
+        turn = "turning_point" if results[0].preload is None else "preload"
+        at_stress = results[0].problem.control.is_load or turn == "preload"
+        units[turn] = "Pa" if at_stress else "h_max"
         for table, result in zip(tables, results, strict=True):
-            table.insert(0, "turning_point", result.turning_point)
+            table.insert(0, turn, getattr(result, turn))
     for table in tables:
         table.attrs.clear()  # pandas compares them when it joins tables
     names = {name: f"{name} ({unit})" if unit else name for name, unit in units.items()}
@@ -145,7 +176,11 @@ def save(result: Result, path: str | os.PathLike[str]) -> None:
     if path.suffix != ".nc":
         raise InputError(f"path is {path}: the name must end in .nc")
     check_outputs({"path": path}, {})
-    write_netcdf(path, to_xarray(result))
+    dataset = to_xarray(result)
+    plain = {name: {"_FillValue": None} for name in dataset.variables}  # no value means "missing"
+    content = sealed(bytes(dataset.to_netcdf(None, engine="h5netcdf", encoding=plain)))
+    with whole_file(path) as stream:
+        stream.write(content)
 
 
 def load(path: str | os.PathLike[str]) -> Result:
@@ -154,7 +189,7 @@ def load(path: str | os.PathLike[str]) -> Result:
     Parameters
     ----------
     path : path
-        A netCDF file, of this or an earlier version of adhesis.
+        A netCDF file.
 
     Returns
     -------
@@ -164,7 +199,8 @@ def load(path: str | os.PathLike[str]) -> Result:
     Raises
     ------
     InputError
-        If the file is missing, or no such file.
+        If the file is missing, damaged, changed, or no such file; or if its loss is not that of its
+        states and jumps.
     TypeError
         If ``path`` is no path.
 
@@ -188,15 +224,93 @@ def load(path: str | os.PathLike[str]) -> Result:
     """
     path = checks.path("path", path)
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as file:
-            found = file.load()
-        return _result(found)
+        found = read_sealed(path, _MEMBERS)
+        result = _result(found)
+        contradiction = _contradiction(found, result)
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"path is {path}: there is no such file") from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except PermissionError:
+        raise InputError(f"path is {path}: it cannot be read (permission denied)") from None
+    except Exception as error:  # h5py and xarray raise nearly every kind over a crafted file
         raise InputError(
             f"path is {path}: it is no loop or path that adhesis has saved ({type(error).__name__})"
         ) from error
+    if contradiction:
+        raise InputError(
+            f"path is {path}: its {contradiction} is not that of its other numbers, so another "
+            "program has changed it"
+        )
+    return result
+
+
+def _contradiction(found: xr.Dataset, result: Result) -> str | None:
+    """Return the name of a number that is not what the others make it; None if all agree.
+
+    The file must be what is saved of the result, and the result what its states and jumps make it,
+    but for the rounding of another processor.
+    """
+    again = to_xarray(result)
+    for name in {*found.variables, *again.variables}:
+        if name not in found or name not in again or not found[name].identical(again[name]):
+            return str(name)
+    for name in (found.attrs.keys() | again.attrs.keys()) - {"adhesis_version"}:
+        if not _alike(found.attrs.get(name), again.attrs.get(name)):
+            return str(name)
+    for name, value in _recomputed(result).items():
+        if not _alike(getattr(result, name), value):
+            return name
+    scale = float(np.sum(np.abs(result.mean_stress[1:] * np.diff(result.separation))))
+    for name, value in _works(result).items():
+        if not _alike(getattr(result, name), value, scale):
+            return name
+    change = result.energy_change if isinstance(result, PathResult) else 0.0
+    audited = abs(result.loss - change - result.loss_from_drops)
+    if not result.loss_error >= audited - _ROUNDING * scale:  # which is a part of it
+        return "loss_error"
+    return None
+
+
+def _recomputed(result: Result) -> dict[str, Any]:
+    """Compute anew what a result keeps beside the states and jumps that it follows from."""
+    values: dict[str, Any] = {
+        "penetration": result.problem.penetration(result.separation),
+        "loss_from_drops": float(sum(jump.energy_drop for jump in result.jumps)),
+    }
+    if isinstance(result, LoopResult):
+        deepest = result.penetration[_turn(result)]
+        is_fixed = result.problem.control.is_fixed
+        values["max_penetration"] = result.turning_point if is_fixed else deepest
+        values["loss_dimensionless"] = result.loss / result.problem.loss_scale
+    return values
+
+
+def _works(result: Result) -> dict[str, float]:
+    """Compute the work of a result anew, in J/m² of nominal area."""
+    work = result.work_along(slice(None))
+    if isinstance(result, PathResult):
+        ends = result.potential[[-1, 0]]
+        change = float(ends[0] - ends[1]) / result.problem.profile.period
+        return {"work": work, "energy_change": change}
+    gained = -result.work_along(slice(0, _turn(result)))
+    return {"loss": work, "work_gained": gained, "work_spent": work + gained}
+
+
+def _turn(result: LoopResult) -> int:
+    """Return the index of the first state of unloading."""
+    return int(result.states("unloading")[0])
+
+
+def _alike(one: Any, other: Any, scale: float = 0.0) -> bool:
+    """Whether two values are equal, numbers but for rounding, relative to them or to a scale."""
+    one, other = np.asarray(one), np.asarray(other)
+    if one.size != other.size:
+        return False
+    if one.dtype.kind not in "fiu" or other.dtype.kind not in "fiu":
+        return bool(np.array_equal(one, other))
+    one, other = one.ravel(), other.ravel()
+    return bool(np.allclose(one, other, _ROUNDING, _ROUNDING * scale, equal_nan=True))
 
 
 def _result(found: xr.Dataset) -> Result:
@@ -208,13 +322,13 @@ def _result(found: xr.Dataset) -> Result:
         if name in _PARTS:
             dim, part = _PARTS[name]
             names = [entry.name for entry in fields(part)]
-            # a file of an earlier version lacks entries that have a default
-            names = [name for name in names if f"{dim}_{name}" in found]
             columns = [found[f"{dim}_{entry}"].values.tolist() for entry in names]
             rows = zip(*columns, strict=True)
             values[name] = tuple(part(**dict(zip(names, row, strict=True))) for row in rows)
         elif name in found:
             array = found[name].values
+            if array.dtype.kind not in _KIND_OF[str(entry.type)]:
+                raise TypeError(name)
             values[name] = array.astype(str) if array.dtype.kind == "O" else array
         elif name == "turning_points":
             values[name] = tuple(np.atleast_1d(about[name]).tolist())

@@ -13,6 +13,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from adhesis.ensemble.outputs import check_output_folder
 from adhesis.ensemble.quantities import UNITS, in_works_of_adhesion, with_units
 from adhesis.ensemble.reporter import bar
 from adhesis.solver import checks
@@ -29,11 +30,11 @@ if TYPE_CHECKING:
 Result = LoopResult | PathResult
 
 
-def plot(result: Result) -> Any:
+def plot(result: Result, ax: Any = None) -> Any:
     """Draw mean stress and contact fraction; see :meth:`adhesis.LoopResult.plot`."""
     from adhesis.ensemble.loop.loop_figure import draw_loops
 
-    return draw_loops(result if isinstance(result, PathResult) else [result])
+    return draw_loops(result if isinstance(result, PathResult) else [result], ax)
 
 
 def film(
@@ -113,7 +114,9 @@ def write_trace_page(answer: Answer, folder: str | os.PathLike[str]) -> Path:
     """Write page, figures and numbers of an answer; see its method ``page``."""
     from adhesis.ensemble.trace.trace_page import write_all
 
-    return write_all(answer, checks.path("folder", folder))
+    path = checks.path("folder", folder)
+    check_output_folder("folder", path, (), {})
+    return write_all(answer, path)
 
 
 def table_of_runs(answer: Answer) -> Any:
@@ -122,7 +125,7 @@ def table_of_runs(answer: Answer) -> Any:
 
     from adhesis.ensemble.trace.answer import run_rows
 
-    hidden = ("range_warnings", "failed")
+    hidden = ("range_warnings", "preload_warnings", "failed")
     rows = [{k: v for k, v in row.items() if k not in hidden} for row in run_rows(answer)]
     return with_units(pd.DataFrame(rows).rename(columns={"said": "description"}))
 
@@ -135,7 +138,8 @@ def _rows_of_result(result: Result) -> list[tuple[str, str]]:
         (
             "loss" if is_loop else "work",
             f"{result.loss:.5g} ± {result.loss_error:.1g} J/m²"
-            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)}",
+            f"{in_works_of_adhesion(result.loss, problem.work_of_adhesion)}"
+            f"{f'; {result.loss_note}' if result.loss_note else ''}",
         ),
         ("sum of energy drops", f"{result.loss_from_drops:.5g} J/m²"),
         ("jumps", str(len(result.jumps))),
@@ -146,6 +150,7 @@ def _rows_of_result(result: Result) -> list[tuple[str, str]]:
     ]
     if isinstance(result, LoopResult):
         rows.insert(3, ("pull-off stress", f"{result.pull_off_stress:.4g} Pa"))
+        rows.insert(1, ("turns at", result.turning_text))
     return rows + [("warning", text) for text in result.warnings]
 
 

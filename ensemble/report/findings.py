@@ -16,9 +16,8 @@ from adhesis.ensemble.quantities import with_unit
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.further_axes import cell_name, lines_along, place, together
 from adhesis.ensemble.report.tables.loss_tables import least
-from adhesis.ensemble.stresses import stress_text
 from adhesis.ensemble.task.doubt import bound, doubtful, why_beyond
-from adhesis.solver.loading.zero_range import beyond_limit
+from adhesis.solver.loading.zero_range import beyond_limit, stress_text
 
 # Root mean square slope above which linear elasticity of small slopes is doubtful.
 STEEP = 0.3
@@ -34,7 +33,15 @@ def _outcome(data: Aggregate) -> str:
         (cell for cell in data.cells if cell.done),
         key=lambda cell: cell.estimates["loss"].mean,
     )
+    cycle = data.campaign.cycle
     top = f"A loop to {turning_point(data)} and back until detached loses"
+    if cycle.under_load:
+        falls = _all(data, "pull_off_stress")
+        ends = " to ".join(dict.fromkeys(stress_text(end) for end in (falls.min(), falls.max())))
+        top = (
+            f"A loop to {turning_point(data)} and back under a weight, which falls off at {ends} "
+            "(the energy of the fall is not counted), loses"
+        )
     if len(cells) == 1:
         return f"{top} on average {_loss(cells[0])}."
     share = [cell.estimates["small_scale_share"].mean for cell in cells]
@@ -49,9 +56,10 @@ def turning_point(data: Aggregate) -> str:
     """Return "Δ/h_max = 0.5 … 0.9": to where the finished loops were loaded."""
     cycle = data.campaign.cycle
     ends = sorted({cell.campaign.cycle.turning_point for cell in data.cells if cell.done})
-    if cycle.under_load:
+    if cycle.turns_at_stress:
         texts = [stress_text(end) for end in ends]
-        return f"a mean stress of {' … '.join(dict.fromkeys((texts[0], texts[-1])))} by a weight"
+        what = "mean stress" if cycle.under_load else "preload"
+        return f"a {what} of {' … '.join(dict.fromkeys((texts[0], texts[-1])))}"
     texts = [f"{end:g}" for end in ends]
     end = " … ".join(dict.fromkeys((texts[0], texts[-1])))
     return f"{penetration_sign(data)} = {end}"
@@ -224,6 +232,8 @@ def quality(data: Aggregate) -> list[str]:
             f"loss: {_listed(wrong)}."
         )
     out += _limit(data)
+    if data.campaign.cycle.preload is not None:
+        out += _preload(data)
     steep = [cell_name(cell) for cell in data.cells if cell.done and _rms_slope(cell) > STEEP]
     if steep:
         out.append(
@@ -248,6 +258,19 @@ def quality(data: Aggregate) -> list[str]:
             "their curves are cut, their losses are complete."
         )
     return out
+
+
+def _preload(data: Aggregate) -> list[str]:
+    """Report the loops whose mean stress did not reach the preload, by cell."""
+    short = [(int(np.sum(cell.values["preload_reached"] == 0)), cell) for cell in data.cells]
+    short = [(count, cell) for count, cell in short if count]
+    if not short:
+        return ["Every loop reached its preload."]
+    return [
+        f"WARNING: {sum(count for count, _ in short)} of {data.done} loops did not reach their "
+        "preload, and turned at the latest turning point: "
+        f"{_listed([f'{count} at {cell_name(cell)}' for count, cell in short])}."
+    ]
 
 
 def _limit(data: Aggregate) -> list[str]:
@@ -457,7 +480,7 @@ def _spectrum(data: Aggregate) -> list[str]:
     if not parts:
         return []
     depths = {f"{cell.plan.penetration[-1]:.2f}" for cell in data.cells}
-    sign = "p̄/p̄_max" if data.campaign.cycle.under_load else penetration_sign(data)
+    sign = "p̄/p̄_max" if data.campaign.cycle.turns_at_stress else penetration_sign(data)
     depth = f"{sign} = {' or '.join(sorted(depths))}"
     return [
         "Slope of the loading spectrum of the deformed surface at small wave numbers and "

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.escape import code_span, fence, markdown, printable
 from adhesis.ensemble.interval import FEWEST_FOR_SKEWNESS, interval_method
 from adhesis.ensemble.quantities import with_unit
@@ -118,7 +119,7 @@ def _summary(data: Aggregate) -> str:
     further = "".join(
         f"{axis.name} = {', '.join(with_unit(axis.name, v) for v in sorted(axis.values))}; "
         for axis in data.further
-        if axis.name not in ("max_penetration", "max_stress")
+        if axis.name not in TURNING_POINTS
     )
     many = f"{sweep.realisations} realisations"
     if data.campaign.stop.relative_error is not None:
@@ -156,6 +157,8 @@ def _footnote(data: Aggregate) -> str:
         "± loop: mean of the estimated numerical error of a loop",
         f"± steps: {steps}",
     ]
+    if data.campaign.cycle.under_load:
+        parts.append("under a weight: it falls off, the energy of the fall is not counted")
     if any(cell.work_of_adhesion > 0 for cell in data.cells):
         parts.append("W/γ: loss over work of adhesion")
     if "resolution" in kinds:

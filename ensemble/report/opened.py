@@ -85,6 +85,8 @@ class CampaignResults:
     def __init__(self, path: Path | str, beside: Sequence[Path | str] = ()) -> None:
         self.path = Path(path)
         self._beside = tuple(beside)
+        for other in self._beside:
+            Results(other).close()  # refused now, and not when a comparison is drawn
         with Results(self.path) as results:
             self.campaign: Campaign = results.campaign
             status = results.status()
@@ -251,13 +253,8 @@ class CampaignResults:
 def _axes(results: Results) -> dict[str, NDArray[Any]]:
     """Values of every task on each axis, row by row; of a part, those of its rows."""
     tasks = results.tasks()
-    out = {
-        "hurst": np.array([task.hurst for task in tasks]),
-        "work_of_adhesion": np.array([task.work_of_adhesion for task in tasks]),
-    }
-    for place, axis in enumerate(results.campaign.axes[2:]):
-        out[axis.name] = np.array([task.others[place][1] for task in tasks])
-    return out | {"realisation": np.array([task.realisation for task in tasks])}
+    names = ("hurst", "work_of_adhesion", *tasks.names, "realisation")
+    return {name: tasks.column(name) for name in names}
 
 
 def _frame(table: Table, index: Sequence[str]) -> pd.DataFrame:

@@ -17,6 +17,7 @@ from typing import BinaryIO
 import h5py
 import numpy as np
 
+from adhesis.ensemble.regular_file import open_regular
 from adhesis.ensemble.results.schema import ROW_DATASETS
 
 HEAD = "head"
@@ -65,10 +66,12 @@ def check_head(path: Path) -> bool | None:
 
     Raises
     ------
+    InputError
+        If it is a pipe, device or directory.
     OSError
         If it cannot be read.
     """
-    with path.open("rb") as handle:
+    with open_regular(path) as handle:
         place = handle.read(_NEAR).find(_MARK)
         if place < 0:
             return None

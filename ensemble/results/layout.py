@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,17 +27,19 @@ from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.quantities import bytes_text
+from adhesis.ensemble.regular_file import irregular
+from adhesis.ensemble.results.disk_file import opened, refusal
 from adhesis.ensemble.results.head import reserve_head, write_head
 from adhesis.ensemble.results.read import Results, stretches
 from adhesis.ensemble.results.schema import (
     DAMAGED,
     DATASETS,
-    FILE_TYPE,
-    FILE_VERSION,
     TASK_DATASETS,
     axis_datasets,
     datasets,
+    description,
     file_size,
+    fixed_attributes,
     scales,
     shape_of,
 )
@@ -47,10 +50,33 @@ from adhesis.solver.runtime.uninterrupted import signals_held
 _COPY_BYTES = 16 * 2**20  # memory of a growing copy
 
 
-def check_new_file(option: str, path: Path) -> None:
-    """Refuse a results file that is to be made with another ending than .h5."""
-    if path.suffix != ".h5":
-        raise InputError(f"{option} is {path}: the name of a new results file must end in .h5")
+def check_results_file(option: str, path: Path) -> None:
+    """Refuse what is no regular file, and a new file that does not end in .h5 (InputError)."""
+    try:
+        kind = irregular(path.stat().st_mode)
+    except FileNotFoundError:
+        if path.suffix != ".h5":
+            raise InputError(
+                f"{option} is {path}: the name of a new results file must end in .h5"
+            ) from None
+        folder = target_of(path).parent
+        if not folder.is_dir():
+            raise InputError(f"{path} cannot be written: there is no folder {folder}") from None
+        return
+    except OSError as error:
+        raise InputError(f"{option} is {path}: it cannot be written ({error.strerror})") from None
+    if kind is not None:
+        raise InputError(f"{option} is {path}: it is {kind}, not a results file")
+
+
+def check_space(path: Path, campaign: Campaign, part: Part = WHOLE) -> None:
+    """Refuse a file that the disk has no room for (InputError), before its tasks are made."""
+    needed = file_size(campaign, part)
+    free = shutil.disk_usage(path.parent).free
+    if needed > free:
+        raise InputError(
+            f"{path} needs {bytes_text(needed)} and the disk has {bytes_text(free)} free"
+        )
 
 
 def create(
@@ -81,20 +107,19 @@ def create(
     ------
     InputError
         If the file cannot be written or the disk is too small.
+    WriteError
+        If the disk does not take it.
     """
     path = target_of(path)
     unfinished = path.with_name(f"{path.name}.part")
-    needed = file_size(campaign, part)
+    if unfinished.is_dir() and not unfinished.is_symlink():
+        raise InputError(f"{path} cannot be written: there is a directory {unfinished}, remove it")
     with signals_held():
         try:
-            free = shutil.disk_usage(path.parent).free
-            if needed > free:
-                raise InputError(
-                    f"{path} needs {bytes_text(needed)} and the disk has {bytes_text(free)} free"
-                )
+            check_space(path, campaign, part)
             # Made anew, so that a link of that name is removed and not followed.
             unfinished.unlink(missing_ok=True)
-            with h5py.File(unfinished, "x", locking=False) as file:
+            with opened(unfinished, "x+b") as (file, _):
                 reserve_head(file)
                 _lay_out(file, campaign, part)
                 _describe(file, campaign, part, versions or {}, grown_from)
@@ -105,9 +130,10 @@ def create(
                 os.fsync(handle.fileno())
             unfinished.replace(path)
         except OSError as error:
-            raise InputError(f"{path} cannot be written: {reason(error)}") from error
+            raise refusal(error)(f"{path} cannot be written: {reason(error)}") from error
         finally:
-            unfinished.unlink(missing_ok=True)
+            with suppress(OSError):  # what another user has put there meanwhile
+                unfinished.unlink(missing_ok=True)
 
 
 def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
@@ -116,21 +142,17 @@ def _lay_out(file: h5py.File, campaign: Campaign, part: Part) -> None:
     for scale in laid_out:
         dataset = file.create_dataset(scale.name, data=scale.values)
         dataset.make_scale(scale.name)
-        dataset.attrs["units"] = scale.unit
-        dataset.attrs["long_name"] = scale.meaning
+        _set_attributes(dataset, description(scale))
     for column in datasets(campaign):
         dataset = _allocate(file, column, shape_of(column, sizes))
-        dataset.attrs["units"] = column.unit
-        dataset.attrs["long_name"] = column.meaning
-        for name, value in column.attributes.items():
-            dataset.attrs[name] = value
+        _set_attributes(dataset, description(column))
         for axis, dim in enumerate(column.dims):
             dataset.dims[axis].attach_scale(file[dim])
     tasks = campaign.tasks(part)
     for column in TASK_DATASETS:
-        file[column.name][...] = [getattr(task, column.name) for task in tasks]
-    for i, column in enumerate(axis_datasets(campaign)):
-        file[column.name][...] = [task.others[i][1] for task in tasks]
+        file[column.name][...] = tasks.column(column.name)
+    for name, column in zip(tasks.names, axis_datasets(campaign), strict=True):
+        file[column.name][...] = tasks.column(name)
 
 
 def _allocate(file: h5py.File, column: Dataset, shape: tuple[int, ...]) -> h5py.Dataset:
@@ -156,19 +178,17 @@ def _describe(
 ) -> None:
     now = datetime.now(UTC).isoformat(timespec="seconds")
     attributes: dict[str, Any] = {
-        "file_type": FILE_TYPE,
-        "file_version": np.array(FILE_VERSION, "i4"),
-        "Conventions": "CF-1.11",
-        "title": "Loading-unloading hysteresis loops of rough adhesive contacts",
-        "campaign": campaign.text,
-        "seed": campaign.sweep.seed,
+        **fixed_attributes(campaign, part),
         "created": now if old is None else old.attributes.get("created", now),
         "laid_out": now,
-        **({} if part == WHOLE else {"part": str(part)}),
         **versions,
     }
+    _set_attributes(file, attributes)
+
+
+def _set_attributes(of: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
     for name, value in attributes.items():
-        file.attrs[name] = value
+        of.attrs[name] = value
 
 
 def _copy_rows(old: Results, file: h5py.File, campaign: Campaign, part: Part) -> None:

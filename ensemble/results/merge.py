@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.results.disk_file import opened
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import (
@@ -36,6 +37,7 @@ from adhesis.ensemble.results.schema import (
 from adhesis.ensemble.results.write import reason
 from adhesis.ensemble.task.dataset import KEPT, Dataset
 from adhesis.ensemble.task.row import RESULT_DATASETS
+from adhesis.solver.runtime.uninterrupted import signals_held
 
 Rows = NDArray[np.intp]
 
@@ -219,21 +221,24 @@ def _compare(source: _Source, row: int, other: Results, there: int) -> None:
 def _copy(sources: Sequence[_Source], out: Path) -> None:
     """Write the rows that were assigned, block by block, the status of a block last."""
     try:
-        with h5py.File(out, "r+", locking=False) as file:
+        with opened(out, "r+b") as (file, disk):
             kept = file[KEPT][:]
             for first in range(0, file["task"].size, _BLOCK_ROWS):
                 stop = first + _BLOCK_ROWS
                 if not any(source.gives(first, stop) for source in sources):
                     continue
-                for dataset in _COPIED:
-                    if dataset.dims[0] == KEPT:
-                        low, high = np.searchsorted(kept, (first, stop))
-                        _copy_dataset(sources, file, dataset, int(low), int(high))
-                    else:
-                        _copy_dataset(sources, file, dataset, first, stop)
-                file.flush()
-                _copy_dataset(sources, file, STATUS, first, stop)
-                file.flush()
+                with signals_held():
+                    for dataset in _COPIED:
+                        if dataset.dims[0] == KEPT:
+                            low, high = np.searchsorted(kept, (first, stop))
+                            _copy_dataset(sources, file, dataset, int(low), int(high))
+                        else:
+                            _copy_dataset(sources, file, dataset, first, stop)
+                    file.flush()
+                    disk.check()
+                    _copy_dataset(sources, file, STATUS, first, stop)
+                    file.flush()
+                    disk.check()
     except OSError as error:
         raise WriteError(f"{out} could not be written: {reason(error)}") from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Tasks
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.checksum import row_checksums
 from adhesis.ensemble.results.head import check_head
@@ -32,8 +33,10 @@ from adhesis.ensemble.results.schema import (
     axis_datasets,
     check_version,
     datasets,
+    description,
     encode_text,
     file_size,
+    fixed_attributes,
     has_checksums,
     lacking,
     origin_of,
@@ -41,10 +44,15 @@ from adhesis.ensemble.results.schema import (
     shape_of,
 )
 from adhesis.ensemble.task.dataset import KEPT, sizes_of
+from adhesis.solver.checks import shown
 
 _MOST_BESIDES = 16 * 2**20  # bytes beside the rows; texts and headers take some 100,000
 _LONGEST_ATTRIBUTE = 2**16  # bytes of a root attribute, of a text those of a reference to it
 _NUMBERS = ("file_version", "seed")  # root attributes that are no texts
+# Attributes that may differ between versions of adhesis that read each other's files.
+_WORDING = frozenset(("file_version", "title", "long_name"))
+# Attributes by which HDF5 joins datasets to the scales of their dimensions.
+_OF_HDF5 = frozenset(("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIMENSION_LABELS"))
 # Exponential functions of numpy differ between processors by the last bits.
 _SCALE_ROUNDING = 1e-12
 _LOOKS = 3
@@ -104,6 +112,7 @@ class Results:
             self._file = h5py.File(self.path, "r", locking=False)
         try:
             with _damage(self.path):
+                self._check_members()
                 self._check_size()
                 self.attributes = self._root_attributes()
                 version = check_version(
@@ -116,6 +125,7 @@ class Results:
                 self.part = Part.parse(self.attributes.get("part", str(WHOLE)))
                 self._datasets = datasets(self.campaign)
                 self._check_layout()
+                self._check_attributes()
                 self._check_scales()
                 self._tasks = self._checked_tasks()
         except BaseException:
@@ -136,9 +146,17 @@ class Results:
                 "campaign can have there"
             )
 
-    def _is_here(self, name: str) -> bool:
-        """Whether a member of the root is in this file, not a link to somewhere else."""
-        return isinstance(self._file.get(name, getlink=True), h5py.HardLink)
+    def _check_members(self) -> None:
+        """Refuse links to elsewhere, before any member of the root is looked up.
+
+        To look up a link to another file opens that one, for which a pipe lets HDF5 wait.
+        """
+        for name in self._file:
+            if not isinstance(self._file.get(name, getlink=True), h5py.HardLink):
+                raise InputError(
+                    f"{self.path} is damaged: its {name} is a link, and not in the file itself; "
+                    f"{_INSTEAD}"
+                )
 
     def _root_attributes(self) -> dict[str, Any]:
         found = {}
@@ -180,10 +198,38 @@ class Results:
 
     def _check_dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
         found = self._file[name]
-        if found.shape != shape or found.dtype != dtype or not self._is_here(name):
+        if found.shape != shape or found.dtype != dtype:
             raise ValueError(name)
         if found.is_virtual or found.external:
             raise ValueError(name)  # its numbers would be those of other files
+
+    def _check_attributes(self) -> None:
+        """Compare the attributes with those that the campaign and the layout have.
+
+        Readers of other programs go by them: by a seed, a unit, or a factor of a dataset.
+        """
+        for name, value in ({"part": None} | fixed_attributes(self.campaign, self.part)).items():
+            found: Any = self.attributes.get(name)
+            if name not in _WORDING and not np.array_equal(found, value):
+                raise InputError(
+                    f"{self.path} is damaged: its attribute {name} is {shown(found)}, and that of "
+                    f"its campaign is {shown(value)}; {_INSTEAD}"
+                )
+        if self.lacking:
+            return  # an earlier version described its datasets in other words
+        wanted = {s.name: description(s) for s in scales(self.campaign, self.part)}
+        for column in self._datasets:
+            wanted[column.name] = description(column)
+            of_dims = [[scale.name for scale in d.values()] for d in self._file[column.name].dims]
+            if of_dims != [[f"/{name}"] for name in column.dims]:
+                raise ValueError(column.name)
+        for name, attributes in wanted.items():
+            found = self._file[name].attrs
+            if set(found) - _OF_HDF5 != set(attributes):
+                raise ValueError(name)
+            for key in attributes.keys() - _WORDING:
+                if not np.array_equal(found[key], attributes[key]):
+                    raise ValueError(name)
 
     def _check_scales(self) -> None:
         """Compare the dimension scales with the campaign."""
@@ -195,15 +241,15 @@ class Results:
                     f"{_INSTEAD}"
                 )
 
-    def _checked_tasks(self) -> list[Task]:
+    def _checked_tasks(self) -> Tasks:
         """Return the tasks of the campaign, which those of the file must be."""
         tasks = self.campaign.tasks(self.part)
-        columns = [(d.name, [getattr(task, d.name) for task in tasks]) for d in TASK_DATASETS]
-        for place, axis in enumerate(axis_datasets(self.campaign)):
-            columns.append((axis.name, [task.others[place][1] for task in tasks]))
-        for name, wanted in columns:
-            found = self._file[name][:]
-            wrong = np.flatnonzero(found != np.asarray(wanted))
+        columns = [(d.name, d.name) for d in TASK_DATASETS]
+        further = zip(axis_datasets(self.campaign), tasks.names, strict=True)
+        columns += [(dataset.name, axis) for dataset, axis in further]
+        for name, axis in columns:
+            found, wanted = self._file[name][:], tasks.column(axis)
+            wrong = np.flatnonzero(found != wanted)
             if wrong.size:
                 row = int(wrong[0])
                 raise InputError(
@@ -354,9 +400,9 @@ class Results:
         text = encode_text(origin_of(self.attributes), ORIGIN_LENGTH)
         return np.full(rows.size, text, ORIGIN.dtype)
 
-    def tasks(self) -> list[Task]:
+    def tasks(self) -> Tasks:
         """Return every task, row by row."""
-        return self._tasks.copy()
+        return self._tasks
 
     def errors(self, rows: NDArray[np.intp]) -> list[str]:
         """Return the error texts of some rows (ascending)."""
@@ -402,11 +448,11 @@ def _damage(path: Path) -> Iterator[None]:
         raise
     except FileNotFoundError as error:
         raise InputError(f"{path} does not exist") from error
-    except IsADirectoryError as error:
-        raise InputError(f"{path} is a directory, not a results file") from error
     except PermissionError as error:
         raise InputError(f"{path} cannot be read: permission denied") from error
     except Exception as error:  # h5py raises nearly every kind over damaged bytes
+        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+            raise InputError(f"{path} cannot be read: {os.strerror(error.errno)}") from error
         raise InputError(
             f"{path} is not a results file of adhesis, or it is damaged or truncated"
         ) from error

@@ -29,7 +29,7 @@ from adhesis.ensemble.task.dataset import (
 from adhesis.ensemble.task.row import RESULT_DATASETS, row_scales
 
 FILE_TYPE = "adhesis-results"
-FILE_VERSION = (1, 3)
+FILE_VERSION = (1, 4)
 # Versions, beside that of adhesis, on which the last bits of a loop depend.
 _COMPUTING = ("numpy", "scipy", "numba", "llvmlite", "fftw", "processor")
 # Files of this version and later ones have checksums.
@@ -124,6 +124,12 @@ def datasets(campaign: Campaign) -> tuple[Dataset, ...]:
     return (*TASK_DATASETS, *axis_datasets(campaign), *RUN_DATASETS, *RESULT_DATASETS)
 
 
+def description(described: Dataset | Scale) -> dict[str, Any]:
+    """Return the attributes of a dataset."""
+    further = described.attributes if isinstance(described, Dataset) else {}
+    return {"units": described.unit, "long_name": described.meaning, **further}
+
+
 def kept_rows(campaign: Campaign, part: Part = WHOLE) -> NDArray[np.intp]:
     """Return the rows of the tasks that keep their fields, in the file of a part."""
     realisation = campaign.rows(part) % campaign.realisations
@@ -160,6 +166,19 @@ def file_size(campaign: Campaign, part: Part = WHOLE, without: frozenset[str] = 
         for dataset in datasets(campaign)
         if dataset.name not in without
     )
+
+
+def fixed_attributes(campaign: Campaign, part: Part = WHOLE) -> dict[str, Any]:
+    """Return the root attributes that a campaign decides, and the same for every file of it."""
+    return {
+        "file_type": FILE_TYPE,
+        "file_version": np.array(FILE_VERSION, "i4"),
+        "Conventions": "CF-1.11",
+        "title": "Loading-unloading hysteresis loops of rough adhesive contacts",
+        "campaign": campaign.text,
+        "seed": campaign.sweep.seed,
+        **({} if part == WHOLE else {"part": str(part)}),
+    }
 
 
 def encode_text(text: str, length: int = ERROR_LENGTH) -> bytes:

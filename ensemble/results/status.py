@@ -29,6 +29,7 @@ from adhesis.ensemble.results.read import (
 )
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from adhesis.ensemble.task.doubt import doubtful, why_beyond
+from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import beyond_limit
 from adhesis.solver.values import finite
 
@@ -60,7 +61,9 @@ def read_status(path: Path | str) -> dict[str, Any]:
         checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the worst first;
         ``beyond_limit``, one for each loss that is beyond what zero range describes
         (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least valid range first;
-        ``opens``, whether patches may open from inside; ``last_row``, when the file was last
+        ``opens``, whether patches may open from inside; ``under_load``, whether the loops are those
+        of a weight, and ``preload_not_reached``, the number of loops that did not reach their
+        preload (None without one); ``last_row``, when the file was last
         written to (as ``time.time()`` counts), None before the first row.
 
     Raises
@@ -71,7 +74,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
     with Results(path) as results:
         accuracy = results.campaign.solver.accuracy
         stop = results.campaign.stop
-        opens = results.campaign.material.opens
+        opens, cycle = results.campaign.material.opens, results.campaign.cycle
         axes = ["hurst", "work_of_adhesion"]
         further = axis_datasets(results.campaign)
         axes += [dataset.name for dataset in further]
@@ -85,6 +88,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
             "audit_residual",
             "loss_error",
             *("valid_range", "largest_contact_fraction", *(_STRENGTH if opens else ())),
+            *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
         failed = np.flatnonzero(state == FAILED)
@@ -115,6 +119,12 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
         "opens": opens,
+        "under_load": cycle.under_load,
+        "preload_not_reached": (
+            int(np.sum((column["preload_reached"] == 0) & (state == DONE)))
+            if "preload_reached" in column
+            else None
+        ),
         "beyond_limit": _beyond_limit(state, column, opens=opens),
         "last_row": os.stat(path).st_mtime if times.size or failures else None,
         "axes": list(axes),
@@ -267,6 +277,10 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         loss = "loss W~ ± standard error of the mean"
         lines += ["", f"    H  γ in J/m² {names}    done  pending  failed    mean s  {loss}"]
         lines += [_group_line(group, further) for group in groups]
+    if status["under_load"]:
+        lines += ["", "losses under a weight: it falls off, the energy of the fall is not counted"]
+    if status["preload_not_reached"]:
+        lines += ["", f"{counted(status['preload_not_reached'], 'loop')} did not reach the preload"]
     if status["damaged"]:
         lines += ["", *damage_lines(status["damaged"])]
     if status["doubtful"]:
@@ -298,7 +312,7 @@ def _group_line(group: dict[str, Any], further: Mapping[str, str]) -> str:
 
 
 def _loss(loss: float, error: float | None) -> str:
-    return f"{loss:.4g}" if error is None else with_error(loss, error)
+    return f"{loss:.4g}" if error is None else with_error(loss, error, 0.0)
 
 
 def _task(row: Mapping[str, Any]) -> str:

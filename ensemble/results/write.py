@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.results.checksum import OF_KEPT, OF_TASKS, checksum
+from adhesis.ensemble.results.disk_file import DiskFile
 from adhesis.ensemble.results.schema import (
     CHECKSUM,
     DATASETS,
@@ -41,6 +42,10 @@ _NAMES = frozenset(d.name for d in RESULT_DATASETS)
 # What a row holds beside the task itself, its status and its checksum.
 _CONTENT = tuple(d for d in DATASETS if d not in (*TASK_DATASETS, STATUS, CHECKSUM))
 
+# Bytes: Open MPI 4.1 ends every rank where a path with its own additions has more than 255.
+_LONGEST_NAME = 200
+_DESCRIPTORS = Path("/proc/self/fd")  # of Linux
+
 
 class Writer:
     """Writes rows of a results file that exists.
@@ -62,14 +67,19 @@ class Writer:
         origin: Callable[[int], str] = lambda rank: "",
     ) -> None:
         self.path = Path(path)
-        self._serial = comm is None
         # HDF5's own lock would refuse readers; two writers are refused by
         # adhesis.ensemble.run.lock.
-        options = {"locking": False} if comm is None else {"driver": "mpio", "comm": comm}
-        self._file = h5py.File(self.path, "r+", **options)
+        self._disk = DiskFile(self.path, "r+b") if comm is None else None
+        self._names = ExitStack()
+        with signals_held():
+            if self._disk is not None:
+                self._file = h5py.File(self._disk, "r+")
+            else:
+                name = self._names.enter_context(_short_name(self.path))
+                self._file = h5py.File(name, "r+", driver="mpio", comm=comm)
+            self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
+            self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
         self._origin = origin
-        self._datasets = {c.name: DatasetRows(self._file[c.name]) for c in DATASETS}
-        self._kept = {int(row): place for place, row in enumerate(self._file[KEPT][:])}
 
     def __enter__(self) -> Self:
         return self
@@ -81,13 +91,17 @@ class Writer:
         trace: TracebackType | None,
     ) -> None:
         # Closing is collective: a rank that failed alone must not wait here for the others. And
-        # HDF5 1.10 crashes when it closes a file that it cannot write to.
-        if error is None or (self._serial and not isinstance(error, WriteError)):
+        # HDF5 1.10 crashes when all ranks close a file that it cannot write to.
+        if error is None or self._disk is not None:
             self.close()
 
     def close(self) -> None:
         """Close the file (collectively, if it was opened so)."""
-        self._file.close()
+        with signals_held():
+            self._file.close()
+            if self._disk is not None:
+                self._disk.close()
+        self._names.close()
 
     def write_result(self, row: int, result: Row, rank: int = 0) -> None:
         """Write the row of a task that was computed; its status last.
@@ -183,8 +197,22 @@ class Writer:
     def flush(self) -> None:
         """Hand what was written to the operating system."""
         # Parallel HDF5 keeps no data back; the serial driver does, in any order.
-        if self._serial:
+        if self._disk is not None:
             self._file.flush()
+            self._disk.check()
+
+
+@contextmanager
+def _short_name(path: Path) -> Iterator[Path]:
+    """Give a file with a long path a short name in this process, as long as it is open."""
+    if len(os.fsencode(path)) <= _LONGEST_NAME or not os.path.isdir(_DESCRIPTORS):
+        yield path
+        return
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        yield _DESCRIPTORS / str(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 class DatasetRows:

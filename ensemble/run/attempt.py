@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Protocol
 
-from adhesis.ensemble.run.interrupt import raised_by_handler
+from adhesis.ensemble.run.interrupt import in_main_thread, raised_by_handler
 
 
 class StopCheck(Protocol):
@@ -109,7 +108,7 @@ def _watched(check: StopCheck) -> Iterator[None]:
 
     A timer of the caller keeps running, and its handler is called when it expires.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not in_main_thread():
         yield
         return
     finished = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from traceback import walk_tb
@@ -34,10 +35,15 @@ def stop_signals() -> tuple[signal.Signals, ...]:
     return always if ignored else (*always, signal.SIGHUP)
 
 
+def in_main_thread() -> bool:
+    """Check whether this is the main thread, the only one that may have handlers of signals."""
+    return threading.current_thread() is threading.main_thread()
+
+
 class StopSignals:
     """Context manager that records the signals of :func:`stop_signals` instead of ending.
 
-    A second SIGINT (Ctrl-C) interrupts at once.
+    A second SIGINT (Ctrl-C) interrupts at once. Outside the main thread none is recorded.
 
     Attributes
     ----------
@@ -50,7 +56,7 @@ class StopSignals:
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
-        for number in stop_signals():
+        for number in stop_signals() if in_main_thread() else ():
             self._before[number] = signal.signal(number, self._note)
         return self
 

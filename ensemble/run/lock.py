@@ -5,6 +5,10 @@ system's, on a file beside the results: it ends with the process that holds it, 
 so the lock file of a killed run is not locked. Ranks may outlive a killed launcher by
 seconds; each rank that writes therefore holds its share, and a new run waits for the last of them.
 
+On Linux it is a lock of the open file: a second run is kept out in the same process, too, and the
+lock lasts whatever else that process opens and closes. Elsewhere it is one of the process (POSIX),
+which keeps out other processes alone and ends when any descriptor of the lock file is closed.
+
 The lock belongs to the file itself: a symbolic link to a results file has no lock of its own. Where
 others can write to the folder, a link in place of the lock is refused, not followed.
 """
@@ -17,9 +21,11 @@ import json
 import os
 import socket
 import stat
+import struct
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
@@ -31,6 +37,14 @@ from adhesis.solver.checks import counted
 
 # Two bytes far beyond the text are locked: for the run as a whole, and for ranks that write.
 _RUN, _WRITERS = 1 << 30, (1 << 30) + 1
+# Linux: struct flock, and the three kinds of a lock.
+_OF_OPEN_FILE = sys.platform == "linux" and hasattr(fcntl, "F_OFD_SETLK")
+_FLOCK = "hhqqi4x"
+_TYPES = {
+    fcntl.LOCK_SH: fcntl.F_RDLCK,
+    fcntl.LOCK_EX: fcntl.F_WRLCK,
+    fcntl.LOCK_UN: fcntl.F_UNLCK,
+}
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
 _FULL = {errno.ENOSPC, errno.EDQUOT}
 # Without O_NONBLOCK, opening a pipe in place of the lock file would block.
@@ -115,6 +129,9 @@ class RunLock:
             return
         if self._owner and not keep_file:
             self.path.unlink(missing_ok=True)
+        for byte in (_RUN, _WRITERS):  # a process that was forked meanwhile has the open file, too
+            with suppress(OSError):
+                _set_lock(self._descriptor, fcntl.LOCK_UN, byte)
         os.close(self._descriptor)
         self._descriptor, self._owner = None, False
 
@@ -139,10 +156,10 @@ class RunLock:
             try:
                 descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | _SAFELY, 0o666)
             except OSError as error:
-                if error.errno == errno.ELOOP:
+                if error.errno in (errno.ELOOP, errno.ENXIO, errno.EISDIR):
                     raise self._no_lock() from None
                 kind = WriteError if error.errno in _FULL else InputError
-                raise kind(f"{self._results} cannot be written: {error.strerror}") from error
+                raise kind(f"{self.path} cannot be written: {error.strerror}") from error
             found = os.fstat(descriptor)
             # With a second name (hard link) it may be a file of the user's: the record would
             # overwrite it.
@@ -159,7 +176,7 @@ class RunLock:
     def _lock(self, byte: int, kind: int) -> bool:
         assert self._descriptor is not None
         try:
-            fcntl.lockf(self._descriptor, kind | fcntl.LOCK_NB, 1, byte)
+            _set_lock(self._descriptor, kind, byte)
         except OSError as error:
             if error.errno in _UNSUPPORTED:
                 if byte == _RUN:
@@ -204,6 +221,19 @@ def _lock_of(results: Path) -> Path:
     return results.with_name(f"{results.name}.lock")
 
 
+def _set_lock(descriptor: int, kind: int, byte: int) -> None:
+    """Lock or release one byte of a file without waiting (OSError)."""
+    if _OF_OPEN_FILE:
+        try:
+            lock = struct.pack(_FLOCK, _TYPES[kind], os.SEEK_SET, byte, 1, 0)
+            fcntl.fcntl(descriptor, fcntl.F_OFD_SETLK, lock)
+            return
+        except OSError as error:
+            if error.errno != errno.EINVAL:  # a system that does not know these locks
+                raise
+    fcntl.lockf(descriptor, kind | (0 if kind == fcntl.LOCK_UN else fcntl.LOCK_NB), 1, byte)
+
+
 def holder(results: Path | str) -> dict[str, Any] | None:
     """Return which run writes to a results file now: host, pid, ranks, since; None if none does.
 
@@ -214,7 +244,7 @@ def holder(results: Path | str) -> dict[str, Any] | None:
     except OSError:
         return None
     try:
-        fcntl.lockf(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB, 1, _RUN)
+        _set_lock(descriptor, fcntl.LOCK_SH, _RUN)
     except OSError as error:
         return None if error.errno in _UNSUPPORTED else _read_record(descriptor) or {}
     finally:

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError
-from adhesis.ensemble.results.layout import create
+from adhesis.ensemble.regular_file import irregular
+from adhesis.ensemble.results.layout import check_space, create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, FAILED, NOT_NEEDED, PENDING, same_rows
 from adhesis.ensemble.results.write import Writer
@@ -84,7 +85,7 @@ class Plan:
 
     Attributes
     ----------
-    tasks : list of Task
+    tasks : Tasks
         Row by row.
     rows : list of int
         Rows to compute.
@@ -96,7 +97,7 @@ class Plan:
         Where the campaign has ``[stop]``: what comes after ``rows``.
     """
 
-    tasks: list[Task]
+    tasks: Tasks
     rows: list[int]
     done: int
     failed: int
@@ -157,13 +158,14 @@ def prepare(
     if redo is not None:
         redo.check(tasks)
 
-    def check_cells(chosen: Sequence[Task]) -> None:
-        for task in {t.cell: t for t in reversed(chosen)}.values():
+    def check_cells(chosen: Tasks) -> None:
+        for task in chosen.of_cells():
             check(campaign, task)
 
     _check_path(path)
     lock.acquire(size, patience)
-    if not path.exists():
+    if not os.path.exists(path):
+        check_space(path, campaign, part)
         check_cells(tasks)
         create(path, campaign, part=part, versions=versions())
         batches = Batches(campaign, tasks, {}) if campaign.stop.relative_error else None
@@ -194,6 +196,7 @@ def prepare(
         for sentence in old.age():
             say(f"{sentence}; the run copies its rows into a file of the present version")
         if difference.grown:
+            check_space(path, campaign, part)
             check_cells(tasks)
         if difference.grown or old.lacking:
             create(path, campaign, part=part, versions=versions(), grown_from=old)
@@ -211,7 +214,8 @@ def prepare(
             again += chosen
         status[again] = PENDING
         plan = _plan(results, status)
-    check_cells([plan.tasks[row] for row in plan.rows])  # where nothing is left, none is loaded
+    # where nothing is left, the solver is not loaded
+    check_cells(plan.tasks.chosen(plan.tasks.rows[plan.rows]))
     if again or plan.batches is not None:
         with Writer(path) as writer:
             writer.reset(again)
@@ -235,13 +239,14 @@ def _planned(plan: Plan) -> int:
 
 def _check_path(path: Path) -> None:
     folder = path.parent
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise InputError(f"{path} cannot be written: there is no folder {folder}")
-    if path.is_dir():
-        raise InputError(f"{path} is a directory, not a results file")
+    kind = irregular(path.stat().st_mode) if os.path.exists(path) else None
+    if kind is not None:
+        raise InputError(f"{path} is {kind}, not a results file")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{path} cannot be written: the folder {folder} is read-only")
-    if path.exists() and not os.access(path, os.R_OK | os.W_OK):
+    if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
         raise InputError(f"{path} cannot be written: permission denied")
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import resource
 import sys
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.precision import fewest, looks
 from adhesis.ensemble.campaign.tables import Campaign
-from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task, Tasks
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DAMAGED, DONE, NOT_NEEDED, PENDING, file_size
@@ -132,7 +133,7 @@ class Price:
 class _Known:
     """Times and the quantity of ``[stop]`` by cell, of loops that are done or were tried out."""
 
-    def __init__(self, tasks: list[Task]) -> None:
+    def __init__(self, tasks: Sequence[Task]) -> None:
         self.seconds: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
         self.values: dict[Cell, list[float]] = {task.cell: [] for task in tasks}
 
@@ -159,7 +160,7 @@ def price(
     *,
     seconds: float = PILOT_SECONDS,
     compute: Callable[[Campaign, Task], Row] | None = None,
-    prepare: Callable[[list[Task]], None] = lambda tasks: None,
+    prepare: Callable[[Tasks], None] = lambda tasks: None,
     on_pilot: Callable[[Task, float], None] = lambda task, seconds: None,
 ) -> Price:
     """Estimate what a campaign costs; writes nothing.
@@ -180,7 +181,8 @@ def price(
     compute : callable, optional
         Computes a task.
     prepare : callable
-        Called with the tasks still to do, if there are any, before the first is tried out.
+        Called with the first task still to do of each cell, if there are any, before one is tried
+        out.
     on_pilot : callable
         Called after each loop that was tried out, with its CPU time in s.
 
@@ -191,14 +193,15 @@ def price(
     """
     compute = compute or Runner()
     tasks = campaign.tasks(part)
-    known = _Known(tasks)
+    known = _Known(tasks.of_cells())
     left, done = tasks, 0
-    if path is not None and path.exists():
+    if path is not None and os.path.exists(path):
         left, done = _left(campaign, path, tasks, known)
     if left:
-        prepare(left)
+        prepare(left.of_cells())
+    to_try = _to_try(left, known)
     pilots, spent, end, longest = 0, 0.0, time.monotonic() + seconds, 0.0
-    for unit in _units(campaign, [task for task in left if not known.seconds[task.cell]]):
+    for unit in _units(campaign, to_try):
         if time.monotonic() > end:
             break
         together = 0.0
@@ -227,11 +230,15 @@ def price(
     )
 
 
-def _left(
-    campaign: Campaign, path: Path, tasks: list[Task], known: _Known
-) -> tuple[list[Task], int]:
+def _left(campaign: Campaign, path: Path, tasks: Tasks, known: _Known) -> tuple[Tasks, int]:
     """Tasks that a run would compute, and the number of those with a result."""
-    mine = {campaign.identity(task): task for task in tasks}
+    first = tasks.of_cells()
+    cells = {
+        _cell_in(campaign, task): (number, task.cell)
+        for number, task in zip(first.cell_of().tolist(), first, strict=True)
+    }
+    left = np.zeros(campaign.task_count, bool)
+    left[tasks.rows] = True
     with Results(path) as results:
         difference = compare(results.campaign, campaign)
         if difference.other:
@@ -248,42 +255,56 @@ def _left(
         )
         done = 0
         for theirs, status, took, value in rows:
-            task = mine.get(results.campaign.identity(theirs))
-            if task is None:
+            number, cell = cells.get(_cell_in(results.campaign, theirs), (0, None))
+            row = number * campaign.realisations + theirs.realisation
+            if cell is None or theirs.realisation >= campaign.realisations or not left[row]:
                 continue
             if status == DONE:
-                known.add(task.cell, took, value)
+                known.add(cell, took, value)
                 done += 1
             more = campaign.stop != results.campaign.stop and status == NOT_NEEDED
-            if status not in (PENDING, DAMAGED) and not more:
-                del mine[campaign.identity(task)]
-    return list(mine.values()), done
+            left[row] = status in (PENDING, DAMAGED) or more
+    return tasks.chosen(np.flatnonzero(left)), done
 
 
-def _units(campaign: Campaign, tasks: list[Task]) -> list[list[Task]]:
-    """Tasks that share a loading branch together; realisation by realisation, the cheapest first.
+def _cell_in(campaign: Campaign, task: Task) -> Hashable:
+    """Return what identifies the cell of a task, also in a campaign that grew new axes."""
+    hurst, gamma, _, _, rest = campaign.identity(task)
+    return (hurst, gamma, rest)
+
+
+def _to_try(left: Tasks, known: _Known) -> Tasks:
+    """Tasks of the cells that are not known yet, realisation by realisation."""
+    unknown = np.array([not known.seconds.get(cell) for cell in left.cells])
+    rows = left.rows[unknown[left.cell_of()]]
+    return left.chosen(rows[np.argsort(rows % left.realisations, kind="stable")])
+
+
+def _units(campaign: Campaign, tasks: Tasks) -> Iterator[list[Task]]:
+    """Tasks that share a loading branch together; of each realisation the cheapest first.
 
     The cheapest first, so that as many cells as possible are met.
     """
-    found: dict[Hashable, list[Task]] = {}
-    for task in tasks:
-        found.setdefault(campaign.branch_of(task) or task, []).append(task)
-    return sorted(
-        found.values(), key=lambda unit: (unit[0].realisation, sum(prior(task) for task in unit))
-    )
+    start = 0
+    while start < len(tasks):
+        near = tasks[start : start + len(tasks.cells)].column("realisation")
+        count = int(np.count_nonzero(near == near[0]))
+        found: dict[Hashable, list[Task]] = {}
+        for task in tasks[start : start + count]:
+            found.setdefault(campaign.branch_of(task) or task, []).append(task)
+        yield from sorted(found.values(), key=lambda unit: sum(prior(task) for task in unit))
+        start += count
 
 
 def _cells(
-    campaign: Campaign, tasks: list[Task], left: list[Task], known: _Known
+    campaign: Campaign, tasks: Tasks, left: Tasks, known: _Known
 ) -> tuple[tuple[CellPrice, ...], str]:
-    first: dict[Cell, Task] = {}
-    for task in tasks:
-        first.setdefault(task.cell, task)
+    firsts = tasks.of_cells()
+    first = {task.cell: task for task in firsts}
     mean = {cell: float(np.mean(seconds)) for cell, seconds in known.seconds.items() if seconds}
     of_prior = _law([prior(first[cell]) for cell in mean], list(mean.values()))
-    count = dict.fromkeys(first, 0)
-    for task in left:
-        count[task.cell] += 1
+    counted = np.bincount(left.cell_of(), minlength=len(tasks.cells))
+    count = dict(zip(first, counted[firsts.cell_of()].tolist(), strict=True))
     stop = ""
     if campaign.stop.relative_error is not None:
         wanted, stop = _realisations(campaign, known)

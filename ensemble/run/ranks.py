@@ -34,9 +34,10 @@ _LAUNCHERS = (
 # here are kept apart by the lock of the results file.
 _HINTS = (
     *("OMPI_COMM_WORLD_", "PMIX_", "PMI_", "PMI1_", "PMI2_", "MPI_LOCAL", "MPIRUN_", "MPIEXEC_"),
-    *("MV2_", "HYDI_", "HYDRA_", "I_MPI_HYDRA", "PALS_", "ALPS_", "JSM_", "FLUX_TASK", "PJM_"),
-    *("PRTE_", "PRRTE_", "PSP_", "SLURM_STEP_NUM_TASKS"),
+    *("MV2_", "HYDI_", "I_MPI_HYDRA", "PALS_", "ALPS_", "JSM_", "FLUX_TASK", "PJM_"),
+    *("PSP_", "SLURM_STEP_NUM_TASKS"),
 )
+_SETTING = "_MCA_"  # in the names of settings, which users make for launchers
 
 
 class OneRank:
@@ -86,7 +87,8 @@ def world() -> Any:
         If a launcher started several processes and MPI sees one: two MPIs are mixed.
     """
     size, _, launcher = launched()
-    if "mpi4py.MPI" not in sys.modules and not any(name.startswith(_HINTS) for name in os.environ):
+    hints = (name for name in os.environ if name.startswith(_HINTS) and _SETTING not in name)
+    if "mpi4py.MPI" not in sys.modules and not any(hints):
         return OneRank()
     try:
         from mpi4py import MPI

@@ -8,13 +8,14 @@ from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, S
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, TextIO
 
 import h5py
 
 from adhesis.ensemble.campaign.precision import Precision
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import WHOLE, Part, Task
+from adhesis.ensemble.errors import WriteError
 from adhesis.ensemble.outputs import target_of
 from adhesis.ensemble.results.schema import origin_of
 from adhesis.ensemble.results.write import Writer
@@ -189,6 +190,7 @@ def run_campaign(
     options: Options | None = None,
     say: Callable[[str], None] = lambda text: None,
     engine: Engine | None = None,
+    stream: TextIO | None = None,
 ) -> Summary:
     """Compute what is missing of a campaign in its results file.
 
@@ -205,6 +207,8 @@ def run_campaign(
         Gets a line about what was found and what will be done, on rank 0.
     engine : Engine, optional
         Loops into a results file, if not given.
+    stream : text stream, optional
+        Where progress is reported; stderr, if not given.
 
     Raises
     ------
@@ -222,17 +226,21 @@ def run_campaign(
     lock = RunLock(path)
     with ExitStack() as stack, StopSignals() as signals:
         stack.push(lock)
-        plan = together(
-            comm,
-            lambda: prepare(
-                *(campaign, path, lock, size),
-                part=options.part,
-                redo=options.redo,
-                patience=options.patience,
-                say=say,
-                check=engine.check,
-            ),
-        )
+        try:
+            plan = together(
+                comm,
+                lambda: prepare(
+                    *(campaign, path, lock, size),
+                    part=options.part,
+                    redo=options.redo,
+                    patience=options.patience,
+                    say=say,
+                    check=engine.check,
+                ),
+            )
+        except WriteError:
+            lock.release()  # no other rank writes yet
+            raise
         origins = [""] * size
         if plan.rows:
             origins = _origins(comm, size)
@@ -244,7 +252,7 @@ def run_campaign(
         if own_rows or comm.rank == 0:
             all_of_them = comm if own_rows else None
             writer = stack.enter_context(engine.writer(path, all_of_them, origins.__getitem__))
-        session = _Session(campaign, plan, writer, options, signals, engine)
+        session = _Session(campaign, plan, writer, options, signals, engine, stream)
         with engine.watch():
             stopped = session.run(comm, own_rows)
     return together(comm, lambda: session.summary(stopped))
@@ -305,7 +313,9 @@ class _Session:
         options: Options,
         signals: StopSignals,
         engine: Engine,
+        stream: TextIO | None = None,
     ) -> None:
+        self._stream = stream
         self._campaign = campaign
         self._plan = plan
         self._writer = writer
@@ -359,6 +369,7 @@ class _Session:
             lambda: self._estimate(
                 *(schedule, master.in_flight / self._campaign.branch_loops, len(channel.workers))
             ),
+            self._stream,
         )
         master = Master(
             *(channel, schedule, self._groups, collect, self._limits, progress.tick),

@@ -12,7 +12,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.dataset import sizes_of
 from adhesis.ensemble.task.fields import FieldPlan, FieldRecorder, field_plan
 from adhesis.ensemble.task.row import Row, row_of, row_scales
-from adhesis.solver.loading.loop import Progress, run_loop
+from adhesis.solver.loading.loop import Progress, run_loop, turn_arguments
 from adhesis.solver.loading.turning_points import LoadingBranch
 from adhesis.solver.method import Branch, Method
 from adhesis.solver.model.control import Control
@@ -128,7 +128,7 @@ class Runner:
         keep = task.realisation < plan.realisations
         sizes = sizes_of(row_scales(campaign))
         turn = here.cycle.turning_point
-        load = here.cycle.under_load
+        preload = here.cycle.preload
         unit = campaign.penetration_unit(task)
         # for loops whose load steps differ from the axes of the curves
         axes: dict[Branch, Array] = {
@@ -139,15 +139,15 @@ class Runner:
         if key is None:
             method = _make_method(campaign, task)
             recorder = FieldRecorder(plan, method, keep=keep)
+            at_preload = preload is not None
             loop = run_loop(
                 method,
-                max_penetration=None if load else turn,
-                max_stress=turn if load else None,
+                **turn_arguments(method.problem.control, turn, at_preload, here.cycle.deepest),
                 load_steps=campaign.cycle.load_steps,
                 progress=progress,
                 on_state=recorder.on_state,
             )
-            row = row_of(loop, sizes, axes if load else None)
+            row = row_of(loop, sizes, axes if here.cycle.turns_at_stress else None)
         else:
             branch = self._branch(campaign, task, key, turn)
             self._shared = None  # an interrupted branch is not continued
@@ -164,6 +164,8 @@ class Runner:
                 raise
             self._shared = _Shared(campaign, key, turn, branch)
             row = row_of(loop, sizes, axes)
+        if preload is not None:
+            recorder.record_at_stresses(loop)
         row |= recorder.row()
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         return {"wall_time": wall, "cpu_time": cpu, **row}
@@ -183,11 +185,14 @@ class Runner:
             _make_method(campaign, task),
             [campaign.at(other).cycle.turning_point for other in others],
             load_steps=campaign.cycle.load_steps,
+            latest=None if campaign.cycle.preload is None else campaign.cycle.deepest,
             marks=[mark for o in others for mark in _marks(field_plan(campaign, o))],
         )
 
 
 def _marks(plan: FieldPlan) -> list[float]:
-    """Return the prescribed values of the states whose fields are kept."""
+    """Return the prescribed values of the states whose fields are kept, if these are prescribed."""
+    if plan.preload is not None:
+        return []
     marks: list[float] = (plan.penetration * (plan.max_stress or 1.0)).tolist()
     return marks

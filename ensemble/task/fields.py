@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from adhesis.ensemble.campaign.tables import Campaign
 from adhesis.ensemble.campaign.tasks import Task
 from adhesis.ensemble.task.dataset import FIELD, KEPT, Dataset, Scale, row_shape, sizes_of
+from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.method import BRANCHES, Branch, ContactState, Method
 from adhesis.solver.model.profile import Array
 from adhesis.solver.observables import gap_shares, spectral_density
@@ -49,9 +50,10 @@ class FieldPlan:
     finest_harmonic : int
         Highest harmonic of all profiles of the campaign.
     max_penetration : float
-        Δ/h_max; under a load 1, and then all penetrations here are mean stresses over max_stress.
-    max_stress : float or None
-        In Pa, under a load.
+        Δ/h_max; under a load and at a preload 1, and then all penetrations here are mean stresses
+        over max_stress or preload.
+    max_stress, preload : float or None
+        In Pa, under a load, and at a preload.
     load_steps : int
     wanted : tuple of float
         Penetrations Δ/h_max as the campaign gives them.
@@ -71,6 +73,7 @@ class FieldPlan:
     max_nodes: int
     realisations: int
     max_stress: float | None = None
+    preload: float | None = None
 
     @cached_property
     def penetration(self) -> Array:
@@ -145,6 +148,8 @@ def field_scales(plan: FieldPlan, several: Collection[str] = ()) -> tuple[Scale,
     depth = f"penetration/{'max_penetration' if 'max_penetration' in several else 'h_max'}"
     if plan.max_stress is not None:
         depth = "mean stress/max_stress"
+    if plan.preload is not None:
+        depth = "mean stress/preload"
     return (
         waves,
         Scale(
@@ -205,7 +210,7 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
     """
     here = campaign if task is None else campaign.at(task)
     profile, cycle, output = here.profile, here.cycle, here.output
-    top, period = 1.0 if cycle.under_load else cycle.turning_point, profile.period
+    top, period = 1.0 if cycle.turns_at_stress else cycle.turning_point, profile.period
     if task is None and campaign.has_axis("max_penetration"):
         top = 1.0
     if task is None and campaign.has_axis("period"):
@@ -222,6 +227,7 @@ def field_plan(campaign: Campaign, task: Task | None = None) -> FieldPlan:
         max_nodes=output.field_nodes,
         realisations=min(output.field_realisations, campaign.realisations),
         max_stress=cycle.turning_point if cycle.under_load else None,
+        preload=cycle.preload,
     )
 
 
@@ -256,7 +262,7 @@ class FieldRecorder:
 
     def on_state(self, branch: Branch, state: ContactState) -> None:
         """Keep the state if its penetration is one of the chosen ones and it has contact."""
-        if not state.patches or not self._plan.penetration.size:
+        if not state.patches or not self._plan.penetration.size or self._plan.preload is not None:
             return
         problem = self._method.problem
         # with a stiffness, the penetration of the far side
@@ -270,6 +276,17 @@ class FieldRecorder:
         if distance[nearest] > 1e-9:
             return
         self._record((BRANCHES.index(branch), nearest), state)
+
+    def record_at_stresses(self, loop: LoopResult) -> None:
+        """Keep the states of a loop that turned at a preload, at its parts; none that it lacks."""
+        assert self._plan.preload is not None
+        for number, part in enumerate(self._plan.penetration.tolist()):
+            for branch in BRANCHES:
+                try:
+                    found = loop.at_stress(part * self._plan.preload, branch)
+                except ValueError:  # the preload was not reached
+                    continue
+                self._record((BRANCHES.index(branch), number), found.state)
 
     def _record(self, index: tuple[int, int], state: ContactState) -> None:
         plan, profile = self._plan, self._method.problem.profile

@@ -122,6 +122,24 @@ _RANGES = (
         since=(1, 3),
     ),
 )
+# Where each loop turned.
+_TURNS = (
+    _task(
+        *("turning_penetration", FLOAT, "1", "penetration/h_max at the turning point"),
+        lambda loop: loop.max_penetration,
+        since=(1, 4),
+    ),
+    _task(
+        *("turning_stress", FLOAT, "Pa", "mean stress at the turning point"),
+        lambda loop: loop.turning_stress,
+        since=(1, 4),
+    ),
+    _task(
+        *("preload_reached", FLOAT, "1", "1 if the mean stress reached the preload, 0 if not"),
+        lambda loop: np.nan if loop.preload_reached is None else float(loop.preload_reached),
+        since=(1, 4),
+    ),
+)
 # Of each loop, one number.
 NUMBERS = (
     _task(
@@ -172,6 +190,7 @@ NUMBERS = (
         lambda loop: loop.energy_at_stake,
     ),
     *_RANGES,
+    *_TURNS,
     _task(
         *("work_gained", FLOAT, "J m-2", "work gained on loading per nominal area"),
         lambda loop: loop.work_gained,

@@ -22,6 +22,7 @@ from adhesis.ensemble.trace.variants import Cycle, Plan, Run, default_tables, ma
 from adhesis.solver import views
 from adhesis.solver.checks import (
     ACCURACY,
+    FULL_PENETRATION,
     Bounds,
     choice,
     counted,
@@ -33,7 +34,7 @@ from adhesis.solver.checks import (
     row,
     whole,
 )
-from adhesis.solver.loading.loop import check_cycle
+from adhesis.solver.loading.loop import check_cycle, check_preload
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.problem import Problem
@@ -164,7 +165,7 @@ class Answer(ByValue):
     def __repr__(self) -> str:
         """One line: the loss with its uncertainty, and the warnings counted."""
         return (
-            f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty)} J/m², "
+            f"Answer(loss={with_error(self.loss.value, self.loss.uncertainty, 0.0)} J/m², "
             f"{counted(len(self.plan.runs), 'loop')}, {counted(len(self.warnings), 'warning')})"
         )
 
@@ -286,6 +287,7 @@ def loss_of_trace(
     work_of_adhesion: Several,
     max_penetration: Several | None = None,
     max_stress: Several | None = None,
+    preload: Several | None = None,
     control: Control | None = None,
     load_steps: int = 40,
     method: MethodName = "auto",
@@ -311,6 +313,9 @@ def loss_of_trace(
         if the control is a stiffness. 0.9 by default.
     max_stress : float or several, optional
         Instead, under a load: turning points p̄ in Pa.
+    preload : float or several, optional
+        Instead, of a machine: p̄ in Pa at which loops turn (:func:`adhesis.run_loop`).
+        ``max_penetration`` is then one number, where they turn at the latest.
     control : Control, optional
         What is prescribed along the path; without it the separation.
     load_steps : int
@@ -345,16 +350,30 @@ def loss_of_trace(
     """
     control = Control() if control is None else control
     instance("control", control, Control, "Control(stiffness), for a load Control(0)")
+    latest = None
+    if preload is None:
+        turns = _turns(control, max_penetration, max_stress)
+    else:
+        turns = preload
+        if max_stress is not None:
+            raise ValueError(
+                "preload and max_stress are given: a machine turns at a preload, a weight "
+                "(control=Control(0)) at max_stress"
+            )
+        if max_penetration is not None:
+            latest = real("max_penetration", max_penetration)
     cycle = make_cycle(
         half_space,
         work_of_adhesion,
-        _turns(control, max_penetration, max_stress),
+        turns,
         load_steps,
         method,
         accuracy,
         control,
         adhesion_range,
         strength,
+        at_preload=preload is not None,
+        latest=latest,
     )
     check(prepared, cycle)
     flag("quick", quick)
@@ -386,7 +405,11 @@ def _turns(
             raise ValueError("max_stress is missing: a path under a load must have it, in Pa")
         return max_stress
     if max_stress is not None:
-        raise ValueError("max_stress is given: it belongs to a load, so give control=Control(0)")
+        raise ValueError(
+            "max_stress is given: it belongs to a load, that of a weight: a weight or a machine? "
+            "For a weight give control=Control(0); for a machine, which turns at that mean stress, "
+            "give preload instead of max_stress"
+        )
     return MAX_PENETRATION if max_penetration is None else max_penetration
 
 
@@ -400,6 +423,9 @@ def make_cycle(
     control: Control | None = None,
     adhesion_range: float | None = None,
     strength: float | None = None,
+    *,
+    at_preload: bool = False,
+    latest: float | None = None,
 ) -> Cycle:
     """Make contact and cycle, with the values of both tables.
 
@@ -412,6 +438,7 @@ def make_cycle(
     real("accuracy", accuracy, ACCURACY)
     control = control or Control()
     turning = "max_stress" if control.is_load else "max_penetration"
+    turning = "preload" if at_preload else turning
     gammas, turns = default_tables(
         _several("work_of_adhesion", work_of_adhesion), _several(turning, turning_points)
     )
@@ -419,10 +446,14 @@ def make_cycle(
         if not values:
             raise ValueError(f"{name} is empty: it must hold one number at least")
     for point in turns:
+        if at_preload:
+            check_preload(point, control)
+            point = FULL_PENETRATION if latest is None else latest
         check_cycle(point, load_steps, control)
     cycle = Cycle(
-        half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength
-    )
+        half_space, gammas, turns, load_steps, method, accuracy, control, adhesion_range, strength,
+        at_preload, latest,
+    )  # fmt: skip
     for gamma in gammas:
         cycle.strength_at(gamma)
     return cycle
@@ -508,8 +539,8 @@ def _neighbours(answer: Answer) -> list[str]:
 
 
 def _warnings(answer: Answer, loss: Quantity) -> list[str]:
-    """Return what is doubtful, what changes the answer most first, loops that failed last."""
-    found = [*_one_patch(answer), *_not_converged(answer)]
+    """Return what is doubtful: what changes the answer most first, loops that failed last."""
+    found = [*answer.main["preload_warnings"], *_one_patch(answer), *_not_converged(answer)]
     if loss.relative > 0.5:
         largest = max(loss.doubts, key=lambda name: loss.doubts[name])
         found.append(
@@ -524,6 +555,10 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
             f"{counted(round(races), 'jump')} would have ended elsewhere under another rule of "
             f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
+    for run in answer.plan.runs:
+        of_run = answer.result(run.name) if run.name != "answer" else None
+        for text in of_run["preload_warnings"] if of_run is not None else ():
+            found.append(f"the loop “{run.name}”: {text}")
     failed = []
     for run in answer.plan.runs:
         text = answer.results.get(run.name)
@@ -596,6 +631,7 @@ def document(answer: Answer) -> dict[str, Any]:
     """Return every number of the answer as one JSON document, in SI units."""
     prepared, trace, cycle, plan = answer.prepared, answer.prepared.trace, answer.cycle, answer.plan
     spectrum = prepared.spectrum
+    at_stress = cycle.at_preload or cycle.control.is_load
     return {
         "file": trace.source,
         "read": {
@@ -626,8 +662,9 @@ def document(answer: Answer) -> dict[str, Any]:
         "work_of_adhesion": cycle.works_of_adhesion[0],
         "stiffness": None if cycle.control.is_fixed else cycle.control.stiffness,
         "strength": finite(cycle.strength_at(cycle.works_of_adhesion[0])),
-        "max_penetration": None if cycle.control.is_load else cycle.turning_points[0],
+        "max_penetration": cycle.latest if at_stress else cycle.turning_points[0],
         "max_stress": cycle.turning_points[0] if cycle.control.is_load else None,
+        "preload": cycle.turning_points[0] if cycle.at_preload else None,
         "load_steps": cycle.load_steps,
         "loss": _plain(answer.loss),
         "loss_over_work_of_adhesion": answer.main["loss_over_work_of_adhesion"],

@@ -284,6 +284,8 @@ def _tables(answer: Answer) -> tuple[Figure, str] | None:
 
 
 def _turn_label(cycle: Cycle) -> str:
+    if cycle.at_preload:
+        return "preload (Pa)"
     if cycle.control.is_load:
         return r"$\bar p$ (Pa)"
     return r"$\Delta/h_{\max}$" if cycle.control.is_fixed else r"$u_\mathrm{tot}/h_{\max}$"

@@ -32,6 +32,8 @@ class Job(ByValue):
     accuracy: float
     stiffness: float = math.inf
     strength: float = math.inf
+    at_preload: bool = False
+    latest: float | None = None
 
 
 def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> dict[str, Any]:
@@ -43,7 +45,7 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     report : callable, optional
         Called after each load step with the branch and the prescribed value that is reached.
     """
-    from adhesis.solver.loading.loop import run_loop
+    from adhesis.solver.loading.loop import run_loop, turn_arguments
     from adhesis.solver.loading.loop_result import strain_warnings
     from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
     from adhesis.solver.method import Branch, ContactState
@@ -61,8 +63,7 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     half_space, control = HalfSpace(job.young, job.poisson), Control(job.stiffness)
     problem = Problem(profile, half_space, job.work_of_adhesion, control, strength=job.strength)
     method = make_method(job.method, problem, accuracy=job.accuracy)
-    name = "max_stress" if control.is_load else "max_penetration"
-    turn: Any = {name: job.turning_point}
+    turn = turn_arguments(control, job.turning_point, job.at_preload, job.latest)
     loop = run_loop(method, load_steps=job.load_steps, progress=progress, **turn)
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
     return loop.numbers() | {
@@ -73,6 +74,8 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
         "strain_warnings": strain_warnings(
             problem, loop.mean_stress, loop.separation, loop.patches
         ),
+        "preload_warnings": loop.preload_warnings,
+        "loss_note": loop.loss_note,
         "contact_fraction": loop.largest_contact_fraction,
         "patches": int(loop.patches.max()),
         "jumps": len(loop.jumps),

@@ -55,18 +55,23 @@ def add_cycle_arguments(group: argparse._ArgumentGroup) -> None:
         "--max-penetration",
         metavar="D[,D…]",
         help="turning points in h_max (default 0.9); with --stiffness those of the far side, "
-        "u_tot/h_max",
+        "u_tot/h_max; with --preload, where a loop turns at the latest",
+    )
+    group.add_argument(
+        "--preload",
+        metavar="P[,P…]",
+        help="instead, a machine turns where the mean stress reaches this: in Pa, or 20kPa",
     )
     group.add_argument(
         "--max-stress",
         metavar="P[,P…]",
-        help="instead, under a load (--stiffness 0): turning points in Pa, or 20kPa",
+        help="instead, under a weight (--stiffness 0): turning points in Pa, or 20kPa",
     )
     group.add_argument(
         "--stiffness",
         type=float,
         metavar="K",
-        help="Pa/m of nominal area of what holds the solid; 0 is load control "
+        help="Pa/m of nominal area of what holds the solid; 0 is load control, that of a weight "
         "(default: fixed separation)",
     )
     group.add_argument(

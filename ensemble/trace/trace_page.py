@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,9 +23,10 @@ def summary(answer: Answer) -> str:
     loop = answer.main
     lines = [
         f"loss        {_value(answer.loss, 1e3, 'mJ/m²')}"
-        f"{in_works_of_adhesion(answer.loss.value, answer.cycle.works_of_adhesion[0])}",
+        f"{in_works_of_adhesion(answer.loss.value, answer.cycle.works_of_adhesion[0])}"
+        f"{_note(answer)}",
         f"pull-off    {_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension",
-        f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area')} at most",
+        f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area', 1.0)} at most",
         f"changes     {_largest_changes(answer)}",
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
         f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
@@ -57,6 +59,12 @@ def _largest_changes(answer: Answer) -> str:
             f"{of}by “{run.name}” ({run.description}{against}): × {change.factor:.3g}{beyond}"
         )
     return "; ".join(clauses) or "no other decision about the trace could be run"
+
+
+def _note(answer: Answer) -> str:
+    """Say what the loss under a load leaves out, in brackets after it."""
+    note = answer.main["loss_note"]
+    return f" ({note})" if note else ""
 
 
 def _scope(answer: Answer) -> str:
@@ -99,10 +107,12 @@ def write_all(answer: Answer, folder: Path) -> Path:
 # ---------------------------------------------------------------------- content
 
 
-def _value(quantity: Quantity, by: float, unit: str) -> str:
+def _value(quantity: Quantity, by: float, unit: str, most: float = math.inf) -> str:
+    """Return a quantity that is not negative, with its interval."""
     unit = f" {unit}" if unit else ""
-    known = with_error(by * quantity.value, by * quantity.uncertainty)
-    return f"{known}{unit} (± {_percent(quantity.relative, 0)})"
+    known = with_error(by * quantity.value, by * quantity.uncertainty, 0.0, most)
+    share = f" (± {_percent(quantity.relative, 0)})" if "±" in known else ""
+    return f"{known}{unit}{share}"
 
 
 def _percent(share: float, digits: int = 1, sign: str = "") -> str:
@@ -123,9 +133,10 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
     parts = [
         f"# From the trace {code_span(name)} to its loss",
         f"Loss **{_value(answer.loss, 1e3, 'mJ/m²')}** of nominal area"
-        f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}, pull-off at a "
+        f"{in_works_of_adhesion(answer.loss.value, cycle.works_of_adhesion[0])}{_note(answer)}, "
+        "pull-off at a "
         f"mean tension of **{_value(answer.pull_off_stress, 1e-3, 'kPa')}**, contact fraction at "
-        f"most **{_value(answer.contact_fraction, 1.0, '')}**: one loop to "
+        f"most **{_value(answer.contact_fraction, 1.0, '', 1.0)}**: one loop to "
         f"{cycle.turn(cycle.turning_points[0])} (h_max = {length_text(answer.main['h_max'], 4)}) "
         f"and off again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} "
         f"Pa, ν = {half_space.poisson:g}.",
@@ -218,23 +229,21 @@ def _variant_rows(answer: Answer) -> list[list[str]]:
 def _sweep_rows(answer: Answer) -> list[list[str]]:
     cycle = answer.cycle
     gamma, point = cycle.works_of_adhesion[0], cycle.turning_points[0]
-    turn = (
-        "p̄, Pa" if cycle.control.is_load else "Δ/h_max" if cycle.control.is_fixed else "u_tot/h_max"
-    )
     rows = [(gamma, point, answer.main)]
     rows += [(float(n.split()[1]), point, r) for n, _, r in answer.group("work of adhesion")]
     rows += [(gamma, float(n.split()[1]), r) for n, _, r in answer.group("turning point")]
-    head = ["γ, J/m²", turn, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
+    head = ["γ, J/m²", cycle.turn_sign, "loss, mJ/m²", "pull-off, kPa", "contact", "jumps"]
     return [
         head,
         *(
             [
                 f"{g:g}",
                 f"{d:g}",
-                with_error(1e3 * r["loss"], 1e3 * abs(r["loss"]) * answer.loss.relative),
+                with_error(1e3 * r["loss"], 1e3 * abs(r["loss"]) * answer.loss.relative, 0.0),
                 with_error(
                     1e-3 * r["pull_off_stress"],
                     1e-3 * r["pull_off_stress"] * answer.pull_off_stress.relative,
+                    0.0,
                 ),
                 f"{r['contact_fraction']:.3f}",
                 f"{r['jumps']}",

@@ -40,7 +40,8 @@ _START = 2.0  # seconds for a process to start
 class Cycle:
     """Contact and cycle in SI units; the answer has the first value of each tuple.
 
-    Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load.
+    Turning points are Δ/h_max, u_tot/h_max of a stiffness, or p̄ in Pa under a load; preloads in Pa
+    if ``at_preload``, and ``latest`` is where a loop turns that does not reach its preload.
     """
 
     half_space: HalfSpace
@@ -52,9 +53,25 @@ class Cycle:
     control: Control = field(default_factory=Control)
     adhesion_range: float | None = None
     strength: float | None = None
+    at_preload: bool = False
+    latest: float | None = None
+
+    @property
+    def turn_sign(self) -> str:
+        """Return the sign of the turning points, with their unit if they have one."""
+        if self.at_preload:
+            return "preload, Pa"
+        if self.control.is_load:
+            return "p̄, Pa"
+        return "Δ/h_max" if self.control.is_fixed else "u_tot/h_max"
 
     def turn(self, point: float) -> str:
         """Describe a turning point: "Δ/h_max = 0.9"."""
+        if self.at_preload:
+            held = "a fixed separation"
+            if not self.control.is_fixed:
+                held = f"a stiffness of {self.control.stiffness:.4g} Pa/m"
+            return f"a preload of {point:g} Pa at {held}"
         if self.control.is_load:
             return f"p̄ = {point:g} Pa"
         if self.control.is_fixed:
@@ -254,6 +271,7 @@ def _tables(cycle: Cycle) -> list[Run]:
     runs = []
     gammas, turns = cycle.works_of_adhesion, cycle.turning_points
     sign = "p̄" if cycle.control.is_load else "Δ" if cycle.control.is_fixed else "u"
+    sign = "preload" if cycle.at_preload else sign
     for gamma in gammas[1:]:
         runs.append(
             Run(f"γ {gamma:g}", "work of adhesion", f"γ = {gamma:g} J/m²", work_of_adhesion=gamma)
@@ -286,6 +304,8 @@ def _job(run: Run, profile: Profile, cycle: Cycle) -> Job:
         method=cycle.method,
         accuracy=cycle.accuracy,
         strength=cycle.strength_at(gamma),
+        at_preload=cycle.at_preload,
+        latest=cycle.latest,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.path_record import Record, states_before_jumps
+from adhesis.solver.loading.path_record import Record, integral, states_before_jumps
 from adhesis.solver.loading.zero_range import (
     InteriorTension,
     interior_tension,
@@ -56,6 +56,9 @@ class EquilibriumPath(ByValue, ResultViews):
     contact_fraction : array
         A/A0.
     patches : int array
+    tangent : array
+        dY/dx of the control (:mod:`adhesis.solver.model.control`), Pa/m, or m/Pa under a load; NaN
+        where the method does not know it. With it the loss can be computed again from the states.
     elastic_energy, adhesion_energy : array
         In J/m, per period.
     jumps : tuple of Jump
@@ -90,6 +93,7 @@ class EquilibriumPath(ByValue, ResultViews):
     penetration: Array
     separation: Array
     mean_stress: Array
+    tangent: Array
     contact_fraction: Array
     patches: NDArray[np.int64]
     elastic_energy: Array
@@ -158,6 +162,28 @@ class EquilibriumPath(ByValue, ResultViews):
     def energy_at_stake(self) -> float:
         """Sum over the jumps of the energy that depends on a race, in J/m²."""
         return float(sum(jump.at_stake for jump in self.jumps))
+
+    def work_along(self, states: slice) -> float:
+        """Compute -∫ Y dx over some states anew, in J/m² of nominal area."""
+        control, h_max = self.problem.control, self.problem.profile.h_max
+        separation, mean_stress = self.separation[states], self.mean_stress[states]
+        return -integral(
+            control.prescribed(separation, mean_stress),
+            control.conjugate(separation, mean_stress, h_max),
+            self.tangent[states],
+        )
+
+    @property
+    def loss_note(self) -> str:
+        """Return what the loss of a path under a load leaves out; empty for all other paths."""
+        if not self.problem.control.is_load:
+            return ""
+        if self.patches[-1]:
+            return "under a weight"
+        return (
+            f"under a weight; it falls off at {stress_text(0.0 - self.mean_stress.min())}, the "
+            "energy of the fall is not counted"
+        )
 
     def states_before_jumps(self) -> list[int]:
         """Return the index of the state before each jump; the next one is that after it."""
@@ -244,6 +270,7 @@ def path_fields(method: Method, record: Record, started: float) -> dict[str, Any
         "load_step": np.array(record.on_axis),
         "penetration": problem.penetration(separation),
         "separation": separation,
+        "tangent": record.column("stiffness"),
         **{name: record.column(name) for name in arrays},
         "patches": record.column("patches").astype(np.int64),
         "jumps": tuple(record.jumps),

@@ -5,27 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from time import process_time
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from adhesis.solver import views
 from adhesis.solver.checks import (
     FAR_DISPLACEMENT,
+    FULL_PENETRATION,
     LOAD_STEPS,
     MAX_PENETRATION,
     MAX_STRESS,
     function,
     instance,
+    plain,
     real,
     whole,
 )
 from adhesis.solver.loading.loop_result import LoopResult, result_of
+from adhesis.solver.loading.mean_stress_event import follow_to_stress
 from adhesis.solver.loading.path_record import Axis, Record
-from adhesis.solver.method import ContactState, Method, PathError
+from adhesis.solver.method import ContactState, Method, Path, PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.problem import Problem
 
 T = TypeVar("T")
+
+DEFAULT_LOAD_STEPS = 40
+"""Load steps of a loop, unless they are given."""
 
 HOW_METHOD = "make_method(name, problem)"
 """Call that makes a method, for error messages."""
@@ -92,7 +98,8 @@ def run_loop(
     *,
     max_penetration: float | None = None,
     max_stress: float | None = None,
-    load_steps: int,
+    preload: float | None = None,
+    load_steps: int = DEFAULT_LOAD_STEPS,
     progress: Progress | bool | None = None,
     on_state: Callable[[Branch, ContactState], None] | None = None,
 ) -> LoopResult:
@@ -102,11 +109,16 @@ def run_loop(
     ----------
     method : Method
     max_penetration : float
-        Δ~max = Δ/h_max, 0 < Δ~max < 1; u_tot/h_max if the control is a stiffness.
+        Δ~max = Δ/h_max, 0 < Δ~max < 1; u_tot/h_max if the control is a stiffness. With a preload it
+        is where the path turns at the latest (by default 0.999; with a stiffness no limit).
     max_stress : float
         Instead, under a load: p̄ in Pa, positive.
+    preload : float
+        Instead, at a fixed separation or with a stiffness: p̄ in Pa, positive. The path turns in the
+        first state whose mean stress is at least that.
     load_steps : int
-        Equal steps of the loading branch; unloading uses the same step.
+        Equal steps of the loading branch, with a preload up to the latest turning point; unloading
+        uses the same step.
     progress : callable or bool, optional
         True shows a bar, in a terminal or notebook; a function is called as :data:`Progress` says.
     on_state : callable, optional
@@ -126,7 +138,10 @@ def run_loop(
     docs/theory.md, "3. The loop"
     """
     control = instance("method", method, Method, HOW_METHOD).problem.control
-    turning_point = turning_of(method.problem, max_penetration, max_stress)
+    if preload is None:
+        turning_point = turning_of(method.problem, max_penetration, max_stress)
+    else:
+        turning_point = latest_turn(method.problem, preload, max_penetration, max_stress)
     turning_point, load_steps = check_cycle(turning_point, load_steps, control)
     function("on_state", on_state)
     started = process_time()
@@ -135,11 +150,16 @@ def run_loop(
     state = method.detached(method.problem.profile.h_max)
     with progress_of(progress, turning_point) as report:
         record.visit("loading", False, state)
-        load = recorder(method, record, "loading", state, report)
         for i in range(load_steps + 1):
-            state = load(axis(i))
-        unload_recorded(method, record, state, axis, turning_point, report)
-    return result_of(method, record, turning_point, load_steps, started)
+            path, reached = load_step(method, record, axis(i), preload)
+            state = record.extend("loading", path)
+            turn = drive_in(method.problem, state) if reached else axis(i)
+            if report is not None:
+                report("loading", turn, state)
+            if reached:
+                break
+        unload_recorded(method, record, state, axis, turn, report)
+    return result_of(method, record, turn, i if reached else load_steps, started, preload)
 
 
 def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None) -> T:
@@ -153,12 +173,123 @@ def turning_of(problem: Problem, max_penetration: T | None, max_stress: T | None
     wanted, other = ("max_penetration", max_penetration), ("max_stress", max_stress)
     if problem.control.is_load:
         wanted, other = other, wanted
+    elif max_stress is not None:
+        raise ValueError(
+            "max_stress is given, but a path under a separation or a stiffness turns at "
+            "max_penetration: a weight or a machine? For a weight give the problem "
+            "control=Control(0); for a machine, which turns at that mean stress, give preload "
+            "instead of max_stress"
+        )
     if wanted[1] is None or other[1] is not None:
         control = "a load" if problem.control.is_load else "a separation or a stiffness"
         raise ValueError(
             f"a path under {control} turns at {wanted[0]}: give that, and no {other[0]}"
+            + ("" if problem.control.is_load else " (or give preload, in Pa)")
         )
     return wanted[1]
+
+
+def turn_arguments(
+    control: Control, turn: object, at_preload: bool, latest: float | None
+) -> dict[str, Any]:
+    """Return the arguments of :func:`run_loop` for a turning point of any kind.
+
+    Parameters
+    ----------
+    control : Control
+    turn : object
+        Turning point, or turning points of ``run_loops``.
+    at_preload : bool
+        Whether it is a preload in Pa.
+    latest : float, optional
+        Then, where the path turns at the latest.
+    """
+    if at_preload:
+        return {"preload": turn, "max_penetration": latest}
+    return {"max_stress" if control.is_load else "max_penetration": turn}
+
+
+def check_preload(preload: float, control: Control) -> float:
+    """Check the mean stress in Pa at which a path turns, and return it as float.
+
+    Raises
+    ------
+    ValueError
+        If it is out of bounds, or the path is one under a load.
+    TypeError
+        If it is not a number.
+    """
+    preload = real("preload", preload, MAX_STRESS)
+    if control.is_load:
+        raise ValueError(
+            f"preload is {plain(preload)} Pa under a load: a weight or a machine? A weight turns "
+            "at max_stress; at a preload turns a machine, which prescribes the separation or has a "
+            "stiffness"
+        )
+    return preload
+
+
+def latest_turn(
+    problem: Problem, preload: float, max_penetration: float | None, max_stress: object = None
+) -> float:
+    """Return the turning point of a path whose mean stress does not reach the preload.
+
+    Parameters
+    ----------
+    problem : Problem
+    preload : float
+        In Pa; the largest of several.
+    max_penetration : float, optional
+        As given; without it nearly full contact at fixed separation, and with a stiffness the
+        displacement at which every state with a gap carries more.
+    max_stress : object
+        Refused, unless it is None.
+
+    Raises
+    ------
+    ValueError
+        If the preload is out of bounds, or the path is one under a load.
+    TypeError
+        If it is not a number.
+    """
+    preload = check_preload(preload, problem.control)
+    if max_stress is not None:
+        raise ValueError(
+            "preload and max_stress are given: a machine turns at a preload, a weight "
+            "(control=Control(0)) at max_stress"
+        )
+    if max_penetration is not None:
+        return max_penetration
+    if problem.control.is_fixed:
+        return FULL_PENETRATION
+    return 1.0 + preload / (problem.control.stiffness * problem.profile.h_max)
+
+
+def load_step(
+    method: Method, record: Record, drive: float, preload: float | None
+) -> tuple[Path, bool]:
+    """Follow one load step from the last state of a record, or up to the preload, if there is one.
+
+    Returns
+    -------
+    Path
+    bool
+        Whether the mean stress has reached the preload.
+
+    Raises
+    ------
+    PathError
+        If the path cannot be followed.
+    """
+    state, prescribed = record.states[-1], method.problem.prescribed(drive)
+    if preload is None:
+        return method.follow(state, prescribed), False
+    return follow_to_stress(method, state, prescribed, preload)
+
+
+def drive_in(problem: Problem, state: ContactState) -> float:
+    """Compute the value of the control in a state: Δ/h_max, or u_tot/h_max of a stiffness."""
+    return problem.penetration(problem.prescribed_in(state))
 
 
 def recorder(

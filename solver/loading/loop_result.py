@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adhesis.solver.checks import choice, counted, reals
+from adhesis.solver.checks import choice, counted, real, reals
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
+from adhesis.solver.loading.loop_state import LoopState, state_at_stress
+from adhesis.solver.loading.mean_stress_event import has_reached
 from adhesis.solver.loading.path_record import Record
-from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
+from adhesis.solver.loading.zero_range import opening_warnings, range_warnings, stress_text
 from adhesis.solver.method import Method
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch
@@ -47,8 +49,11 @@ class LoopResult(EquilibriumPath):
     ----------
     turning_point : float
         As prescribed: Δ/h_max, u_tot/h_max if the control is a stiffness, p̄ in Pa under a load.
+        With a preload the value that was reached.
     max_penetration : float
         Δ/h_max at the turning point: prescribed, or computed if the control does not fix it.
+    preload : float or None
+        Mean stress in Pa at which the path was to turn.
     loss : float
         ∮ p̄ dΔ in J/m² of nominal area, over all states
         (:func:`adhesis.solver.loading.path_record.integral`).
@@ -69,17 +74,21 @@ class LoopResult(EquilibriumPath):
     loss_dimensionless: float
     work_gained: float
     work_spent: float
+    preload: float | None = None
 
     _numbers = (
-        *("turning_point", "max_penetration", "loss", "loss_dimensionless", "work_gained"),
+        *("turning_point", "max_penetration", "turning_stress", "preload", "preload_reached"),
+        *("loss", "loss_dimensionless", "work_gained"),
         *("work_spent", "effective_work_of_approach", "effective_work_of_separation"),
         *("pull_off_stress", "pull_off_penetration"),
     )
 
     def __repr__(self) -> str:
         """Return two lines with the loop and its loss, and the number of warnings."""
+        weight = "under a weight, " if self.problem.control.is_load else ""
         return (
-            f"LoopResult(turning_point={self.turning_point:g}, {self.load_steps} load steps, "
+            f"LoopResult({weight}turning_point={self.turning_point:g}, "
+            f"{self.load_steps} load steps, "
             f"{len(self.separation)} states, method {self.method.name!r},\n"
             f"  loss={self.loss:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
             f"valid_range={self.valid_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
@@ -98,9 +107,76 @@ class LoopResult(EquilibriumPath):
         return (self.loss - self.loss_from_drops) / self.loss if self.loss else 0.0
 
     @property
+    def turning_stress(self) -> float:
+        """Mean stress p̄ in Pa at the turning point."""
+        return float(self.mean_stress[self.branch == "unloading"][0])
+
+    @property
+    def preload_reached(self) -> bool | None:
+        """Whether the mean stress reached the preload; None without one."""
+        if self.preload is None:
+            return None
+        return has_reached(self.turning_stress, self.preload)
+
+    @property
+    def _turned_after_jump(self) -> bool:
+        """Whether the last state of loading is the end of a jump."""
+        last = int(np.count_nonzero(self.branch == "loading")) - 1
+        return last - 1 in self.states_before_jumps()
+
+    @property
+    def _where(self) -> str:
+        """Turning point as prescribed, for a message."""
+        control, point = self.problem.control, self.turning_point
+        if control.is_load:
+            return f"p̄ = {stress_text(point)}"
+        return f"{'Δ' if control.is_fixed else 'u_tot'}/h_max = {point:.6g}"
+
+    @property
+    def turning_text(self) -> str:
+        """Return how the loop turned, for a terminal: at which preload, stress or penetration."""
+        where = self._where
+        if self.preload is None:
+            return where
+        preload = stress_text(self.preload)
+        if not self.preload_reached:
+            return f"{where}, before the preload of {preload} is reached"
+        if self._turned_after_jump:
+            beyond = stress_text(self.turning_stress)
+            return f"{where}, the end of a jump from below the preload of {preload} to {beyond}"
+        return f"the preload of {preload}, at {where}"
+
+    @property
+    def preload_warnings(self) -> list[str]:
+        """Return a sentence where the mean stress does not reach the preload, or jumps beyond."""
+        found: list[str] = []
+        if self.preload is None:
+            return found
+        if not self.preload_reached:
+            loading = np.where(self.branch == "loading", self.mean_stress, -np.inf)
+            highest = int(loading.argmax())
+            most = (
+                f"at most {stress_text(loading[highest])}, at Δ/h_max = "
+                f"{self.penetration[highest]:.4g}"
+            )
+            if loading[highest] <= 0:
+                most = "a tension in every state of contact"
+            found.append(
+                f"the preload of {stress_text(self.preload)} is not reached: on loading the mean "
+                f"stress is {most}; the loop turns at {self._where}, with "
+                f"{stress_text(self.turning_stress)}"
+            )
+        elif self._turned_after_jump:
+            found.append(
+                f"a jump goes beyond the preload of {stress_text(self.preload)}: the loop turns at "
+                f"its end, with {stress_text(self.turning_stress)}"
+            )
+        return found
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons to doubt the loss, one sentence each; none for most loops."""
-        found = []
+        found = self.preload_warnings
         slope = float(np.sqrt(self.problem.profile.m2))
         if slope > STEEP:
             found.append(
@@ -150,16 +226,20 @@ class LoopResult(EquilibriumPath):
         profile = self.problem.profile
         kinds = Counter(jump.kind for jump in self.jumps)
         several = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+        turned = f"Δ/h_max up to {self.max_penetration:.4g}"
+        if self.preload is not None:
+            turned = f"turning at {self.turning_text}"
         return "\n".join(
             (
                 f"profile    h_max = {profile.h_max:.4g} m, m2 = {profile.m2:.4g}, "
                 f"period {profile.period:.4g} m",
                 f"loop       γ = {self.problem.work_of_adhesion:.4g} J/m², "
-                f"Δ/h_max up to {self.max_penetration:.4g} in {self.load_steps} load steps, "
+                f"{turned} in {self.load_steps} load steps, "
                 f"method {self.method.name}",
                 f"loss       {self.loss:.5g} ± {self.loss_error:.1g} J/m² "
                 f"(W~ = {self.loss_dimensionless:.5g}); "
-                f"sum of drops {self.loss_from_drops:.5g} J/m²",
+                f"sum of drops {self.loss_from_drops:.5g} J/m²"
+                f"{f' ({self.loss_note})' if self.loss_note else ''}",
                 f"range      {self.range_summary()}",
                 f"jumps      {len(self.jumps)}{f' ({several})' if several else ''}",
                 f"pull-off   {self.pull_off_stress:.4g} Pa, "
@@ -184,8 +264,13 @@ class LoopResult(EquilibriumPath):
         Raises
         ------
         ValueError
-            If the branch is unknown, or there are not as many values as states.
+            If the branch is unknown, there are not as many values as states, or the loop turned at
+            a preload, which lies between load steps.
         """
+        if self.preload is not None:
+            raise ValueError(
+                "this loop turned at a preload, between two load steps: take its values with at"
+            )
         values = self._of_states(values)
         chosen = self.states(branch, load_steps_only=True)
         control, h_max = self.problem.control, self.problem.profile.h_max
@@ -233,6 +318,57 @@ class LoopResult(EquilibriumPath):
         found = np.interp(wanted, x, values[chosen].astype(float), left, right)
         return np.where(beyond, np.nan, found)
 
+    def at_stress(self, stress: float, branch: Branch = "unloading") -> LoopState:
+        """Compute the state of a branch at a mean stress, with its contact, gaps and fields.
+
+        Parameters
+        ----------
+        stress : float
+            p̄ in Pa, compression positive.
+        branch : {"loading", "unloading"}
+
+        Returns
+        -------
+        LoopState
+            The first state in contact with that mean stress; where only jumps pass it, the end of
+            the first of them.
+
+        Raises
+        ------
+        ValueError
+            If no state of the branch has that mean stress, the branch is unknown, or the loop
+            comes from a file and holds no contact states.
+        TypeError
+            If the stress is not a number.
+
+        References
+        ----------
+        docs/preload.md, "Contact and gaps at a mean stress"
+
+        Examples
+        --------
+        >>> from adhesis import HalfSpace, Problem, make_method, run_loop, single_wave
+        >>> problem = Problem(single_wave(1e-6, 1e-3), HalfSpace(1e6, 0.5), 0.01)
+        >>> loop = run_loop(make_method("sharp", problem), preload=500, load_steps=8)
+        >>> state = loop.at_stress(100, "unloading")
+        >>> round(state.mean_stress, 3), state.fields().gap.shape
+        (100.0, (32,))
+        """
+        stress, chosen = real("stress", stress), self.states(branch)
+        if self.new_method is None or not self.contact_states:
+            raise ValueError(
+                "this loop holds no contact states: it was loaded from a file; run it again, or "
+                "ask before it is saved"
+            )
+        return state_at_stress(
+            self.new_method(),
+            branch,
+            self.contact_states,
+            self.states_before_jumps(),
+            chosen,
+            stress,
+        )
+
     def states(self, branch: Branch, load_steps_only: bool = False) -> NDArray[np.intp]:
         """Return the indices of one branch's states, optionally only those on the load-step axis.
 
@@ -257,7 +393,12 @@ class LoopResult(EquilibriumPath):
 
 
 def result_of(
-    method: Method, record: Record, turning_point: float, load_steps: int, started: float
+    method: Method,
+    record: Record,
+    turning_point: float,
+    load_steps: int,
+    started: float,
+    preload: float | None = None,
 ) -> LoopResult:
     """Make the result from the record of a loop; ``started`` is its first CPU time, in s."""
     problem = method.problem
@@ -271,6 +412,7 @@ def result_of(
     return LoopResult(
         turning_point=turning_point,
         max_penetration=max_penetration,
+        preload=preload,
         load_steps=load_steps,
         loss=loss,
         loss_dimensionless=loss / problem.loss_scale,

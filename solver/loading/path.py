@@ -23,7 +23,14 @@ from numpy.typing import NDArray
 
 from adhesis.solver.checks import counted, finite_row, flag, function, instance
 from adhesis.solver.loading.equilibrium_path import EquilibriumPath, path_fields
-from adhesis.solver.loading.loop import HOW_METHOD, Progress, check_cycle, progress_of, unload
+from adhesis.solver.loading.loop import (
+    DEFAULT_LOAD_STEPS,
+    HOW_METHOD,
+    Progress,
+    check_cycle,
+    progress_of,
+    unload,
+)
 from adhesis.solver.loading.loop_result import estimated_error, strain_warnings
 from adhesis.solver.loading.path_record import Axis, Record
 from adhesis.solver.loading.zero_range import opening_warnings, range_warnings
@@ -221,7 +228,7 @@ def run_path(
     method: Method,
     turning_points: Sequence[float],
     *,
-    load_steps: int,
+    load_steps: int = DEFAULT_LOAD_STEPS,
     out: bool = True,
     progress: Progress | bool | None = None,
     on_state: Callable[[Branch, ContactState], None] | None = None,

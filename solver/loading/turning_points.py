@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from time import process_time
 
-from adhesis.solver.checks import instance, row
+from adhesis.solver.checks import instance, real, row
 from adhesis.solver.loading.loop import (
+    DEFAULT_LOAD_STEPS,
     HOW_METHOD,
     Progress,
     check_cycle,
+    drive_in,
+    latest_turn,
+    load_step,
     progress_of,
     turning_of,
     unload_recorded,
 )
 from adhesis.solver.loading.loop_result import LoopResult, result_of
+from adhesis.solver.loading.mean_stress_event import has_reached
 from adhesis.solver.loading.path_record import Axis, Record
 from adhesis.solver.method import ContactState, Method, PathError
 from adhesis.solver.model.jump import Branch
@@ -30,11 +36,15 @@ class LoadingBranch:
     ----------
     method : Method
     turning_points : sequence of float, shape (loops,)
-        Different ones: Δ/h_max or u_tot/h_max, or p̄ in Pa under a load.
+        Different ones: Δ/h_max or u_tot/h_max, or p̄ in Pa under a load; with ``latest``,
+        preloads in Pa.
     load_steps : int
-        Equal steps up to the largest turning point; unloading branches use the same step.
+        Equal steps up to the largest turning point, or to ``latest``; unloading branches use the
+        same step.
     marks : sequence of float
         Further values at which a step of the loading branch ends.
+    latest : float, optional
+        Where a loop turns whose preload is not reached: Δ/h_max or u_tot/h_max.
 
     Raises
     ------
@@ -56,19 +66,25 @@ class LoadingBranch:
         *,
         load_steps: int,
         marks: Sequence[float] = (),
+        latest: float | None = None,
     ) -> None:
         instance("method", method, Method, HOW_METHOD)
         points = row("turning points", turning_points, entry="turning point").tolist()
         turns = sorted(points)
         if not turns or len(set(turns)) < len(turns):
             raise ValueError(f"turning points are {points}: there must be some, all different")
-        for turn in turns:
-            _, load_steps = check_cycle(turn, load_steps, method.problem.control)
+        ends = turns if latest is None else [latest]
+        for end in ends:
+            _, load_steps = check_cycle(end, load_steps, method.problem.control)
         self.method = method
-        self._axis = Axis(turns[-1], load_steps)
-        further = self._axis.apart(marks, turns)
-        self._drives = self._axis.between(0.0, turns[-1], [*turns, *further])
-        self._turns = frozenset(turns)
+        self._axis = Axis(ends[-1], load_steps)
+        further = self._axis.apart(marks, ends)
+        self._drives = self._axis.between(0.0, ends[-1], [*ends, *further])
+        self._turns = tuple(turns)
+        self._of_preloads = latest is not None
+        self._reached = -math.inf  # the last of the turning points
+        self._has_left = False  # whether the state lies beyond it
+        self._drive = 0.0  # prescribed value of the state
         self._passed = 0  # number of prescribed values reached
         self._record = Record()
         self._state = method.detached(method.problem.profile.h_max)
@@ -89,21 +105,39 @@ class LoadingBranch:
         if turn not in self._turns:
             raise ValueError(f"{turn!r} is not a turning point of this loading branch")
         started = process_time()
-        problem = self.method.problem
-        while self._passed < len(self._drives) and self._drives[self._passed] <= turn:
+        for stop in self._turns:
+            if self._reached < stop <= turn:
+                self._advance(stop, progress)
+        self._seconds += process_time() - started
+
+    def _advance(self, turn: float, progress: Progress | None) -> None:
+        """Follow the branch from one of its turning points to the next."""
+        preload = turn if self._of_preloads else None
+        while not self._is_at(turn):
             if self._error is not None:
                 raise self._error
             drive = self._drives[self._passed]
             try:
-                path = self.method.follow(self._state, problem.prescribed(drive))
+                path, reached = load_step(self.method, self._record, drive, preload)
             except PathError as error:
                 self._error = error
                 raise
-            if progress is not None:
-                progress("loading", drive, path.states[-1])
-            self._state = self._record.extend("loading", path)
-            self._passed += 1
-        self._seconds += process_time() - started
+            state = path.states[-1]
+            end = drive_in(self.method.problem, state) if reached else drive
+            if progress is not None:  # which may raise: nothing is changed before
+                progress("loading", end, state)
+            self._state, self._drive = self._record.extend("loading", path), end
+            self._passed += not reached
+            self._has_left = True
+        self._reached, self._has_left = turn, False
+
+    def _is_at(self, turn: float) -> bool:
+        """Return whether a turning point is reached, or the branch has ended before a preload."""
+        if self._passed == len(self._drives):
+            return True
+        if not self._of_preloads:
+            return self._drives[self._passed] > turn
+        return has_reached(self._state.mean_stress, turn)
 
     def loop(
         self,
@@ -138,7 +172,7 @@ class LoadingBranch:
             As in :func:`adhesis.solver.loading.loop.run_loop`.
         """
         self.advance_to(turn, progress)
-        if self._drives[self._passed - 1] != turn:
+        if self._reached != turn or self._has_left:
             raise ValueError(f"this loading branch has passed {turn!r}")
         started = process_time() - self._seconds
         record = self._record.copy()
@@ -148,16 +182,20 @@ class LoadingBranch:
                 on_state(branch, state)
         axis = self._axis
         apart = axis.apart(marks)
-        unload_recorded(self.method, record, self._state, axis, turn, progress, apart)
-        return result_of(self.method, record, turn, self._passed - 1, started)
+        unload_recorded(self.method, record, self._state, axis, self._drive, progress, apart)
+        preload = turn if self._of_preloads else None
+        ended = self._passed == len(self._drives) or not self._of_preloads
+        steps = self._passed - 1 if ended else self._passed
+        return result_of(self.method, record, self._drive, steps, started, preload)
 
 
 def run_loops(
     method: Method,
     *,
-    max_penetration: Sequence[float] | None = None,
+    max_penetration: Sequence[float] | float | None = None,
     max_stress: Sequence[float] | None = None,
-    load_steps: int,
+    preload: Sequence[float] | None = None,
+    load_steps: int = DEFAULT_LOAD_STEPS,
     progress: Progress | bool | None = None,
 ) -> tuple[LoopResult, ...]:
     """Run loops that share one loading branch, which is followed once.
@@ -168,8 +206,13 @@ def run_loops(
     max_penetration, max_stress : sequence of float, shape (loops,)
         The turning points, all different: Δ/h_max or u_tot/h_max, or Pa under a load. May be any
         iterable of numbers.
+    preload : sequence of float, shape (loops,)
+        Instead, in Pa and all different: each loop turns where its mean stress reaches its preload
+        (:func:`adhesis.solver.loading.loop.run_loop`). ``max_penetration`` is then one number,
+        where it turns at the latest.
     load_steps : int
-        Equal steps up to the largest turning point; unloading branches use the same step.
+        Equal steps up to the largest, or latest, turning point; unloading branches use the same
+        step.
     progress : callable or bool, optional
         True shows a bar, in a terminal or notebook; a function is called as
         :data:`adhesis.solver.loading.loop.Progress` says.
@@ -195,10 +238,17 @@ def run_loops(
     docs/theory.md, "8. Paths and controls"
     """
     instance("method", method, Method, HOW_METHOD)
-    name = "max_stress" if method.problem.control.is_load else "max_penetration"
-    given = turning_of(method.problem, max_penetration, max_stress)
-    points = row(name, given, entry="turning point").tolist()
-    branch = LoadingBranch(method, points, load_steps=load_steps)
-    with progress_of(progress, max(points)) as report:
+    problem, latest = method.problem, None
+    if preload is None:
+        name = "max_stress" if problem.control.is_load else "max_penetration"
+        given = turning_of(problem, max_penetration, max_stress)
+        points = row(name, given, entry="turning point").tolist()
+    else:
+        points = row("preload", preload, entry="preload").tolist()
+        one = None if max_penetration is None else real("max_penetration", max_penetration)
+        wanted = [latest_turn(problem, point, one, max_stress) for point in points]
+        latest = max(wanted, default=None)
+    branch = LoadingBranch(method, points, load_steps=load_steps, latest=latest)
+    with progress_of(progress, max(points) if latest is None else latest) as report:
         loops = {turn: branch.loop(turn, progress=report) for turn in sorted(points)}
     return tuple(loops[turn] for turn in points)

@@ -1,11 +1,15 @@
 """Adapt numba's compiler in three respects; only this module and ``jit`` import numba.
 
 Results are boxed by C code alone, the message for slices of different shapes is a short one, and
-references are counted only to arrays that a function makes or returns.
+references are counted only to arrays that a function makes or returns. That holds for functions
+with this module's :class:`Compiler`; numba's tables, which a user's own functions are compiled
+with, stay as they are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from numba.core import boxing, ir, lowering, pythonapi, types
@@ -29,9 +33,23 @@ def _shapes_differ_compiled(source: Any, target: Any) -> Any:
     return refuse
 
 
-# numba's own message contains the shapes, which takes compiling half of Python's strings: 3.5 s.
-if hasattr(arrayobj, "raise_with_shape_context"):
-    arrayobj.raise_with_shape_context = _shapes_differ
+@contextmanager
+def _short_message() -> Iterator[None]:
+    """Write code that refuses a slice of another shape with the short message, inside this context.
+
+    numba's own message contains the shapes, which takes compiling half of Python's strings: 3.5 s.
+    Only one thread compiles at a time.
+    """
+    name = "raise_with_shape_context"
+    own = getattr(arrayobj, name, None)
+    if own is None:
+        yield
+        return
+    setattr(arrayobj, name, _shapes_differ)
+    try:
+        yield
+    finally:
+        setattr(arrayobj, name, own)
 
 
 # ------------------------------------------------------------------- results handed to Python
@@ -70,19 +88,30 @@ def _box_named_tuple(typ: Any, val: Any, c: Any) -> Any:
     return result
 
 
-pythonapi._boxers.functions.update(
-    {
-        types.Array: _box_array,
-        types.NamedTuple: _box_named_tuple,
-        types.NamedUniTuple: _box_named_tuple,
-    }
-)
+_BOXERS: dict[Any, Any] = {
+    types.Array: _box_array,
+    types.NamedTuple: _box_named_tuple,
+    types.NamedUniTuple: _box_named_tuple,
+}
+_NumbaAPI: Any = pythonapi.PythonAPI  # numba has no types
+
+
+class _PythonAPI(_NumbaAPI):  # type: ignore[misc]  # numba has no types
+    """numba's access to Python's objects, with the boxers above."""
+
+    def from_native_value(self, typ: Any, val: Any, env_manager: Any = None) -> Any:
+        """Box a value."""
+        box = _BOXERS.get(type(typ))
+        if box is None:
+            return super().from_native_value(typ, val, env_manager)
+        return box(typ, val, pythonapi._BoxContext(self.context, self.builder, self, env_manager))
 
 
 # ------------------------------------------------------------------- references to arrays
 
 _NumbaLower: Any = lowering.Lower  # numba has no types
 # expressions whose result is kept by their operands; of calls, those of array.reshape
+_INTERNAL: dict[Any, Any] = {}  # functions that numba compiled for code without counting
 _VIEWS = {"getattr", "static_getitem", "cast", "build_tuple", "exhaust_iter", "undef"}
 
 
@@ -109,7 +138,8 @@ class _Lower(_NumbaLower):  # type: ignore[misc]  # numba has no types
                 if not self._borrows(assign.value, owning):
                     owning.add(assign.target.name)
         self._borrowing = {assign.target.name for assign in assignments} - owning
-        self._uncounted = self.context.subtarget(enable_nrt=False)
+        # What numba compiles on the way, and keeps for all, must not be code without counting.
+        self._uncounted = self.context.subtarget(enable_nrt=False, cached_internal_func=_INTERNAL)
 
     def _borrows(self, value: Any, owning: set[str]) -> bool:
         """Return whether a value borrows if the variables that are not ``owning`` do."""
@@ -148,7 +178,18 @@ class _Lower(_NumbaLower):  # type: ignore[misc]  # numba has no types
         if name in self._borrowing:
             self.context = self._uncounted
         try:
-            super().lower_inst(inst)
+            with _short_message():
+                super().lower_inst(inst)
+        finally:
+            self.context = counted
+
+    def create_cpython_wrapper(self, release_gil: bool = False) -> None:
+        """Write the code that Python calls."""
+        counted, own = self.context, self.context.subtarget()
+        own.get_python_api = lambda builder: _PythonAPI(own, builder)
+        self.context = own
+        try:
+            super().create_cpython_wrapper(release_gil)
         finally:
             self.context = counted
 

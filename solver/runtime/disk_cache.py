@@ -12,19 +12,24 @@ unreliable on network disks.
 
 Reading a file executes its content. A folder or file is therefore used only if its owner is trusted
 (the user, root, and in the installation the owner of the sources, which are executed anyway) and
-nobody else may write it; otherwise it is ignored with one warning (:class:`_Distrusted`).
+nobody else may write it; otherwise it is ignored with one warning (:class:`_Distrusted`). Whoever
+owns a folder above could put another in its place: the same holds for all of them, but that a
+sticky one, such as /tmp, may be written by all. They are opened one from the other, and the file
+from the last, so that nothing can be exchanged after it was checked.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import pwd
 import re
+import secrets
 import stat
-import tempfile
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -82,6 +87,11 @@ def users_folder() -> Path | None:
         return None
 
 
+# Descriptors to go on from, also of folders that can be passed and not listed.
+_FOLDER = os.O_DIRECTORY | getattr(os, "O_PATH", os.O_RDONLY)
+_LONGEST_WAY = 200  # folders and links: more are a circle of links
+
+
 class _Distrusted(Exception):
     """Error for a folder or file that others could have written, with the remedy."""
 
@@ -108,17 +118,14 @@ class _CodeFolder:
         _Distrusted
         """
         try:
-            self._check(self.folder, os.stat(self.folder))
-            # O_NONBLOCK: opening a pipe of that name would block
-            descriptor = os.open(self.folder / file, os.O_RDONLY | os.O_NONBLOCK)
+            with self._opened() as folder:
+                # O_NONBLOCK: opening a pipe of that name would block
+                flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW
+                with os.fdopen(os.open(file, flags, dir_fd=folder), "rb") as stream:
+                    self._check(self.folder / file, os.fstat(stream.fileno()))
+                    return stream.read()
         except OSError:
             return None
-        with os.fdopen(descriptor, "rb") as stream:
-            self._check(self.folder / file, os.fstat(descriptor))
-            try:
-                return stream.read()
-            except OSError:
-                return None
 
     def write(self, file: str, content: bytes) -> None:
         """Write a file, readable for all in the installation and for the user alone elsewhere.
@@ -128,19 +135,57 @@ class _CodeFolder:
         OSError, _Distrusted
         """
         _make_folder(self.folder, 0o755 if self._installed else 0o700)
-        self._check(self.folder, os.stat(self.folder))
-        handle, temporary = tempfile.mkstemp(dir=self.folder, prefix=f".{file[:40]}-")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(content)
-            os.chmod(temporary, 0o644)  # other users read the installation's code
-            os.replace(temporary, self.folder / file)
-        except BaseException:
-            os.unlink(temporary)
-            raise
+        with self._opened() as folder:
+            temporary = f".{file[:40]}-{secrets.token_hex(8)}"
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+            handle = os.open(temporary, flags, 0o600, dir_fd=folder)
+            try:
+                with os.fdopen(handle, "wb") as stream:
+                    stream.write(content)
+                    os.fchmod(handle, 0o644)  # other users read the installation's code
+                os.replace(temporary, file, src_dir_fd=folder, dst_dir_fd=folder)
+            except BaseException:
+                os.unlink(temporary, dir_fd=folder)
+                raise
 
-    def _check(self, path: Path, found: os.stat_result) -> None:
-        """Raise if an untrusted user could have written a folder or file."""
+    @contextmanager
+    def _opened(self) -> Iterator[int]:
+        """Open the folder, after every folder above it, and every link on the way.
+
+        In the installation those above hold the sources, which are executed anyway.
+
+        Raises
+        ------
+        OSError, _Distrusted
+        """
+        path = Path(os.path.abspath(self.folder))
+        path, parts = (path.parents[1], path.parts[-2:]) if self._installed else _split(path)
+        names = [*reversed(parts)]
+        passed: list[tuple[Path, os.stat_result]] = []
+        here = os.open(path, _FOLDER)
+        try:
+            while names:
+                name = names.pop()
+                found = os.stat(name, dir_fd=here, follow_symlinks=False)
+                passed.append((path / name, found))
+                if len(passed) > _LONGEST_WAY:
+                    raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+                if stat.S_ISLNK(found.st_mode):
+                    names += reversed(Path(os.readlink(name, dir_fd=here)).parts)
+                    continue
+                path /= name
+                there = os.open(name, _FOLDER | os.O_NOFOLLOW, dir_fd=here)
+                os.close(here)
+                here = there
+                passed[-1] = path, os.fstat(here)
+            for place, found in reversed(passed):
+                self._check(place, found, above=place != path)
+            yield here
+        finally:
+            os.close(here)
+
+    def _check(self, path: Path, found: os.stat_result, above: bool = False) -> None:
+        """Raise if an untrusted user could have written a folder or file, or a link above them."""
         trusted = {os.geteuid(), 0}
         who = "you or root"
         if self._installed:
@@ -151,6 +196,8 @@ class _CodeFolder:
                 f"{path} is not used, as compiled code is executed: it belongs to "
                 f"{_name_of(found.st_uid)} and not to {who}; {self._remedy}"
             )
+        if stat.S_ISLNK(found.st_mode) or (above and found.st_mode & stat.S_ISVTX):
+            return  # links have no modes; in a sticky folder others can only add something
         if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
             raise _Distrusted(
                 f"{path} is not used, as compiled code is executed: users other than its "
@@ -177,6 +224,7 @@ class CodeFiles:
     """
 
     def __init__(self, name: str, to_installation: bool = False) -> None:
+        self.name = name
         users = users_folder()
         self._folders = [_CodeFolder(installed_folder() / name, installed=True)]
         if users is not None:
@@ -239,6 +287,11 @@ class CodeFiles:
 
 def _listed(reasons: Iterable[str]) -> str:
     return ", ".join(reasons) or "there is no home folder"
+
+
+def _split(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """Return the root of a path, and the names below it."""
+    return Path(path.anchor), path.parts[1:]
 
 
 def _name_of(user: int) -> str:

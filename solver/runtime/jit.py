@@ -212,14 +212,19 @@ class _FunctionCache:
     def _file(self, signature: Any) -> str:
         return f"{self._name}-{hashlib.sha256(str(signature).encode()).hexdigest()[:16]}"
 
+    def _digest(self, signature: Any, content: bytes) -> bytes:
+        """Return the digest of the code of a signature, for this folder alone."""
+        place = f"{code_files().name}/{self._file(signature)}\n"
+        return hashlib.sha256(place.encode() + content).digest()
+
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Load the code of a signature; None if it is not cached."""
         content = _files().read(self._file(signature))
         if content is None:
             return None
         digest, content = content[:_DIGEST], content[_DIGEST:]
-        if hashlib.sha256(content).digest() != digest:
-            return None  # a damaged file: compiled and written anew
+        if self._digest(signature, content) != digest:
+            return None  # a damaged file, or one from another place: compiled and written anew
         target.refresh()
         symbols, calls, copied, state = pickle.loads(content)
         # the code that this code calls must be loaded before it, under the expected symbol
@@ -250,7 +255,7 @@ class _FunctionCache:
         state = result._reduce()
         # numba has no types
         content: bytes = dumps((symbols, calls, copied, state))  # type: ignore[no-untyped-call]
-        _files().write(self._file(signature), hashlib.sha256(content).digest() + content)
+        _files().write(self._file(signature), self._digest(signature, content) + content)
 
     def _note(self, result: Any, signature: Any, calls: list[_Call], copied: bool) -> None:
         """Attach to the code the calls that its callers inherit."""

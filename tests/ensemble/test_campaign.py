@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from adhesis.ensemble.campaign.compare import compare
 from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.campaign.tables import TABLES
+from adhesis.ensemble.campaign.tasks import WHOLE, Part
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.task.compute import make_problem
 from adhesis.ensemble.task.fields import field_plan
@@ -188,7 +189,7 @@ def test_bad_files_are_refused_in_one_sentence(text, words):
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError, match="cannot be read: No such file"):
         load_campaign(tmp_path / "none.toml")
-    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+    with pytest.raises(InputError, match="is a directory, not a file"):
         load_campaign(tmp_path)
     binary = tmp_path / "b.toml"
     binary.write_bytes(b"\xff\xfe\x00")
@@ -251,6 +252,34 @@ def test_seeds_are_a_promise():
     """Written down: a release that changes them would break every campaign that is to grow."""
     tasks = parse_campaign(campaign_text(seed="0")).tasks()
     assert [t.seed for t in tasks[:2]] == [4232842298785526, 2383740928328724]
+
+
+def test_tasks_by_number_are_those_by_column():
+    campaign = parse_campaign(campaign_text(realisations="3", **AXES))
+    for part in (WHOLE, Part(2, 5)):
+        tasks = campaign.tasks(part)
+        assert len(tasks) == len(list(tasks)) == campaign.rows(part).size
+        for name in ("hurst", "work_of_adhesion", "realisation", "seed"):
+            assert tasks.column(name).tolist() == [getattr(task, name) for task in tasks]
+        for name in tasks.names:
+            assert tasks.column(name).tolist() == [dict(task.others)[name] for task in tasks]
+        first = {}
+        for task in tasks:
+            first.setdefault(task.cell, task)
+        assert tasks.of_cells() == list(first.values())
+    assert tasks[1:3] == [tasks[1], tasks[2]]
+    assert tasks != [*tasks, tasks[0]]
+    with pytest.raises(IndexError):
+        tasks[len(tasks)]
+
+
+def test_too_many_tasks_are_counted_and_not_made():
+    """Three lists of two thousand values make 8e9 cells, which no memory holds."""
+    many = [f"[{', '.join(f'{low + k * step:.4g}' for k in range(2000))}]" for low, step in (
+        (0.1, 1e-4), (0.01, 1e-4), (1e6, 1e3)
+    )]  # fmt: skip
+    text = campaign_text(hurst=many[0], work_of_adhesion=many[1], young=many[2])
+    assert "makes 16000000000 tasks: it must make at most 10000000" in complaint(text)
 
 
 def test_penetration_axes():

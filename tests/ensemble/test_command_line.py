@@ -164,15 +164,55 @@ def test_bad_values_are_one_sentence(name, words, sentence, folder, capsys):
 
 
 @pytest.mark.parametrize(
-    "words", ["--seed 1 --seed=2", "--seed 1 --see 1", "--field-penetrations 0.1 --field-p 0.2 0.3"]
+    "words",
+    [
+        "--seed 1 --seed=2",
+        "--seed 1 --seed 1",
+        "--field-penetrations 0.1 --field-penetrations 0.2 0.3",
+    ],
 )
 def test_an_option_that_is_given_twice_is_refused(words, capsys):
-    option = parser_of("loop")._get_option_tuples(words.split()[0])[0][0].option_strings[-1]
+    option = words.split()[0]
     line = refused(capsys, ["loop", "--hurst", "0.8", *words.split()])
     assert line.startswith(f"adhesis loop: {option} is given twice: give it once")
     many = parser_of("run").parse(["c.toml", "--hurst", "0.7", "--hurst", "0.8"])
     assert many.hurst == ["0.7", "0.8"]  # may be repeated
     assert not [name for name in vars(many) if name.startswith("_")]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("run c.toml --out {}.h5", "run c.toml --out {}.h5 --ranks 2", "run {}.toml"),
+        *("new {}.toml", "sample {}.csv", "merge a.h5 --out {}.h5", "merge {}.h5 --out a.h5"),
+        *("status {}.h5", "verify {}.h5", "report {}.h5 --to x", "bench --to {}", "doctor --in {}"),
+        *("trace {}.csv --to x CONTACT", "trace c.csv --to {} CONTACT"),
+        "loop --heights {}.csv --period 2mm CONTACT",
+        *(f"loop --hurst 0.8 --{name} {{}}.{name}" for name in ("json", "csv")),
+        *("loop --hurst 0.8 --fields {}.npz", "loop --hurst 0.8 --film {}.html"),
+    ],
+)
+def test_a_name_that_is_too_long_is_one_sentence(words, capsys, tmp_path, monkeypatch):
+    """Of a file or folder, of the folder that it is in, and of the whole path."""
+    monkeypatch.chdir(tmp_path)
+    write_campaign(tmp_path)
+    assert main(["sample", "c.csv"]) == 0
+    capsys.readouterr()
+    words = words.replace("CONTACT", " ".join(CONTACT))
+    for name in ("y" * 256, "y" * 300 + "/x", "z/" * 2100 + "x"):
+        assert name in refused(capsys, words.format(name).split())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.csv", "c.toml"]
+
+
+def test_an_error_that_is_of_no_single_option_names_none(monkeypatch, capsys):
+    """Python 3.13 raises what older ones report through ``error``."""
+
+    def parse_args(self, words, namespace):
+        raise argparse.ArgumentError(None, f"unrecognized arguments: {' '.join(words[1:])}")
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", parse_args)
+    line = refused(capsys, ["trace", "x.csv", "--speed"])
+    assert line.startswith("adhesis trace: unrecognized arguments: --speed (")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -417,3 +457,36 @@ def test_ranks_are_bounded_by_cores_and_nodes():
     most = launch.largest_number_of_ranks({})
     assert most == 16 * launch.cores()
     assert launch.largest_number_of_ranks({"SLURM_JOB_NUM_NODES": "100"}) == 100 * most
+
+
+# ---------------------------------------------------------------------- abbreviations
+
+
+def filled(parser: argparse.ArgumentParser) -> list[str]:
+    """Return words with all that a command requires."""
+    words = []
+    for action in parser._actions:
+        value = str(next(iter(action.choices))) if action.choices else "1"
+        if action.option_strings and action.required:
+            words += [action.option_strings[0], value]
+        elif not action.option_strings and action.nargs not in ("?", "*"):
+            words.append(value)
+    return words
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_option_can_be_abbreviated(name, capsys):
+    """What passes options on, as the batch scripts do, knows them by their whole names."""
+    parser = parser_of(name)
+    words, options = filled(parser), set(parser._option_string_actions)
+    parser.parse(words)
+    short = {o[:end] for o in options if o.startswith("--") for end in range(3, len(o))} - options
+    assert short
+    for option in sorted(short):
+        for given in ([option, "1"], [f"{option}=1"]):
+            assert given[0] in refused(capsys, [name, *words, *given])
+
+
+def test_the_overview_takes_no_abbreviation_either(capsys):
+    for word in ("--vers", "--he", "stat"):
+        assert f"COMMAND is '{word}'" in refused(capsys, [word])

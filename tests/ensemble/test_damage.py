@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import zlib
 
 import h5py
 import numpy as np
@@ -200,6 +202,75 @@ def test_headers_that_promise_something_else_are_refused_before_they_are_read(
         Results(path)
     assert "\n" not in str(caught.value)
     assert not read
+
+
+def sign_all(path):
+    """Give a file a head that is right for it: the checksum of its length, with no rows left out.
+
+    Without HDF5, which would follow the links in it.
+    """
+    content = bytearray(path.read_bytes())
+    mark, length = b"adhesis head 1: ", 8192
+    place = content.find(mark)
+    table = f"{len(content)} 0+{len(content)} {place}+{length} ".encode()
+    text = mark + f"{zlib.crc32(table):08x} ".encode() + table
+    content[place : place + length] = text.ljust(length, b".")
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("name", ["loss", "status", "hurst", "task", "unloading_penetration", "x"])
+@pytest.mark.parametrize("kind", ["pipe", "sound", "soft", "nowhere"])
+def test_a_link_is_refused_before_it_is_followed(path, name, kind, tmp_path):
+    """HDF5 opens what an external link names, and a pipe without a writer lets it wait."""
+    os.mkfifo(tmp_path / "pipe")
+
+    def change(file):
+        if name in file:
+            file.move(name, "moved")
+        if kind == "soft":
+            file[name] = h5py.SoftLink("/moved")
+        else:
+            target = {"pipe": tmp_path / "pipe", "sound": path, "nowhere": "none.h5"}[kind]
+            file[name] = h5py.ExternalLink(str(target), "/loss")
+
+    changed(path, change)
+    sign_all(path)
+    with pytest.raises(InputError, match=f"is damaged: its {name} is a link, and not in the file"):
+        Results(path)
+
+
+ATTRIBUTES = {
+    "another seed": lambda file: file.attrs.modify("seed", 77),
+    "a seed of several numbers": lambda file: file.attrs.create("seed", [5, 5]),
+    "another convention": lambda file: file.attrs.modify("Conventions", "none"),
+    "a part": lambda file: file.attrs.create("part", "1/1 "),
+    "another unit": lambda file: file["loss"].attrs.modify("units", "mJ m-2"),
+    "the unit of an axis": lambda file: file["unloading_penetration"].attrs.modify("units", "m"),
+    "no unit": lambda file: file["loss"].attrs.pop("units"),
+    "a factor": lambda file: file["loss"].attrs.create("scale_factor", 2.0),
+    "a fill value": lambda file: file["loss"].attrs.create("_FillValue", 1.0),
+    "other names of flags": lambda file: file["status"].attrs.modify("flag_meanings", "a b c d"),
+    "other flags": lambda file: file["status"].attrs.modify(
+        "flag_values", np.arange(1, 5, 1, "u1")
+    ),
+    "another dimension": lambda file: _another_dimension(file["loss"], file["field_task"]),
+}
+
+
+def _another_dimension(dataset, scale):
+    dataset.dims[0].detach_scale(dataset.dims[0][0])
+    dataset.dims[0].attach_scale(scale)
+
+
+@pytest.mark.parametrize("name", ATTRIBUTES)
+def test_an_attribute_that_is_not_the_campaigns_is_refused(path, name, capsys):
+    """Other programs go by it, and the checksum of the head can be made right."""
+    changed(path, ATTRIBUTES[name])
+    write_head(path)
+    assert main(["verify", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    if name == "another seed":
+        assert "is damaged: its attribute seed is 77, and that of its campaign is 5" in line
 
 
 # ---------------------------------------------------------------- what commands say

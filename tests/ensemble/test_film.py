@@ -184,7 +184,7 @@ def test_what_cannot_be_filmed_is_refused_in_one_sentence(loop, tmp_path, monkey
         (lambda: loop.film(frames=2.5), (TypeError, ValueError), "frames is 2.5"),
         (lambda: loop.film(progress=3), TypeError, "progress is 3"),
         (lambda: bare.film(), ValueError, "this result holds no contact states"),
-        (lambda: loop.film(tmp_path / "no" / "a.html", frames=2), OSError, "No such file"),
+        (lambda: loop.film(tmp_path / "no" / "a.html", frames=2), InputError, "no directory"),
     ):
         with pytest.raises(error, match=re.escape(text)):
             call()

@@ -161,10 +161,10 @@ def test_what_is_no_readable_file_is_refused(
     path = tmp_path / "a.csv"
     path.write_text("1")
 
-    def refuse(self: Path, *_: object, **__: object) -> None:
-        raise PermissionError(13, "Permission denied", str(self))  # root may read everything
+    def refuse(path: Path, *_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied", str(path))  # root may read everything
 
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(InputError, match=r"cannot read .*a\.csv: Permission denied"):
         read(path)
 

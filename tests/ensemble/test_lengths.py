@@ -14,7 +14,7 @@ from adhesis.ensemble.campaign.file import load_campaign, parse_campaign
 from adhesis.ensemble.command.main import COMMANDS, main, parser_of
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.lengths import height, length, length_text, length_with_unit
-from adhesis.ensemble.loop.cycle import turning_points_of
+from adhesis.ensemble.loop.cycle import turns_of
 from adhesis.ensemble.stresses import stress
 from adhesis.solver.model.control import Control
 from tests.support.campaign_support import campaign_text
@@ -82,7 +82,8 @@ def test_every_option_that_is_a_length_or_a_stress_takes_a_unit() -> None:
     assert options[height] == {"--h-rms"}
     lengths = {"--period", "--step", "--cut-off", "--tip-radius", "--longest-gap", "--layer"}
     assert options[length] == lengths | {"--adhesion-range"}
-    assert options[stress] == {"--young", "--strength"}  # and --max-stress, a list
+    assert options[stress] == {"--young", "--strength", "--field-stresses"}
+    # and --max-stress and --preload, lists
     assert options[float] == set(NUMBERS) - {"--work-of-adhesion"}
 
 
@@ -227,10 +228,10 @@ def test_what_is_no_stress_is_refused_with_the_rule(text: str, sentence: str) ->
 def test_turning_points_under_a_load_and_keys_of_a_campaign_take_stresses_with_units() -> None:
     parser = parser_of("loop")
     args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,500, 1e-3MPa"])
-    assert turning_points_of(args, Control(0.0)) == (200.0, 500.0, 1000.0)
+    assert turns_of(args, Control(0.0)).points == (200.0, 500.0, 1000.0)
     args = parser.parse(["--stiffness", "0", "--max-stress", "0.2kPa,5bar"])
     with pytest.raises(InputError, match="--max-stress is '5bar': its unit must be one of Pa, kPa"):
-        turning_points_of(args, Control(0.0))
+        turns_of(args, Control(0.0))
     assert parse_campaign(campaign_text(young='"1 MPa"')) == parse_campaign(
         campaign_text(young="1e6")
     )

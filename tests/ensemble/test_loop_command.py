@@ -96,7 +96,10 @@ DIMENSIONAL = {
     "m": {"h_max", "h_rms", "period", "separation", "patch_length", "valid_range", "edge_range"},
     "m²": {"m0"},
     "1/m²": {"m4"},
-    "Pa": {"young", "mean_stress", "pull_off_stress", "largest_interior_tension"},
+    "Pa": {
+        *("young", "mean_stress", "pull_off_stress", "largest_interior_tension"),
+        *("turning_stress", "preload"),
+    },
     "J/m": {"energy", "elastic_energy", "adhesion_energy"},
     "J/m²": {
         *("work_of_adhesion", "loss", "loss_from_drops", "loss_error", "energy_drop", "at_stake"),
@@ -486,3 +489,20 @@ def test_the_strength_of_the_interface_is_an_option_and_stands_in_the_json(
     assert capsys.readouterr().err.startswith("adhesis loop: --adhesion-range is 1e-09 and")
     assert run(*wave_words(wave_file, "--strength", 1e-4)) == 2
     assert "--strength is 0.0001 Pa: it must be at least" in capsys.readouterr().err
+
+
+def test_defaults_of_a_profile_and_material_are_stated_where_they_are_taken(capsys):
+    words = ("--hurst", 0.8, "--n0", 4, "--ratio", 4, "--load-steps", 2, "--young", 1e6, "--quiet")
+    assert run(*words) == 0
+    (line,) = (t for t in capsys.readouterr().out.splitlines() if t.startswith("defaults"))
+    assert "--period 6.2832mm --seed 0 --h-rms 1um --work-of-adhesion 0.04 --poisson 0.5" in line
+    assert run(*words, "--period", "1mm", "--m2", 1e-3) == 0
+    (line,) = (t for t in capsys.readouterr().out.splitlines() if t.startswith("defaults"))
+    assert "--period" not in line
+    assert "--h-rms" not in line
+
+
+@pytest.mark.usefixtures("exact_method")
+def test_given_heights_take_no_defaults(wave_file, capsys):
+    assert run(*wave_words(wave_file, "--load-steps", 2, "--quiet")) == 0
+    assert "defaults" not in capsys.readouterr().out

@@ -58,6 +58,7 @@ LOOPS: dict[str, Callable[[], LoopResult | PathResult]] = {
     "without adhesion": lambda: run_loop(
         ExactWave(Problem(WAVE, HalfSpace(1e6, 0.5), 0.0)), max_penetration=0.5, load_steps=4
     ),
+    "to a preload": lambda: run_loop(wave_method(), preload=500.0, load_steps=4),
     "path": lambda: run_path(wave_method(), [0.5, 0.2, 0.6], load_steps=4),
 }
 
@@ -162,8 +163,8 @@ def test_other_files_are_refused(tmp_path, result):
     result.to_xarray().drop_attrs().to_netcdf(other, engine="h5netcdf")
     for call, error, message in (
         (lambda: adhesis.load(tmp_path / "c.nc"), InputError, "there is no such file"),
-        (lambda: adhesis.load(text), InputError, "it is no loop or path that adhesis has saved"),
-        (lambda: adhesis.load(other), InputError, "it is no loop or path that adhesis has saved"),
+        (lambda: adhesis.load(text), InputError, "it has no checksum at its end"),
+        (lambda: adhesis.load(other), InputError, "it has no checksum at its end"),
         (lambda: adhesis.load(3), TypeError, "path is 3"),
         (lambda: result.save("loop.h5"), InputError, "the name must end in .nc"),
         (lambda: result.save(3), TypeError, "path is 3"),
@@ -341,6 +342,71 @@ def test_what_is_no_campaign_is_refused(source, error, text):
         adhesis.Campaign(source)
 
 
+def test_units_are_asked_for_on_every_way_in(tmp_path):
+    """40 J/m² can hardly be meant: with mJ/m² taken for J/m² it is a thousand times too much."""
+    tables = {**TABLES, "sweep": {**TABLES["sweep"], "work_of_adhesion": [40]}}
+    sound = adhesis.Campaign(TABLES).text
+    text = sound.replace("work_of_adhesion = [0.02]", "work_of_adhesion = [40]")
+    file = tmp_path / "my.toml"
+    file.write_text(text)
+    for source in (tables, text, file):
+        with pytest.raises(InputError, match=r"\[sweep\] work_of_adhesion is .*40"):
+            adhesis.Campaign(source)
+    with_unit = {**TABLES, "sweep": {**TABLES["sweep"], "work_of_adhesion": ["40 mJ/m2"]}}
+    assert adhesis.Campaign(with_unit).tables.sweep.work_of_adhesion == (0.04,)
+
+
+def test_what_a_campaign_computes_cannot_be_changed(campaign):
+    """Ranks compute its text, and one process its tables."""
+    for name in ("text", "tables"):
+        with pytest.raises(AttributeError):
+            setattr(campaign, name, None)
+
+
+def _inside_itself():
+    values: list[Any] = [0.7]
+    values.append(values)
+    return values
+
+
+def _nested(depth):
+    values: Any = 0.7
+    for _ in range(depth):
+        values = [values]
+    return values
+
+
+class _Printed(float):
+    def __repr__(self):
+        return "1\n[output]\njumps = 1\n#"
+
+
+@pytest.mark.parametrize(
+    "values", [_inside_itself(), _nested(20), _nested(100_000), ["\ud800"], "\0", [b"a"], {"a": 1}]
+)
+def test_a_value_that_no_key_has_is_refused_in_one_sentence(values):
+    with pytest.raises(InputError) as error:
+        adhesis.Campaign({**TABLES, "sweep": {**TABLES["sweep"], "hurst": values}})
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+def test_a_number_of_a_class_of_ones_own_is_a_number():
+    half_space = {"young": 1e6, "poisson": _Printed(0.5)}
+    assert adhesis.Campaign({**TABLES, "material": half_space}).tables.material.poisson == 0.5
+
+
+NAMES: tuple[Any, ...] = ("a\0.h5", "a\ud800.h5", "")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_no_file_can_be_called_is_refused(name, campaign, result):
+    path = result.save, adhesis.load, adhesis.open, adhesis.read_trace, campaign.run, campaign.price
+    for function in (*path, adhesis.Campaign, lambda name: adhesis.open("x.h5", beside=[name])):
+        with pytest.raises(ValueError, match="it must be the name of a file"):
+            function(name)
+
+
 def test_a_campaign_is_priced_run_resumed_and_opened(campaign, tmp_path, capsys):
     file = tmp_path / "my.h5"
     price = campaign.price(seconds=0.1)
@@ -418,3 +484,21 @@ def test_the_examples_of_the_docstrings_are_right(module):
     done = doctest.testmod(module)
     assert done.failed == 0
     assert done.attempted >= 3
+
+
+def test_a_loop_is_drawn_into_axes_that_are_given():
+    problem = Problem(single_wave(1e-9, 1e-3), HalfSpace(1e6, 0.5), 1e-9)
+    loop = run_loop(ExactWave(problem), max_penetration=0.5, load_steps=4)
+    figure = Figure()
+    stress, contact = figure.subplots(1, 2)
+    assert loop.plot(ax=(stress, contact)) is figure
+    assert stress.get_lines()[0].get_ydata() == pytest.approx(
+        1e-3 * loop.mean_stress[loop.branch == "unloading"]
+    )
+    assert contact.get_ylabel() == "contact fraction $A/A_0$"
+    alone = Figure().subplots()
+    assert loop.plot(ax=alone) is alone.figure
+    assert len(alone.get_lines()) == 3  # two branches, and a line at 0
+    for bad in ("ax", [alone, 1], [], 3):
+        with pytest.raises(TypeError, match="it must be one Axes of matplotlib, or two of them"):
+            loop.plot(ax=bad)

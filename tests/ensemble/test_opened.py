@@ -120,6 +120,8 @@ def test_every_figure_of_the_report_has_a_method_that_returns_its_axes(results):
     for name in ("loop_against_penetration", "height_density"):
         axes = getattr(results.plot, name)()
         assert axes[0].figure.axes == axes
+        assert axes.figure is axes[0].figure
+        assert "data:image/png;base64," in axes._repr_html_()  # what a notebook displays
         assert axes[0].lines
     axes = results.plot.loss_against_hurst()
     assert axes[-1].get_xlabel() == "Hurst exponent $H$"

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
+import time
+
 import numpy as np
 import pytest
 
 from adhesis.ensemble.campaign.file import parse_campaign
-from adhesis.ensemble.campaign.tasks import Part
+from adhesis.ensemble.campaign.tasks import Part, Task
 from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.write import Writer
 from adhesis.ensemble.run.plan import prior
 from adhesis.ensemble.run.price import as_text, price
+from adhesis.ensemble.run.session import run_campaign
 from adhesis.solver.method import PathError
 from tests.support.campaign_support import adhesis, campaign_text, write_campaign
-from tests.support.fake_run import fake_result
+from tests.support.fake_run import fake_engine, fake_result
 
 
 def cost(task):
@@ -36,6 +40,50 @@ def test_pilots_tell_what_the_campaign_costs():
     assert reported.makespan(1000) == reported.longest
     hurried = price(campaign, compute=compute, seconds=0.0)
     assert hurried.pilots == 0
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Count the tasks that are made."""
+    tasks = []
+
+    class Counted(Task):
+        def __post_init__(self):
+            tasks.append(self.realisation)
+
+    monkeypatch.setattr("adhesis.ensemble.campaign.tasks.Task", Counted)
+    return tasks
+
+
+def test_a_million_tasks_are_priced_by_those_that_are_tried_out(made):
+    campaign = parse_campaign(campaign_text(realisations="250_000"))
+    tried = []
+
+    def stops(campaign, task):
+        tried.append(task)
+        if len(tried) == 8:
+            time.sleep(0.2)
+        return compute(campaign, task)
+
+    reported = price(campaign, compute=stops, seconds=0.1)
+    assert len(tried) < 1000
+    assert {task.realisation for task in tried[:4]} == {0}  # one of each cell at first
+    assert reported.tasks == reported.left == 1_000_000
+    assert reported.seconds > 1e5
+    assert len(made) < 3000
+    assert price(campaign, part=Part(3, 7), compute=compute, seconds=0.0).left == len(
+        range(2, 1_000_000, 7)
+    )
+
+
+def test_a_disk_that_is_too_small_is_met_before_tasks_are_made(made, tmp_path, monkeypatch):
+    full = shutil.disk_usage(tmp_path)._replace(free=10**9)
+    monkeypatch.setattr("adhesis.ensemble.results.layout.shutil.disk_usage", lambda path: full)
+    campaign = parse_campaign(campaign_text(realisations="2_500_000"))
+    with pytest.raises(InputError, match=r"needs .* and the disk has 1000 MB free"):
+        run_campaign(campaign, tmp_path / "r.h5", engine=fake_engine(""))
+    assert not made
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_pilot_loop_without_a_path_costs_what_it_took():

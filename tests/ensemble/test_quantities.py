@@ -28,5 +28,23 @@ def test_a_value_has_the_digits_of_its_error(value: float, error: float, text: s
     assert with_error(value, error) == text
 
 
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.995, 0.020, "0.995, from 0.975 to 1.000"),
+        (0.6, 0.7, "0.6, from 0.0 to 1.0"),
+        (0.5, 0.112, "0.50 ± 0.11"),
+        (1.0, 0.0, "1 ± 0"),
+        (0.98, 0.02, "0.980 ± 0.020"),
+        (1.2, 0.112, "1.20 ± 0.11"),
+    ],
+)
+def test_no_interval_leaves_the_bounds_of_its_quantity(
+    value: float, error: float, text: str
+) -> None:
+    """A fraction of contact of more than 1 is not printed, unless it was given."""
+    assert with_error(value, error, 0.0, 1.0) == text
+
+
 def test_a_small_size_is_not_zero() -> None:
     assert [bytes_text(size) for size in (0, 345_678, 12_345_678)] == ["0 kB", "346 kB", "12 MB"]

@@ -27,6 +27,7 @@ from adhesis.ensemble.results.layout import create
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DATASETS, DONE, FAILED, PENDING, scales
 from adhesis.ensemble.results.write import DatasetRows, Writer
+from adhesis.ensemble.run import lock as lock_module
 from adhesis.ensemble.run.lock import RunLock, holder
 from adhesis.ensemble.task.dataset import KEPT
 from adhesis.ensemble.task.row import RESULT_DATASETS
@@ -396,11 +397,10 @@ def test_a_full_disk_leaves_nothing(campaign):
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))\n"
         "from tests.support.campaign_support import campaign_text\n"
         "from adhesis.ensemble.campaign.file import parse_campaign\n"
-        "from adhesis.ensemble.errors import InputError\n"
+        "from adhesis.ensemble.errors import WriteError\n"
         "from adhesis.ensemble.results.layout import create\n"
         "try:\n    create(sys.argv[1], parse_campaign(campaign_text()))\n"
-        # HDF5 may crash the process at its end, over what it could not write
-        "except InputError as error:\n    print(error, flush=True)\n"
+        "except WriteError as error:\n    print(error, flush=True)\n"
     )
     import tempfile
 
@@ -411,8 +411,8 @@ def test_a_full_disk_leaves_nothing(campaign):
             capture_output=True,
             text=True,
         )
-        assert run.stdout.startswith(f"{target} cannot be written: "), run.stderr
-        assert len(run.stdout.splitlines()) == 1
+        assert run.stdout == f"{target} cannot be written: File too large\n"
+        assert (run.returncode, run.stderr) == (0, "")  # HDF5 would crash it at its end
         assert not os.listdir(folder)
 
 
@@ -457,6 +457,58 @@ def test_one_run_a_file_and_a_killed_one_holds_nothing(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def wanted_by_another_process(path):
+    """Whether a run of another process is refused."""
+    code = HOLD_LOCK.replace("time.sleep(60)", "")
+    command = [sys.executable, "-c", code, str(path), str(ROOT)]
+    return subprocess.run(command, capture_output=True, check=False).returncode != 0
+
+
+@pytest.mark.skipif(not lock_module._OF_OPEN_FILE, reason="needs locks of open files")
+def test_the_lock_lasts_whatever_its_process_opens_and_closes(tmp_path):
+    """A lock of the process would end when the first descriptor of its file is closed."""
+    path = tmp_path / "r.h5"
+    with RunLock(path) as lock:
+        lock.acquire(1, 0.0)
+        assert holder(path)["pid"] == os.getpid()
+        lock.path.read_bytes()
+        with pytest.raises(InputError, match=rf"another run .*process {os.getpid()}"):
+            RunLock(path).acquire(1, 0.2)
+        assert wanted_by_another_process(path)
+    assert not wanted_by_another_process(path)
+
+
+@pytest.mark.skipif(not lock_module._OF_OPEN_FILE, reason="needs locks of open files")
+def test_a_process_that_was_forked_meanwhile_does_not_keep_a_lock_that_was_released(tmp_path):
+    path, (end, write) = tmp_path / "r.h5", os.pipe()
+    lock = RunLock(path)
+    lock.acquire(1, 0.0)
+    child = os.fork()
+    if not child:
+        os.read(end, 1)
+        os._exit(0)
+    try:
+        lock.release(keep_file=True)
+        with RunLock(path) as again:
+            again.acquire(1, 0.0)
+    finally:
+        os.write(write, b"x")
+        os.waitpid(child, 0)
+
+
+@pytest.mark.skipif(not lock_module._OF_OPEN_FILE, reason="needs locks of open files")
+def test_a_system_without_locks_of_open_files_locks_for_the_process(tmp_path, monkeypatch):
+    def unknown(*_):
+        raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+
+    monkeypatch.setattr(fcntl, "fcntl", unknown)
+    path = tmp_path / "r.h5"
+    with RunLock(path) as lock:
+        lock.acquire(1, 0.0)
+        assert wanted_by_another_process(path)
+    assert not wanted_by_another_process(path)
+
+
 @pytest.mark.parametrize("code", ["ENOLCK", "ENOSYS", "EOPNOTSUPP"])
 def test_a_file_system_without_locks_is_used_after_a_warning(tmp_path, monkeypatch, capsys, code):
     """As Lustre without ``flock``; a lock that another process holds is another error."""
@@ -465,6 +517,7 @@ def test_a_file_system_without_locks_is_used_after_a_warning(tmp_path, monkeypat
         raise OSError(getattr(errno, code), os.strerror(getattr(errno, code)))
 
     monkeypatch.setattr(fcntl, "lockf", refuse)
+    monkeypatch.setattr(fcntl, "fcntl", refuse)
     path = tmp_path / "r.h5"
     with RunLock(path) as lock:
         lock.acquire(2, 0.0)

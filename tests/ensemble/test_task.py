@@ -49,6 +49,7 @@ def loop_of(campaign, *, steps_below_zero: int, jumps: int = 0) -> LoopResult:
         penetration=penetration,
         separation=problem.separation(0) * (1 - penetration),
         mean_stress=value,
+        tangent=value,
         contact_fraction=value,
         patches=value.astype(int),
         elastic_energy=value,

@@ -27,6 +27,7 @@ ROOT = Path(__file__).parent.parent.parent
 PAGES = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
     *(p for p in sorted(ROOT.glob("docs/**/*.md")) if "_build" not in p.parts),
+    *sorted(ROOT.glob("study/**/*.md")),
 ]
 
 # Commands that are read by their parser, or whose files are looked for, but that are not run here.
@@ -62,8 +63,10 @@ NOT_RUN = {
     "python benchmarks/endurance.py empty": "a quiet machine; test_mpi.py runs it short",
     "python benchmarks/endurance.py campaign jobs/example.toml": "as before",
     "python benchmarks/endurance.py campaign jobs/paper.toml --out paper.h5": "takes minutes",
-    "python -m tools.study collect study": "needs the results files of the study's campaigns",
-    "python -m tools.study page": "tests/project/test_study.py makes the tables anew",
+    "make study": "minutes",
+    "python -m study page": "make study",
+    "python -m study collect out/study": "needs the results files of the study's campaigns",
+    "adhesis run study/campaigns/NAME.toml --out out/study/NAME.h5": "hours",
     "adhesis report paper.h5 --to paper --beside beside/*.h5": "needs their results",
     "python examples/measured_profile.py --to out/measured": "test_measured_profile.py",
     "python examples/measured_profile.py trace.csv --to out/measured": "as before",

@@ -56,7 +56,7 @@ def test_every_figure_of_the_documentation_has_a_command():
     assert made == set(kept())
     for part in figures.PARTS.values():
         for command in part.commands:
-            modules = ("-m adhesis ", "-m tools.study ", "-m tools.transcripts ")
+            modules = ("-m adhesis ", "-m tools.transcripts ")
             assert command.startswith(modules) or (ROOT / command.split()[0]).exists()
 
 
@@ -80,14 +80,17 @@ def test_a_figure_that_is_no_longer_made_is_removed(tmp_path, monkeypatch):
     for name in ("fig4.png", "fig5.png"):
         shutil.copyfile(ROOT / "docs" / "figures" / "loop.png", folder / name)
     (tmp_path / "draw.py").write_text(
-        "import shutil, sys; shutil.copyfile('docs/paper/fig5.png', sys.argv[1])"
+        "import shutil, sys; shutil.copyfile('docs/paper/fig5.png', sys.argv[1])\n"
+        "open(sys.argv[1].replace('png', 'csv'), 'w').close()"
     )
+    (tmp_path / "numbers").mkdir()
     monkeypatch.setattr(figures, "ROOT", tmp_path)
-    part = figures.Part(("draw.py OUT/fig5a.png",), "*.png", "paper")
+    part = figures.Part(("draw.py OUT/fig5a.png",), "*.*", "paper", data="numbers")
     monkeypatch.setattr(figures, "PARTS", {"paper": part})
     figures.make("paper", 1)
     assert [path.name for path in folder.iterdir()] == ["fig5a.png"]
     assert figures.stamped(folder / "fig5a.png").endswith("ARGS=paper")
+    assert [path.name for path in (tmp_path / "numbers").iterdir()] == ["fig5a.csv"]
 
 
 def test_the_picture_of_the_folders_shows_what_the_code_does():

@@ -173,6 +173,12 @@ def test_number_of_jobs_in_the_environment_is_not_taken_for_a_folder(cluster: Cl
     assert (done.returncode, seen) == (0, "report"), done.stderr
 
 
+def test_job_that_could_not_write_says_that_it_does_not_come_back(cluster: Cluster) -> None:
+    done, seen = slurm(cluster, "study.toml", CODE="74")
+    assert (done.returncode, seen) == (74, "nothing")
+    assert "results could not be written: this job does not come back" in done.stdout
+
+
 def test_launcher_that_ends_with_0_but_starts_no_rank_is_a_failure(cluster: Cluster) -> None:
     done, seen = slurm(cluster, "study.toml", LAUNCHER="true", PENDING="9")
     assert (done.returncode, seen) == (1, "nothing")
@@ -242,6 +248,19 @@ def test_slurm_job_passes_options_on(
     assert done.returncode == 0, done.stderr
     assert cluster.calls("adhesis")[0] == ["run", *run.split()]
     assert action == ("nothing" if "part" in run else "report")  # a part is reported on with all
+
+
+def test_names_that_begin_with_a_dash_are_no_options(cluster: Cluster) -> None:
+    done, action = slurm(cluster, "-dash.toml")
+    assert (done.returncode, action) == (0, "report"), done.stderr
+    done = cluster.run("bash", cluster.folder / "calls.submitted")
+    assert done.returncode == 0, done.stderr
+    assert cluster.calls("adhesis")[-1] == ["report", "./-dash.h5", "--to", "./-dash"]
+    done = cluster.run(JOBS / "local.sh", "-dash.toml", "3", OUT="-out")
+    assert (done.returncode, done.stderr) == (0, "")
+    names = "./-dash.toml --out ./-dash.h5", "./-dash.toml --out ./-out/-dash.h5 --ranks 3"
+    runs = [words[1:] for words in cluster.calls("adhesis") if words[0] == "run"]
+    assert runs == [name.split() for name in names]
 
 
 @pytest.mark.parametrize("name", ["slurm.sh", "pbs.sh"])

@@ -72,23 +72,8 @@ def test_doctor_and_workers_execute_nothing_of_the_working_directory(study):
 
 @pytest.mark.mpi
 def test_ranks_execute_nothing_of_the_working_directory(study, capfd):
-    assert launch.run_ranks(MPIRUN, 2, ["--version"]) == (0, "")
-    assert capfd.readouterr().out.count("adhesis ") == 1
-
-
-@pytest.mark.parametrize("output", [None, print])
-def test_a_launcher_that_hangs_after_its_ranks_have_ended_is_killed(
-    tmp_path, monkeypatch, capfd, output
-):
-    """The exit code and the message are those that the ranks have passed on."""
-    launcher = tmp_path / "mpirun"
-    launcher.write_text(f'#!/bin/sh\nprintf "75\\nstopped" > "${launch.STARTED}"\nexec sleep 60\n')
-    launcher.chmod(0o755)
-    monkeypatch.setattr(launch, "_LAUNCHER_ENDS", 0.1)
-    monkeypatch.setattr(launch, "_LAUNCHER_KILLED", 0.1)
-    assert launch.run_ranks(str(launcher), 2, [], output=output) == (75, "stopped")
-    text = "the run is over, but its launcher has not ended: it is ended in 0 s\n"
-    assert capfd.readouterr().err == text
+    assert launch.run_ranks(MPIRUN, 2, ["--version"]) == launch.RanksEnd(0)
+    assert capfd.readouterr().err.count("adhesis ") == 1
 
 
 # --------------------------------------------------------------------- the end of the parent

@@ -26,6 +26,8 @@ FOLDERS = (*PACKAGES.values(), "tests")
 # The only modules that import what is slow to load: MPI, the file format, the compiler, figures.
 MPI = {"adhesis.ensemble.run.ranks", "adhesis.ensemble.doctor.probe"}
 HDF5 = {
+    "adhesis.ensemble.results.disk_file",
+    "adhesis.ensemble.loop.sealed_file",
     "adhesis.ensemble.results.merge",
     "adhesis.ensemble.results.head",
     "adhesis.ensemble.results.layout",
@@ -225,7 +227,9 @@ def test_a_run_with_nothing_to_do_loads_no_solver(
 ) -> None:
     path = tmp_path / "c.toml"
     path.write_text(text_of(realisations=2))
-    packages = loaded(COMMAND, "run", str(path), "--out", str(results), *options)
+    settings = {"PMIX_MCA_gds": "hash", "PRTE_MCA_plm": "ssh", "HYDRA_LAUNCHER": "ssh"}
+    command = f"import os; os.environ |= {settings}  # of a site, and not of a rank\n{COMMAND}"
+    packages = loaded(command, "run", str(path), "--out", str(results), *options)
     assert packages & {"mpi4py", "matplotlib", "numba", "llvmlite", "scipy"} == set()
 
 
@@ -265,3 +269,19 @@ def test_nothing_imports_the_folders_by_their_bare_names() -> None:
     ]
     for path in (*PATHS.values(), *places):
         assert {n.split(".")[0] for n in imported(path)} & {"solver", "ensemble"} == set(), path
+
+
+def test_no_program_takes_abbreviated_options() -> None:
+    """A new option may make an abbreviation ambiguous that scripts use."""
+    programs = [
+        path
+        for top in ("benchmarks", "docs", "examples", "tools")
+        for path in (ROOT / top).rglob("*.py")
+    ]
+    for path in (*PATHS.values(), *programs):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and (
+                ast.unparse(node.func).endswith(("ArgumentParser", ".add_parser"))
+            ):
+                given = {word.arg: ast.unparse(word.value) for word in node.keywords}
+                assert given.get("allow_abbrev") == "False", f"{path}:{node.lineno}"

@@ -206,3 +206,56 @@ def test_a_file_that_others_may_write_is_compiled_and_kept_anew(places):
         assert files.read("code") is None
     assert files.write("code", b"mine") == places[1]
     assert files.read("code") == b"mine"
+
+
+@root_only
+@pytest.mark.parametrize(
+    ("owner", "mode", "words"),
+    [
+        (0, 0o755, ""),
+        (0, 0o1777, ""),  # sticky, as /tmp is
+        (0, 0o777, "above is not used.*mode 777.*chmod go-w .*above"),
+        (0, 0o770, "above is not used.*mode 770"),
+        (MALLORY, 0o755, f"above is not used.*uid {MALLORY}.*ADHESIS_CACHE"),
+        (MALLORY, 0o1777, f"above is not used.*uid {MALLORY}"),
+    ],
+)
+def test_who_owns_a_folder_above_could_exchange_the_code(places, monkeypatch, owner, mode, words):
+    above = places[1].parent.parent / "above"
+    monkeypatch.setenv("ADHESIS_CACHE", str(above / "of" / "mine"))
+    assert CodeFiles("key").write("code", b"code") == above / "of" / "mine" / "key"
+    os.chown(above, owner, owner)
+    above.chmod(mode)
+    content, reported = read()
+    assert content == (None if words else b"code")
+    assert re.search(words, reported) if words else reported == ""
+
+
+@root_only
+def test_a_link_is_followed_if_nobody_else_could_have_made_it(places, monkeypatch):
+    """A home folder is often a link; in /tmp anybody may make one to a folder that is trusted."""
+    top = places[1].parent.parent
+    (top / "tmp").mkdir()
+    (top / "tmp").chmod(0o1777)
+    CodeFiles("key").write("code", b"code")
+    link = top / "tmp" / "link"
+    for target in (top / "user", Path("../user")):
+        link.symlink_to(target)
+        for words in ("", f"link is not used.*uid {MALLORY}"):
+            monkeypatch.setenv("ADHESIS_CACHE", str(link))
+            content, reported = read()
+            assert content == (None if words else b"code")
+            assert re.search(words, reported) if words else reported == ""
+            os.chown(link, MALLORY, MALLORY, follow_symlinks=False)
+        link.unlink()
+    link.symlink_to(link)
+    assert read() == (None, "")
+
+
+def test_the_file_itself_is_no_link(places):
+    files = CodeFiles("key")
+    files.write("other", b"code")
+    (places[1] / "code").symlink_to("other")
+    assert read(files) == (None, "")
+    assert files.write("code", b"mine") == places[1]
+    assert (read(files), files.read("other")) == ((b"mine", ""), b"code")

@@ -12,9 +12,10 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 import pytest
-from numba import njit, types
+from numba import types
 from numba.core import boxing, pythonapi, serialize
 from numba.core.dispatcher import Dispatcher
 
@@ -77,6 +78,11 @@ def raises_signal() -> Callable[[int], int]:
     return function
 
 
+def njit(function: Callable[..., Any]) -> Any:
+    """Compile a function as ours are."""
+    return numba.njit(function, pipeline_class=compiler.Compiler)
+
+
 NOW, ALARM = raises_signal(), int(signal.SIGALRM)
 
 
@@ -126,7 +132,7 @@ def test_results_are_what_numba_makes_of_them():
 
 def boxed_in_c(typ: Any) -> bool:
     """Whether boxing a result of this type runs C code alone."""
-    box = pythonapi._boxers.lookup(type(typ))
+    box = compiler._BOXERS.get(type(typ)) or pythonapi._boxers.lookup(type(typ))
     if box in (boxing.box_tuple, compiler._box_named_tuple):
         of_ours = not isinstance(typ, types.BaseNamedTuple) or (
             typ.instance_class.__module__.startswith("adhesis.solver.")

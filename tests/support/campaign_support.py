@@ -19,11 +19,14 @@ import numpy as np
 
 from adhesis.ensemble.command.campaigns import run
 from adhesis.ensemble.command.main import main
+from adhesis.ensemble.run import launch
 from tests.support.fake_run import fake_engine
 from tests.support.launchers import MPIRUN
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TESTS = Path(__file__).resolve().parent
+
+MOST_RANKS = 100  # more than cores anywhere: what a launcher needs to start them is set
 
 # Time, place and version may differ between two runs of one campaign, and so the checksums of rows;
 # nothing else may.
@@ -80,15 +83,9 @@ def environment(**extra: str) -> dict[str, str]:
     """Return an environment in which mpirun works even from a process that has loaded MPI."""
     dirty = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "SLURM_", "MPI4PY_RC_")
     env = {k: v for k, v in os.environ.items() if not k.startswith(dirty)}
-    env.update(
-        OMPI_ALLOW_RUN_AS_ROOT="1",
-        OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
-        OMPI_MCA_rmaps_base_oversubscribe="1",
-        OMPI_MCA_hwloc_base_binding_policy="none",
-        PYTHONPATH=str(ROOT),
-        **extra,
-    )
-    return env
+    with patch.dict(os.environ, env, clear=True):
+        allowed = launch.launch_environment(MOST_RANKS)
+    return allowed | {"PYTHONPATH": str(ROOT)} | extra
 
 
 def command(words: Iterable[object], ranks: int = 0, fake: str | None = None) -> list[str]:
@@ -145,6 +142,18 @@ def start(
     )
 
 
+def start_python(*words: object) -> subprocess.Popen[str]:
+    """Start this interpreter in an environment in which it can start ranks."""
+    return subprocess.Popen(
+        [sys.executable, *map(str, words)],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
 def ranks_of(launcher: int) -> list[int]:
     """Return the process ids of the ranks that a launcher has started."""
     found = []
@@ -173,7 +182,7 @@ def hung_launchers() -> list[int]:
         pid
         for pid in ranks_of(os.getpid())
         if not has_ended(pid)
-        and Path(f"/proc/{pid}/comm").read_text().strip() in ("mpirun", "orterun")
+        and Path(f"/proc/{pid}/comm").read_text().strip() in ("mpirun", "orterun", "prterun")
         and all(has_ended(rank) for rank in ranks_of(pid))
     ]
 

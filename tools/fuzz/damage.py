@@ -71,7 +71,9 @@ def judged(damage: Damage, content: bytes) -> tuple[str, str]:
 def main() -> int:
     """Judge as many cases as are asked for; returns 1 if one is wrong."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--seconds", type=float, help="draw cases for so long")

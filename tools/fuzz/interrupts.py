@@ -277,7 +277,7 @@ def is_wrong(how: str) -> bool:
 
 def main() -> int:
     """Return 1 if an interrupt did not arrive as what it was."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--kind", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--count", type=int, default=100, help="of each kind")

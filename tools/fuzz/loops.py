@@ -119,7 +119,7 @@ def opening_summary(found: list[dict[str, Any]]) -> str:
 
 def main() -> int:
     """Return 1 if a scene came out wrong."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--seconds", type=float, default=np.inf)
     parser.add_argument("--scenes", type=int, default=2000, help="at most so many")

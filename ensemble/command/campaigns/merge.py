@@ -7,6 +7,7 @@ results file like any other: merge further parts into it, resume it, grow its ca
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -21,26 +22,33 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("parts", metavar="PART.h5", nargs="+", help="results files of one campaign")
-    parser.add_argument("--out", metavar="FILE.h5", required=True, help="made, or merged into")
+    parser.add_argument(
+        "parts", type=Path, metavar="PART.h5", nargs="+", help="results files of one campaign"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.h5", required=True, help="made, or merged into"
+    )
 
 
 def execute(args: argparse.Namespace) -> int:
     """Merge; returns 0."""
-    from adhesis.ensemble.results.layout import check_new_file
+    from adhesis.ensemble.results.layout import check_results_file
     from adhesis.ensemble.results.merge import merge
     from adhesis.ensemble.run.lock import RunLock
     from adhesis.solver.checks import counted
 
-    out = Path(args.out)
-    if not out.parent.is_dir():
+    out = args.out
+    if not os.path.isdir(out.parent):
         raise InputError(f"{out} cannot be written: there is no folder {out.parent}")
-    if not out.exists():
-        check_new_file("--out", out)
+    check_results_file("--out", out)
     try:
         with RunLock(out) as lock:
             lock.acquire(1, 10.0)
-            merged = merge(args.parts, out)
+            try:
+                merged = merge(args.parts, out)
+            except WriteError:
+                lock.release()  # nobody else writes
+                raise
     except WriteError as error:
         print(f"adhesis merge: {error}; the same command resumes", file=sys.stderr)
         return _WRITE_FAILED

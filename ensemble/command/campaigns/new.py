@@ -6,6 +6,7 @@ It lists every key with its meaning, its rule and its default. An existing file 
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from adhesis.ensemble.errors import InputError
@@ -26,9 +27,9 @@ def execute(args: argparse.Namespace) -> int:
     """Write the file; returns 0."""
     if args.file.suffix != ".toml":
         raise InputError(f"FILE.toml is {args.file}: the name must end in .toml")
-    if args.file.is_file():
-        raise InputError(f"FILE.toml is {args.file}, which exists: give another name")
     check_outputs({"FILE.toml": args.file}, {})
+    if os.path.isfile(args.file):
+        raise InputError(f"FILE.toml is {args.file}, which exists: give another name")
     from adhesis.ensemble.campaign.template import campaign_template
 
     writing = Writing()

@@ -2,9 +2,10 @@
 
 A results file that exists is resumed, or extended if the campaign grew; one of another campaign is
 refused. Exit codes: 0 all tasks done, 1 some tasks failed, 2 bad input, 70 an error of adhesis
-itself, 74 the results file could not be written, 75 stopped early (a signal, the walltime, a rank
-that does not answer): run the same command again to resume. 137: a rank that --ranks started was
-killed; the same holds.
+itself, 71 too little memory or too few processes, 74 the results file could not be written, 75
+stopped early (a signal, the walltime, a rank that does not answer): run the same command again to
+resume. Of --ranks, 137: a rank was killed, and the same holds; and 2: the launcher brought no ranks
+together.
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from adhesis.ensemble.command.streams import OutputError, write_line
-from adhesis.ensemble.errors import InputError, WriteError
+from adhesis.ensemble.errors import InputError, WriteError, lack
 
 if TYPE_CHECKING:
     from adhesis.ensemble.campaign.tables import Campaign
-    from adhesis.ensemble.campaign.tasks import Task
+    from adhesis.ensemble.campaign.tasks import Task, Tasks
     from adhesis.ensemble.run.session import Engine, Options, Summary
 
 DONE, SOME_FAILED, BAD_INPUT = 0, 1, 2
-OUR_ERROR, WRITE_FAILED, RESUME = 70, 74, 75  # EX_SOFTWARE, EX_IOERR, EX_TEMPFAIL
+OUR_ERROR, TOO_FEW_RESOURCES = 70, 71  # EX_SOFTWARE, EX_OSERR
+WRITE_FAILED, RESUME = 74, 75  # EX_IOERR, EX_TEMPFAIL
 INTERRUPTED = 130  # by a second Ctrl-C: the first one stops the run in order
 _ALL_ARRIVE = 20.0  # s within which all ranks have the same error, if it is one of all
 _PAUSE = 5.0  # s between two lines of a dry run
-_CODES = (DONE, SOME_FAILED, BAD_INPUT, OUR_ERROR, WRITE_FAILED, RESUME, INTERRUPTED)
 EXAMPLES = (
     "adhesis run jobs/example.toml --ranks 3",
     "adhesis run jobs/paper.toml --dry-run",
@@ -40,9 +41,12 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("campaign", metavar="CAMPAIGN.toml", help="the campaign file")
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="the campaign file")
     parser.add_argument(
-        "--out", metavar="FILE.h5", help="results file (default: the campaign's name, here)"
+        "--out",
+        type=Path,
+        metavar="FILE.h5",
+        help="results file (default: the campaign's name, here)",
     )
     parser.add_argument(
         "--ranks",
@@ -133,6 +137,9 @@ def execute(
     except BaseException as error:
         if args.dry_run and isinstance(error, (BrokenPipeError, OutputError)):
             raise
+        if sentence := lack(error):
+            _end_job(comm, TOO_FEW_RESOURCES, f"adhesis run: {sentence}; what was done is kept")
+            return TOO_FEW_RESOURCES
         traceback.print_exc()
         _end_job(comm, OUR_ERROR)
         return OUR_ERROR
@@ -162,16 +169,10 @@ def _start_ranks(
     """Start ranks and wait for them; returns the exit code."""
     from adhesis.ensemble.run import launch
 
-    code, sentence = launch.run_ranks(mpirun, ranks, args.words, program)
-    if code not in _CODES:
-        sentence = (
-            f"adhesis run: a rank was killed ({Path(mpirun).name} ended with {code}); what was "
-            "done is kept, run the same command again to resume"
-        )
-        code = launch.KILLED
-    if sentence:
-        write_line(sentence)
-    return code
+    end = launch.run_ranks(mpirun, ranks, args.words, program)
+    for line in filter(None, (*end.words, end.sentence)):
+        write_line(line)
+    return end.code
 
 
 def _end_job(comm: Any, code: int, sentence: str = "") -> None:
@@ -190,13 +191,16 @@ def _run(
     from adhesis.ensemble.campaign.tasks import WHOLE, Part
     from adhesis.ensemble.run.dispatch import Unresponsive
     from adhesis.ensemble.run.interrupt import deadline, parse_duration
+    from adhesis.ensemble.run.launch import report_meeting
     from adhesis.ensemble.run.ranks import together
     from adhesis.ensemble.run.session import Options, run_campaign
     from adhesis.solver.checks import counted
 
     # One rank reads: a file that changes meanwhile must not split the job.
     campaign = together(comm, lambda: load_campaign(args.campaign))
-    path = Path(args.out or f"{Path(args.campaign).stem}.h5")
+    if comm.rank == 0:
+        report_meeting()
+    path = args.out or Path(f"{args.campaign.stem}.h5")
     together(comm, lambda: _check_out(args, path))
     if args.dry_run:
         return _tell_price(campaign, path, args, engine) if comm.rank == 0 else DONE
@@ -231,12 +235,11 @@ def _run(
 
 
 def _check_out(args: argparse.Namespace, path: Path) -> None:
-    """Refuse the campaign file itself, and a new results file that does not end in .h5."""
-    from adhesis.ensemble.results.layout import check_new_file
+    """Refuse the campaign file itself, and what is no results file or will be none."""
+    from adhesis.ensemble.results.layout import check_results_file
 
-    if not path.exists():
-        check_new_file("--out", path)
-    elif path.samefile(args.campaign):
+    check_results_file("--out", path)
+    if os.path.exists(path) and path.samefile(args.campaign):
         raise InputError(f"--out is {path}, the campaign file itself: give another file")
 
 
@@ -294,10 +297,10 @@ def _tell_price(
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    def prepare(tasks: list[Task]) -> None:
+    def prepare(tasks: Tasks) -> None:
         from adhesis.ensemble.warm import warm_up  # loads the compiler
 
-        for task in {t.cell: t for t in reversed(tasks)}.values():
+        for task in tasks:
             engine.check(campaign, task)
         warm_up(engine.methods(campaign, tasks), say)
 

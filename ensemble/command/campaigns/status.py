@@ -19,7 +19,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("file", metavar="FILE.h5", help="the results file")
+    parser.add_argument("file", type=Path, metavar="FILE.h5", help="the results file")
     parser.add_argument("--json", action="store_true", help="everything, as JSON")
     parser.add_argument("--watch", action="store_true", help="repeat the status until all is done")
     parser.add_argument(

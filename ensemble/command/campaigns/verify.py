@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from pathlib import Path
 
 SOUND, SOME_DAMAGED = 0, 1
 EXAMPLES = (
@@ -18,7 +19,7 @@ EXAMPLES = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("file", metavar="FILE.h5", help="the results file")
+    parser.add_argument("file", type=Path, metavar="FILE.h5", help="the results file")
     parser.add_argument(
         "--json", action="store_true", help="counts, and every damaged row with its task, as JSON"
     )

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
+from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report.figures.loss_figures import errorbar
 from adhesis.ensemble.report.figures.style import (
     MM,
@@ -27,7 +28,6 @@ from adhesis.ensemble.report.figures.style import (
 )
 from adhesis.ensemble.report.further_axes import axis_label, lines_along, place, together
 
-TURNING_POINTS = ("max_penetration", "max_stress", "preload")
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
 _LOSS = ("loss", "loss (mJ/m²)", 1e-3)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from adhesis.ensemble.aggregate.average import Aggregate
+from adhesis.ensemble.campaign.tables import TURNING_POINTS
 from adhesis.ensemble.report import paper
 from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
-from adhesis.ensemble.report.figures.along import TURNING_POINTS, along, with_figure
+from adhesis.ensemble.report.figures.along import along, with_figure
 from adhesis.ensemble.report.figures.selection import beside_paper
 from adhesis.ensemble.report.further_axes import together
 from adhesis.ensemble.report.paper import PaperFigure

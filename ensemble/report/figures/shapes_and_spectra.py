@@ -299,7 +299,10 @@ def _draw_shape(
     k: int,
     part: NDArray[np.intp],
 ) -> None:
-    """Draw the nodes ``part``, counted on beyond the period where they exceed it."""
+    """Draw the nodes ``part``, counted on beyond the period where they exceed it.
+
+    Each surface stands above the profile by its own gap.
+    """
     factor = -(-_FEWEST_NODES // position.size)
     x = 1e3 * _between(part, factor) * (position[1] - position[0])
     rigid = 1e6 * _refined(CubicSpline, shape.height, part, factor)
@@ -364,7 +367,7 @@ def _penetration_handles(
     # Where the largest penetration varies with H or γ, only its share is the same for all.
     tops = {cell.campaign.cycle.turning_point for cell in data.cells}
     unit = _penetration_sign(data)
-    if len(tops) > 1 and not data.campaign.cycle.under_load:
+    if len(tops) > 1 and not data.campaign.cycle.turns_at_stress:
         unit = r"\Delta/\Delta"
     penetration = data.cells[0].plan.penetration if len(tops) == 1 else data.fields.penetration
     return [
@@ -382,7 +385,7 @@ def _penetration_handles(
 
 def _penetration_sign(data: Aggregate) -> str:
     cycle = data.campaign.cycle
-    if cycle.under_load:
+    if cycle.turns_at_stress:
         return r"\bar p/\bar p"
     return r"\Delta/h" if cycle.stiffness is None else r"u_\mathrm{tot}/h"
 

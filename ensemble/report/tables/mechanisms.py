@@ -104,10 +104,11 @@ def mechanisms(data: Aggregate) -> Table:
 
 def slopes(data: Aggregate, branches: Sequence[str] = BRANCHES) -> Table:
     """Exponent of the deformed surface's spectrum at small wave numbers, state by state."""
+    depth = "p̄/p̄_max" if data.campaign.cycle.turns_at_stress else "Δ/h_max"
     columns = (
         *key_columns(data),
         TableColumn("branch", "branch"),
-        TableColumn("penetration", "Δ/h_max", fixed(2)),
+        TableColumn("penetration", depth, fixed(2)),
         TableColumn("realisations", "n"),
         TableColumn("slope", "slope", fixed(2)),
         TableColumn("slope_sem", "s.e.", number(1)),

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.regular_file import open_regular
 from adhesis.solver import checks
 
 MOST_BYTES = 200_000_000
@@ -113,7 +114,7 @@ class Source:
 
     def open(self) -> BinaryIO:
         """Open it to read (OSError)."""
-        return Path(self.name).open("rb") if self.content is None else io.BytesIO(self.content)
+        return open_regular(self.name) if self.content is None else io.BytesIO(self.content)
 
     def read(self) -> bytes:
         """Return its whole content.

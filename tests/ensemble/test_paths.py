@@ -1,0 +1,350 @@
+"""Crafted paths in the place of every file that a command or function reads or writes.
+
+None holds it up, none is followed where it must not be, none is replaced, and the answer is one
+sentence.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import stat
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import adhesis
+import adhesis.ensemble.command.loop as loop_command
+import adhesis.ensemble.command.trace as trace_command
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.run.session import run_campaign
+from adhesis.solver.references.exact_wave import ExactWave
+from tests.support.campaign_support import campaign_text
+from tests.support.fake_run import fake_engine
+from tests.support.synthetic_results import campaign, rows, write
+
+ANOTHER_USER = 12345
+LONGEST = 20  # s; nothing here takes one
+PROBLEM = adhesis.Problem(adhesis.single_wave(1e-6, 1e-3), adhesis.HalfSpace(1e6, 0.5), 1e-4)
+MATERIAL = ("--work-of-adhesion", "0.01", "--young", "1e6", "--poisson", "0.5")
+LOOP = ("loop", "--heights", "wave.csv", "--period", "1e-3", *MATERIAL, "--load-steps", "2")
+TRACE = (*MATERIAL, "--unit", "um")
+
+# ------------------------------------------------------------------------------- crafted paths
+
+
+def _socket(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(path.name)  # of the current folder: longer names are not possible
+
+
+def _shared(path: Path, target: str) -> None:
+    """Put a link of another user into the place of a path, in a folder in which all may write."""
+    path.parent.chmod(0o1777)
+    path.symlink_to(target)
+    os.lchown(path, ANOTHER_USER, ANOTHER_USER)
+
+
+MADE: dict[str, Callable[[Path], None]] = {
+    "pipe": os.mkfifo,
+    "socket": _socket,
+    "folder": Path.mkdir,
+    "file": lambda path: path.write_text("mine") and None,
+    "link to a pipe": lambda path: path.symlink_to("apart/pipe"),
+    "link to a socket": lambda path: path.symlink_to("apart/socket"),
+    "link to a folder": lambda path: path.symlink_to("apart"),
+    "link to an endless device": lambda path: path.symlink_to("/dev/zero"),
+    "link to a file": lambda path: path.symlink_to("apart/precious"),
+    "link to nothing": lambda path: path.symlink_to("apart/new"),
+    "link to itself": lambda path: path.symlink_to(path.name),
+    "link of another user": lambda path: _shared(path, "apart/precious"),
+    "second name": lambda path: path.hardlink_to("apart/precious"),
+}
+NAMED = {
+    "a file for a folder": "apart/precious/x",
+    "no folder": "none/x",
+    "a name too long": 300 * "x",
+    "a device": "/dev/zero",
+    "a block device": "/dev/loop-none",
+}
+OF_READING = (
+    *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
+    *("link to an endless device", "link to nothing", "link to itself"),
+    *("a file for a folder", "no folder", "a name too long", "a device"),
+)
+OF_WRITING = (
+    *("pipe", "socket", "folder", "link to a pipe", "link to a socket", "link to a folder"),
+    *("link to itself", "link of another user", "a file for a folder", "no folder"),
+    "a name too long",
+)
+OF_FOLDERS = (
+    *("pipe", "socket", "file", "link to a pipe", "link to a socket", "link to a file"),
+    *("link to an endless device", "link to nothing", "link to itself", "link of another user"),
+    *("a file for a folder", "a name too long", "a device"),
+)
+
+
+def kept(folder: Path) -> dict[str, Any]:
+    """Return what lies in a folder: kinds, targets of links, and contents."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        state = path.lstat()
+        name = str(path.relative_to(folder))
+        found[name] = (stat.S_IFMT(state.st_mode), state.st_ino if name != "" else 0)
+        if path.is_symlink():
+            found[name] += (os.readlink(path),)
+        elif path.is_file():
+            found[name] += (path.read_bytes(),)
+    return found
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., str]]:
+    """Make a crafted path in the current folder, which ends with ``ending``; gives its name."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "apart").mkdir()
+    (tmp_path / "apart" / "precious").write_text("mine")
+    os.mkfifo(tmp_path / "apart" / "pipe")
+    monkeypatch.chdir(tmp_path / "apart")
+    _socket(Path("socket"))
+    monkeypatch.chdir(tmp_path)
+    Path("wave.csv").write_text("\n".join(map(repr, np.cos(np.arange(16) * np.pi / 8) * 1e-9)))
+    x = np.arange(200)
+    lines = [f"{a} {np.cos(a / 3) + 0.3 * np.sin(a):.4f}" for a in x]
+    Path("trace.csv").write_text("\n".join(lines))
+    Path("c.toml").write_text(campaign_text())
+
+    def make(kind: str, ending: str = "") -> str:
+        if kind == "link of another user" and os.geteuid() != 0:
+            pytest.skip("only root can give files to other users")
+        if kind in NAMED:
+            return NAMED[kind] if kind == "a device" else NAMED[kind] + ending
+        path = Path(f"crafted{ending}")
+        MADE[kind](path)
+        return str(path)
+
+    def too_late(*_: object) -> None:
+        raise AssertionError(f"it waits for more than {LONGEST} s")
+
+    before = signal.signal(signal.SIGALRM, too_late)
+    signal.alarm(LONGEST)
+    yield make
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def no_work(*_: object, **__: object) -> None:
+    raise AssertionError("the work began before the paths were looked at")
+
+
+@pytest.fixture
+def no_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop_command, "make_method", lambda name, problem, **_: ExactWave(problem))
+    for name in ("run_loop", "run_loops", "run_path"):
+        monkeypatch.setattr(loop_command, name, no_work)
+    monkeypatch.setattr(trace_command, "run_plan", no_work)
+    monkeypatch.setattr("adhesis.ensemble.bench.equal_error.benchmark", no_work)
+    monkeypatch.setattr("adhesis.ensemble.run.session.run_campaign", no_work)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return the path of a sound results file."""
+    small = campaign(hurst=(0.8,), gamma=(0.01,), realisations=2)
+    return str(write(tmp_path_factory.mktemp("results") / "sound.h5", small, rows(small)))
+
+
+@pytest.fixture(scope="module")
+def loop() -> adhesis.LoopResult:
+    return adhesis.run_loop(ExactWave(PROBLEM), max_penetration=0.6, load_steps=4)
+
+
+# ------------------------------------------------------------------------------------ commands
+
+Words = Callable[[str, str], tuple[str, ...]]
+READ: dict[str, tuple[Words, str]] = {
+    "run CAMPAIGN": (lambda path, _: ("run", path), ".toml"),
+    "run --out": (lambda path, _: ("run", "c.toml", "--out", path), ".h5"),
+    "run --dry-run --out": (lambda path, _: ("run", "c.toml", "--dry-run", "--out", path), ".h5"),
+    "status": (lambda path, _: ("status", path), ".h5"),
+    "verify": (lambda path, _: ("verify", path), ".h5"),
+    "report": (lambda path, _: ("report", path, "--to", "new"), ".h5"),
+    "report --beside": (
+        lambda path, sound: ("report", sound, "--to", "new", "--beside", path),
+        ".h5",
+    ),
+    "merge": (lambda path, _: ("merge", path, "--out", "all.h5"), ".h5"),
+    "merge, the second": (lambda path, sound: ("merge", sound, path, "--out", "all.h5"), ".h5"),
+    "merge --out": (lambda path, sound: ("merge", sound, "--out", path), ".h5"),
+    "loop --heights": (
+        lambda path, _: ("loop", "--heights", path, "--period", "1e-3", *MATERIAL),
+        ".csv",
+    ),
+    "loop --trace": (lambda path, _: ("loop", "--trace", path, *TRACE), ".csv"),
+    "trace": (lambda path, _: ("trace", path, *TRACE, "--to", "new"), ".csv"),
+    "trace, an array": (lambda path, _: ("trace", path, *TRACE, "--to", "new"), ".npy"),
+    "trace, of an instrument": (lambda path, _: ("trace", path, *TRACE, "--to", "new"), ".sdf"),
+}
+WRITTEN: dict[str, tuple[Words, str]] = {
+    "loop --json": (lambda path, _: (*LOOP, "--json", path), ".json"),
+    "loop --csv": (lambda path, _: (*LOOP, "--csv", path), ".csv"),
+    "loop --figure": (lambda path, _: (*LOOP, "--figure", path), ".png"),
+    "loop --film": (lambda path, _: (*LOOP, "--film", path), ".html"),
+    "loop --fields": (lambda path, _: (*LOOP, "--fields", path), ".npz"),
+    "sample": (lambda path, _: ("sample", path), ".csv"),
+    "new": (lambda path, _: ("new", path), ".toml"),
+}
+FOLDERS: dict[str, Words] = {
+    "trace --to": lambda path, _: ("trace", "trace.csv", *TRACE, "--to", path),
+    "report --to": lambda path, sound: ("report", sound, "--to", path),
+    "bench --to": lambda path, _: ("bench", "--quick", "--to", path),
+    "doctor --in": lambda path, _: ("doctor", "--in", path),
+}
+# A new results file is made through a link, and one that is missing where it is looked at.
+MAKES = {"run --out", "run --dry-run --out", "merge --out"}
+
+
+def refused(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> str:
+    """Return the one sentence with which a command refuses its paths, before it does anything."""
+    folder = Path.cwd()
+    before = kept(folder)
+    code = main(list(words))
+    out, error = capsys.readouterr()
+    assert (code, out) == (2, ""), (code, out, error)
+    (line,) = error.splitlines()
+    assert kept(folder) == before
+    return line
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("kind", OF_READING)
+@pytest.mark.parametrize("name", READ)
+def test_a_command_refuses_what_is_no_file_to_read(
+    name: str,
+    kind: str,
+    place: Callable[..., str],
+    results: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    if name in MAKES and kind == "link to nothing":
+        pytest.skip("the file that the link names is made")
+    words, ending = READ[name]
+    assert refused(words(place(kind, ending), results), capsys)
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("kind", OF_WRITING)
+@pytest.mark.parametrize("name", WRITTEN)
+def test_a_command_refuses_what_is_no_file_to_write(
+    name: str,
+    kind: str,
+    place: Callable[..., str],
+    results: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words, ending = WRITTEN[name]
+    assert refused(words(place(kind, ending), results), capsys)
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("kind", OF_FOLDERS)
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_command_refuses_what_is_no_folder(
+    name: str,
+    kind: str,
+    place: Callable[..., str],
+    results: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert refused(FOLDERS[name](place(kind), results), capsys)
+
+
+# ----------------------------------------------------------------------------------- functions
+
+Call = Callable[[str, str, adhesis.LoopResult], object]
+FUNCTIONS: dict[str, tuple[Call, str]] = {
+    "open": (lambda path, _, __: adhesis.open(path), ".h5"),
+    "open, beside": (lambda path, sound, _: adhesis.open(sound, beside=[path]), ".h5"),
+    "load": (lambda path, _, __: adhesis.load(path), ".nc"),
+    "read_trace": (lambda path, _, __: adhesis.read_trace(path), ".csv"),
+    "Campaign": (lambda path, _, __: adhesis.Campaign(path), ".toml"),
+    "Campaign.price": (lambda path, _, __: adhesis.Campaign("c.toml").price(path), ".h5"),
+    "Campaign.run": (lambda path, _, __: adhesis.Campaign("c.toml").run(path), ".h5"),
+}
+SAVING: dict[str, tuple[Call, str]] = {
+    "save": (lambda path, _, loop: loop.save(path), ".nc"),
+    "film": (lambda path, _, loop: loop.film(frames=2).save(path), ".html"),
+}
+
+
+def refused_by(call: Callable[[], object]) -> None:
+    folder = Path.cwd()
+    before = kept(folder)
+    with pytest.raises(InputError) as error:
+        call()
+    assert "\n" not in str(error.value)
+    assert kept(folder) == before
+
+
+@pytest.mark.usefixtures("no_loop")
+@pytest.mark.parametrize("kind", OF_READING)
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_function_refuses_what_is_no_file_to_read(
+    name: str,
+    kind: str,
+    place: Callable[..., str],
+    results: str,
+    loop: adhesis.LoopResult,
+) -> None:
+    if name.startswith("Campaign.") and kind == "link to nothing":
+        pytest.skip("the file that the link names is made")
+    call, ending = FUNCTIONS[name]
+    path = place(kind, ending)
+    refused_by(lambda: call(path, results, loop))
+
+
+@pytest.mark.parametrize("kind", OF_WRITING)
+@pytest.mark.parametrize("name", SAVING)
+def test_a_function_refuses_what_is_no_file_to_write(
+    name: str,
+    kind: str,
+    place: Callable[..., str],
+    results: str,
+    loop: adhesis.LoopResult,
+) -> None:
+    call, ending = SAVING[name]
+    path = place(kind, ending)
+    refused_by(lambda: call(path, results, loop))
+
+
+# ------------------------------------------------------------- files beside the results of a run
+
+
+@pytest.mark.parametrize("kind", [kind for kind in MADE if kind != "file"])
+def test_what_stands_in_the_place_of_the_lock_is_refused(
+    kind: str, place: Callable[..., str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    place(kind, ".h5.lock")
+    run = adhesis.Campaign("c.toml").tables
+    refused_by(lambda: run_campaign(run, "crafted.h5", engine=fake_engine("")))
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_what_stands_in_the_place_of_the_unfinished_file_is_removed_and_not_followed(
+    kind: str, place: Callable[..., str]
+) -> None:
+    place(kind, ".h5.part")
+    run = adhesis.Campaign("c.toml").tables
+    if kind == "folder":
+        refused_by(lambda: run_campaign(run, "crafted.h5", engine=fake_engine("")))
+        return
+    before = kept(Path("apart"))
+    run_campaign(run, "crafted.h5", engine=fake_engine(""))
+    assert kept(Path("apart")) == before
+    assert sorted(path.name for path in Path().glob("crafted*")) == ["crafted.h5"]

@@ -1,0 +1,326 @@
+"""A preload on the command line, of a trace and in campaigns."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import adhesis
+from adhesis import Control, HalfSpace, prepare_trace, read_trace, run_loop
+from adhesis.ensemble.aggregate.average import aggregate
+from adhesis.ensemble.campaign.file import parse_campaign
+from adhesis.ensemble.command.main import main
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.report import findings
+from adhesis.ensemble.task.compute import Runner, make_problem, run_task
+from adhesis.solver.registry import make_method
+from tests.support.campaign_support import campaign_text
+
+SCENE = [
+    "loop", "--hurst", "0.8", "--seed", "4", "--period", "1e-3", "--n0", "3", "--ratio", "6",
+    "--work-of-adhesion", "0.005", "--load-steps", "10", "--quiet",
+]  # fmt: skip
+
+
+def run(tmp_path: Path, capsys, *words: str) -> tuple[dict, str, str]:
+    out = tmp_path / "loop.json"
+    assert main([*SCENE, *words, "--json", str(out)]) == 0
+    return json.loads(out.read_text()), *capsys.readouterr()
+
+
+def test_the_loop_of_a_machine_turns_at_the_preload(tmp_path, capsys):
+    document, text, _ = run(tmp_path, capsys, "--preload", "0.5kPa")
+    assert document["preload"] == 500.0
+    assert document["preload_reached"] is True
+    assert document["turning_stress"] == pytest.approx(500.0, rel=1e-8)
+    assert document["turning_point"] == document["max_penetration"]
+    units = document["provenance"]["units"]
+    assert units["preload"] == units["turning_stress"] == "Pa"
+    assert units["turning_point"] == "1"
+    assert (
+        f"turning at the preload of 0.5 kPa, at Δ/h_max = {document['turning_point']:.6g}" in text
+    )
+    stress = np.array(document["mean_stress"])[np.array(document["branch"]) == "loading"]
+    assert stress.max() == stress[-1]
+    table = ("--csv", str(tmp_path / "loop.csv"))
+    several, _, _ = run(tmp_path, capsys, "--preload", "0.5kPa,200", *table)
+    assert [turn["preload"] for turn in several["turns"]] == [200.0, 500.0]
+    assert "preload (Pa)" in (tmp_path / "loop.csv").read_text().splitlines()[0]
+    assert several["loss"] == pytest.approx(document["loss"], rel=1e-5)
+    soft, text, _ = run(tmp_path, capsys, "--preload", "500", "--stiffness", "1e9")
+    assert soft["turning_stress"] == pytest.approx(500.0, rel=1e-8)
+    assert soft["loss"] > document["loss"]
+    assert "held by 1e+09 Pa/m, turning at the preload of 0.5 kPa, at u_tot/h_max = " in text
+
+
+def test_a_preload_that_is_not_reached_is_doubted(tmp_path, capsys):
+    words = ("--preload", "500kPa", "--max-penetration", "0.6")
+    document, text, errors = run(tmp_path, capsys, *words)
+    assert document["preload_reached"] is False
+    assert document["turning_point"] == 0.6
+    assert "turning at Δ/h_max = 0.6, before the preload of 500 kPa is reached" in text
+    assert "the preload of 500 kPa is not reached" in errors
+    assert main([*SCENE, *words, "--strict"]) == 1
+    capsys.readouterr()
+    strong = ["0.05" if word == "0.005" else word for word in SCENE]
+    assert main([*strong, "--preload", "9kPa", "--stiffness", "1e7"]) == 1
+    assert "Pa, less than the preload" in capsys.readouterr().err
+
+
+def test_the_loss_of_a_weight_says_so(tmp_path, capsys):
+    document, text, _ = run(tmp_path, capsys, "--stiffness", "0", "--max-stress", "500")
+    (line,) = (line for line in text.splitlines() if line.startswith("loss"))
+    assert document["loss_note"] in line
+    assert document["loss_note"].startswith("under a weight; it falls off at ")
+    assert document["loss_note"].endswith("the energy of the fall is not counted")
+    machine, text, _ = run(tmp_path, capsys, "--preload", "500")
+    assert machine["loss_note"] == ""
+    assert machine["loss"] > document["loss"]
+    assert "under a weight" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--max-stress", "20kPa"), "a weight or a machine? For a weight give --stiffness 0 with "),
+        (("--max-stress", "20kPa"), "--max-stress 20kPa; for a machine, which turns at that mean "),
+        (("--max-stress", "20kPa", "--stiffness", "1e9"), "give --preload 20kPa instead"),
+        (("--preload", "20kPa", "--stiffness", "0"), "For a weight give --max-stress 20kPa with"),
+        (("--preload", "20kPa", "--max-stress", "1"), "--max-stress and --preload are given"),
+        (("--preload", "20kPa", "--path", "0.5,0.2"), "--path and --preload are given"),
+        (
+            ("--preload", "20kPa", "--max-penetration", "0.5,0.6"),
+            "beside --preload: it must be one",
+        ),
+        (("--preload", "20bar"), "--preload is '20bar': its unit must be one of Pa, kPa"),
+        (("--preload", "20kPa,2e4"), "--preload is 20kPa,2e4: turning points must differ"),
+        (("--preload", "-1"), "--preload is -1.0: it must be a positive number"),
+        (("--preload", "1kPa", "--max-penetration", "1"), "--max-penetration is 1.0: it must be"),
+        (("--preload", "1", "--field-stresses", "1"), "--field-stresses needs --fields"),
+        (
+            ("--preload", "1", "--fields", "f.npz", "--field-penetrations", "0.1"),
+            "give --field-stresses, as 5kPa 10kPa, instead",
+        ),
+        (
+            ("--preload", "100", "--fields", "f.npz", "--field-stresses", "5kPa"),
+            "--field-stresses: stress is 5000 Pa: on the unloading branch the mean stress in",
+        ),
+        (("--preload", "1,2", "--film", "f.html"), "give --preload one value"),
+    ],
+)
+def test_what_is_no_preload_is_refused_in_one_sentence(
+    words, sentence, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert main([*SCENE, *words]) == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert len(error.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_fields_are_written_at_mean_stresses(tmp_path, capsys):
+    path = tmp_path / "fields.npz"
+    document, _, _ = run(tmp_path, capsys, "--preload", "500", "--fields", str(path))
+    found = np.load(path)
+    wanted = np.tile(500.0 * np.array([0.25, 0.5, 0.75, 1.0]), 2)
+    assert found["mean_stress"] == pytest.approx(wanted, rel=1e-8)
+    assert found["branch"].tolist() == ["loading"] * 4 + ["unloading"] * 4
+    assert found["gap"].mean(axis=1) == pytest.approx(found["separation"], rel=1e-3)
+    assert found["penetration"][7] == pytest.approx(document["turning_point"], rel=1e-9)
+    words = ("--fields", str(path), "--field-stresses=-100", "--stiffness", "1e9")
+    run(tmp_path, capsys, *words, "--max-penetration", "0.6")
+    found = np.load(path)  # no state of contact has so small a tension on loading
+    assert found["mean_stress"] == pytest.approx([-100.0], rel=1e-8)
+    assert found["branch"].tolist() == ["unloading"]
+
+
+def test_a_trace_turns_at_the_preload(tmp_path, capsys):
+    rng = np.random.default_rng(1)
+    x = np.linspace(0, 1e-3, 200)
+    z = sum(1e-6 / n * np.cos(2 * np.pi * n * x / 1e-3 + rng.uniform(0, 6)) for n in range(1, 9))
+    path = tmp_path / "trace.csv"
+    np.savetxt(path, np.transpose([x, z]), delimiter=",")
+    words = ["trace", str(path), "--unit", "m", "--work-of-adhesion", "0.002", "--young", "1e6"]
+    words += ["--poisson", "0.5", "--quick", "--quiet", "--processes", "1", "--load-steps", "8"]
+    assert main([*words, "--preload", "300", "--to", str(tmp_path / "out")]) == 0
+    assert "to a preload of 300 Pa at a fixed separation" in capsys.readouterr().out
+    document = json.loads((tmp_path / "out" / "trace.json").read_text())
+    assert document["preload"] == 300.0
+    assert document["max_penetration"] is None
+    assert document["loop"]["turning_stress"] == pytest.approx(300.0, rel=1e-8)
+    assert main([*words, "--max-stress", "300", "--to", str(tmp_path / "no")]) == 2
+    assert "a weight or a machine?" in capsys.readouterr().err
+    prepared = prepare_trace(read_trace(path, unit="m"))
+    scene = {"half_space": HalfSpace(1e6, 0.5), "work_of_adhesion": 0.002, "load_steps": 8}
+    answer = adhesis.loss_of_trace(prepared, **scene, preload=300.0, quick=True, processes=0)
+    assert answer.loss.value == document["loss"]["value"]
+    with pytest.raises(ValueError, match="a weight or a machine"):
+        adhesis.loss_of_trace(prepared, **scene, max_stress=300.0)
+    with pytest.raises(ValueError, match="preload and max_stress are given"):
+        adhesis.loss_of_trace(prepared, **scene, max_stress=300.0, preload=300.0)
+    weight = adhesis.loss_of_trace(
+        prepared, **scene, max_stress=300.0, control=Control(0), quick=True, processes=0
+    )
+    (line,) = (line for line in str(weight).splitlines() if line.startswith("loss"))
+    assert "(under a weight; it falls off at " in line
+    page = weight.page(tmp_path / "w").with_suffix(".md").read_text()
+    assert "(under a weight; it falls off at " in page.split("pull-off", 1)[0]
+
+
+# ---------------------------------------------------------------------- campaigns
+
+PRELOADS = [100.0, 400.0]
+
+
+def text_of(
+    cycle: str = 'preload = ["0.1 kPa", 400]\nmax_penetration = 0.95', **changes: str
+) -> str:
+    values = {"n0": "2", "work_of_adhesion": "[0.002]", "hurst": "[0.8]", "load_steps": "10"}
+    values |= {"method": '"sharp"'} | changes
+    text = campaign_text(**values).replace("nodes_per_wave = 16\n", "")
+    return text.replace("max_penetration = 0.6", cycle)
+
+
+def test_a_campaign_of_preloads_from_end_to_end(tmp_path, capsys):
+    """Run, status, extend, run again, and report; each row is the loop of its preload."""
+    file, out = tmp_path / "c.toml", tmp_path / "c.h5"
+    file.write_text(text_of(realisations="1"))
+    assert main(["run", str(file), "--out", str(out)]) == 0
+    with adhesis.open(out) as results:
+        before = results.dataset.load()
+    file.write_text(text_of(realisations="2"))
+    assert main(["run", str(file), "--out", str(out)]) == 0
+    capsys.readouterr()
+    assert main(["status", str(out), "--json"]) == 0
+    status = json.loads(capsys.readouterr().out)
+    assert (status["done"], status["failed"], status["pending"]) == (4, 0, 0)
+    campaign = parse_campaign(file.read_text())
+    with adhesis.open(out) as results:
+        loops = results.dataset.load()
+    for name in ("loss", "turning_penetration", "unloading_mean_stress", "states"):
+        old, new = before[name], loops[name].isel(realisation=slice(0, 1))
+        np.testing.assert_array_equal(old, new)
+    assert loops.turning_stress.values == pytest.approx(
+        np.broadcast_to(np.reshape(PRELOADS, (-1, 1)), (1, 1, 2, 2)), rel=1e-8
+    )
+    assert (loops.preload_reached == 1).all()
+    for task in campaign.tasks():
+        row = run_task(campaign, task)
+        here = loops.sel(preload=dict(task.others)["preload"], realisation=task.realisation)
+        assert float(here.loss.squeeze()) == row["loss"]
+        method = make_method("sharp", make_problem(campaign, task))
+        preload = dict(task.others)["preload"]
+        loop = run_loop(method, preload=preload, max_penetration=0.95, load_steps=10)
+        assert row["loss"] == pytest.approx(loop.loss, rel=1e-4)
+        assert row["turning_penetration"] == pytest.approx(loop.max_penetration, rel=1e-7)
+        beyond = campaign.loading_penetration > loop.max_penetration
+        assert np.isnan(row["loading_mean_stress"][beyond]).all()
+        assert row["loading_mean_stress"][~beyond].max() <= preload * (1 + 1e-9)
+    folder = tmp_path / "report"
+    assert main(["report", str(out), "--to", str(folder)]) == 0
+    page = (folder / "report.md").read_text()
+    assert "preload of 100, 400 Pa" in page
+    assert "Every loop reached its preload." in page
+    assert (folder / "loss_along_preload.png").exists()
+
+
+def test_a_runner_has_the_bits_of_single_tasks_and_keeps_fields_at_mean_stresses():
+    campaign = parse_campaign(text_of(realisations="1"))
+    runner = Runner()
+    for task in campaign.tasks():
+        row, alone = runner(campaign, task), run_task(campaign, task)
+        for name in row.keys() - {"wall_time", "cpu_time"}:
+            np.testing.assert_array_equal(row[name], alone[name])
+        preload = dict(task.others)["preload"]
+        gap, separation = (
+            row["field_gap"].mean(axis=-1),
+            row["h_max"] * (1 - row["turning_penetration"]),
+        )
+        assert row["turning_stress"] == pytest.approx(preload, rel=1e-8)
+        assert gap[:, -1] == pytest.approx(separation, rel=1e-3)
+        assert np.isfinite(row["psd_displacement"]).all()
+
+
+def test_a_machine_of_a_campaign_may_go_beyond_the_height_of_its_profile():
+    """u_tot/h_max = Δ/h_max + p̄/(k h_max) at the preload."""
+    campaign = parse_campaign(
+        text_of("preload = 400\nstiffness = 1e8\nmax_penetration = 6", realisations="1")
+    )
+    (task,) = campaign.tasks()
+    row = run_task(campaign, task)
+    assert row["preload_reached"] == 1
+    stress = row["loading_mean_stress"]
+    beyond = row["turning_penetration"] + 400 / (1e8 * row["h_max"])
+    assert beyond > 1
+    known = campaign.loading_penetration <= beyond
+    assert np.isfinite(stress[known]).all()
+    assert np.isnan(stress[~known]).all()
+    assert np.isfinite(row["field_gap"]).all()
+
+
+def test_a_campaign_says_which_loops_did_not_reach_their_preload(tmp_path, capsys):
+    file, out = tmp_path / "c.toml", tmp_path / "c.h5"
+    file.write_text(text_of('preload = [100, "1 MPa"]', realisations="1"))
+    assert main(["run", str(file), "--out", str(out)]) == 0
+    (sentence,) = (s for s in findings.quality(aggregate(out)) if "did not reach" in s)
+    assert "WARNING: 1 of 2 loops did not reach their preload, and turned at the latest" in sentence
+    assert "1 at H = 0.8, γ = 0.002 J/m², preload = 1e+06" in sentence
+    capsys.readouterr()
+    assert main(["status", str(out)]) == 0
+    assert "1 loop did not reach the preload" in capsys.readouterr().out
+    with adhesis.open(out) as results:
+        loops = results.dataset
+        assert loops.preload_reached.values.ravel().tolist() == [1.0, 0.0]
+        assert loops.turning_penetration.values.ravel()[1] == 0.999
+
+
+def test_a_campaign_under_a_weight_says_so_in_its_status_and_report(tmp_path, capsys):
+    file, out = tmp_path / "c.toml", tmp_path / "c.h5"
+    file.write_text(text_of('control = "load"\nmax_stress = 200', realisations="2"))
+    assert main(["run", str(file), "--out", str(out)]) == 0
+    capsys.readouterr()
+    assert main(["status", str(out)]) == 0
+    assert "under a weight: it falls off, the energy of the fall" in capsys.readouterr().out
+    outcome = findings.verdict(aggregate(out))[0]
+    assert "under a weight, which falls off at " in outcome
+    assert "(the energy of the fall is not counted)" in outcome
+
+
+@pytest.mark.parametrize(
+    ("cycle", "sentence"),
+    [
+        ("max_stress = 200", "which turns at that mean stress, give preload = 200.0"),
+        ('preload = 200\ncontrol = "load"', "a weight or a machine? For a weight give max_stress"),
+        ("preload = 200\nmax_penetration = [0.5, 0.9]", "several values beside a preload"),
+        ("preload = 200\nstiffness = 1e9", "max_penetration is missing"),
+        (
+            "preload = 200\nmax_penetration = 1.2",
+            "max_penetration is 1.2: it must be a number betw",
+        ),
+        ("max_penetration = [0.5, 1]", "max_penetration is 1.0: it must be a number between 0"),
+        ("preload = -1", "preload is -1: it must be a positive number"),
+        ('preload = "1 bar"', "preload is '1 bar': its unit must be one of"),
+        ("preload = [200, 200.0]", "a list of different values"),
+    ],
+)
+def test_what_is_no_preload_of_a_campaign_is_refused(cycle, sentence):
+    with pytest.raises(InputError) as refusal:
+        parse_campaign(text_of(cycle))
+    assert sentence in str(refusal.value)
+
+
+def test_preloads_of_a_campaign_do_not_become_more():
+    """They share a loading branch, whose stops they are."""
+    from adhesis.ensemble.campaign.compare import compare
+
+    one, two = (
+        parse_campaign(text_of(f"preload = {values}"))
+        for values in ("[100, 400]", "[100, 300, 400]")
+    )
+    assert not compare(one, two).grown
+    (other,) = compare(one, two).other
+    assert other.startswith("cycle.preload is")

@@ -1,0 +1,318 @@
+"""Saved loops and paths: what was saved is loaded, and nothing else, from whatever a file holds."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+import adhesis
+from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.loop.sealed_file import sealed
+from adhesis.solver.references.exact_wave import ExactWave
+
+SEAL = len(sealed(b""))
+HALF_SPACE = adhesis.HalfSpace(1e6, 0.5)
+PROBLEM = adhesis.Problem(adhesis.single_wave(1e-6, 1e-3), HALF_SPACE, 1e-4)
+
+
+@pytest.fixture(scope="module")
+def loop() -> adhesis.LoopResult:
+    return adhesis.run_loop(ExactWave(PROBLEM), max_penetration=0.6, load_steps=6)
+
+
+@pytest.fixture(scope="module")
+def content(loop: adhesis.LoopResult, tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Return the bytes of the saved loop."""
+    path = tmp_path_factory.mktemp("saved") / "loop.nc"
+    loop.save(path)
+    return path.read_bytes()
+
+
+def refusal(path: Path) -> str:
+    """Return the sentence with which a file is refused."""
+    with pytest.raises(InputError) as error:
+        adhesis.load(path)
+    sentence = str(error.value)
+    assert sentence.startswith(f"path is {path}: ")
+    assert "\n" not in sentence
+    return sentence
+
+
+def test_other_programs_open_a_saved_file(
+    loop: adhesis.LoopResult, content: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "loop.nc"
+    path.write_bytes(content)
+    for engine in ("h5netcdf", None):
+        with xr.open_dataset(path, engine=engine) as found:
+            np.testing.assert_array_equal(found.mean_stress, loop.mean_stress)
+            assert found.mean_stress.units == "Pa"
+            assert found.attrs["loss"] == loop.loss
+    with h5py.File(path) as file:
+        np.testing.assert_array_equal(file["separation"], loop.separation)
+
+
+def test_what_was_loaded_is_saved_as_the_same_file(content: bytes, tmp_path: Path) -> None:
+    path, again = tmp_path / "loop.nc", tmp_path / "again.nc"
+    path.write_bytes(content)
+    once = adhesis.load(path)
+    once.save(again)
+    twice = adhesis.load(again)
+    assert twice == once
+    assert twice.method == once.method
+    assert twice.to_xarray().identical(once.to_xarray())
+
+
+def test_a_bit_that_is_flipped_is_found(content: bytes, tmp_path: Path) -> None:
+    path, draw = tmp_path / "loop.nc", random.Random(5)
+    for _ in range(1000):
+        damaged = bytearray(content)
+        damaged[draw.randrange(len(content))] ^= 1 << draw.randrange(8)
+        path.write_bytes(damaged)
+        assert "checksum" in refusal(path)
+
+
+def test_a_file_that_was_cut_off_or_goes_on_is_refused(content: bytes, tmp_path: Path) -> None:
+    path, draw = tmp_path / "loop.nc", random.Random(6)
+    sizes = [0, 1, SEAL, len(content) - SEAL, len(content) - 1]
+    sizes += [draw.randrange(len(content)) for _ in range(295)]
+    for size in sizes:
+        path.write_bytes(content[:size])
+        assert "checksum" in refusal(path)
+    for more in (b"\0", b"x" * SEAL, content[-SEAL:]):
+        path.write_bytes(content + more)
+        assert "checksum" in refusal(path)
+
+
+def test_another_program_that_writes_leaves_no_checksum(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "loop.nc"
+    path.write_bytes(content)
+    with h5py.File(path, "r+") as file:
+        file.attrs["note"] = "mine"
+    assert "checksum" in refusal(path)
+
+
+# ------------------------------------------------------- crafted files with a right checksum
+
+CRAFTED: dict[str, Callable[[h5py.File, Path], None]] = {}
+
+
+def crafted(change: Callable[[h5py.File, Path], None]) -> Callable[[h5py.File, Path], None]:
+    CRAFTED[change.__name__] = change
+    return change
+
+
+def replaced(file: h5py.File, name: str, **options: object) -> None:
+    """Put a dataset of the same shape into the place of another."""
+    shape, dtype = file[name].shape, file[name].dtype
+    del file[name]
+    file.create_dataset(name, shape, dtype, **options)
+
+
+@crafted
+def a_link_to_a_pipe(file: h5py.File, folder: Path) -> None:
+    del file["mean_stress"]
+    file["mean_stress"] = h5py.ExternalLink(str(folder / "pipe"), "/x")
+
+
+@crafted
+def one_more_link_to_a_pipe(file: h5py.File, folder: Path) -> None:
+    file["more"] = h5py.ExternalLink(str(folder / "pipe"), "/x")
+
+
+@crafted
+def a_link_inside(file: h5py.File, _: Path) -> None:
+    file.move("mean_stress", "tangent_2")
+    file["mean_stress"] = h5py.SoftLink("/tangent_2")
+
+
+@crafted
+def external_storage(file: h5py.File, _: Path) -> None:
+    replaced(file, "mean_stress", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
+
+
+@crafted
+def a_pipe_as_storage(file: h5py.File, folder: Path) -> None:
+    replaced(file, "mean_stress", external=[(str(folder / "pipe"), 0, h5py.h5f.UNLIMITED)])
+
+
+@crafted
+def a_virtual_dataset(file: h5py.File, folder: Path) -> None:
+    shape = file["mean_stress"].shape
+    del file["mean_stress"]
+    layout = h5py.VirtualLayout(shape, "f8")
+    layout[...] = h5py.VirtualSource(str(folder / "loop.nc"), "separation", shape)
+    file.create_virtual_dataset("mean_stress", layout)
+
+
+@crafted
+def a_bomb(file: h5py.File, _: Path) -> None:
+    del file["mean_stress"]
+    file.create_dataset("mean_stress", (2**33,), "f8", chunks=(2**20,), compression="gzip")
+
+
+@crafted
+def a_group(file: h5py.File, _: Path) -> None:
+    file.create_group("more")["up"] = file["/"]
+
+
+@crafted
+def a_group_in_place(file: h5py.File, _: Path) -> None:
+    del file["mean_stress"]
+    file.create_group("mean_stress")
+
+
+@crafted
+def a_factor(file: h5py.File, _: Path) -> None:
+    file["mean_stress"].attrs["scale_factor"] = 2.0
+
+
+@crafted
+def an_offset(file: h5py.File, _: Path) -> None:
+    file["mean_stress"].attrs["add_offset"] = 2.0
+
+
+@crafted
+def a_fill_value(file: h5py.File, _: Path) -> None:
+    file["mean_stress"].attrs["_FillValue"] = file["mean_stress"][3]
+
+
+@crafted
+def another_type(file: h5py.File, _: Path) -> None:
+    file["mean_stress"].attrs["dtype"] = "bool"
+
+
+@crafted
+def another_unit(file: h5py.File, _: Path) -> None:
+    file["mean_stress"].attrs["units"] = "kPa"
+
+
+@crafted
+def a_date(file: h5py.File, _: Path) -> None:
+    file["mean_stress"].attrs["units"] = "days since 2000-01-01"
+
+
+@crafted
+def coordinates(file: h5py.File, _: Path) -> None:
+    file["mean_stress"].attrs["coordinates"] = "penetration jump_kind"
+
+
+@crafted
+def a_curve_that_contradicts_its_loss(file: h5py.File, _: Path) -> None:
+    file["mean_stress"][...] *= 2
+
+
+@crafted
+def one_state_of_the_curve(file: h5py.File, _: Path) -> None:
+    file["mean_stress"][3] *= 1.001
+
+
+@crafted
+def no_numbers(file: h5py.File, _: Path) -> None:
+    file["mean_stress"][...] = np.nan
+
+
+@crafted
+def a_penetration(file: h5py.File, _: Path) -> None:
+    file["penetration"][2] += 1e-3
+
+
+@crafted
+def a_drop(file: h5py.File, _: Path) -> None:
+    file["jump_energy_drop"][0] *= 2
+
+
+@crafted
+def heights(file: h5py.File, _: Path) -> None:
+    file["coefficient_real"][...] *= 2
+
+
+@crafted
+def infinite_heights(file: h5py.File, _: Path) -> None:
+    file["coefficient_real"][...] = np.inf
+
+
+@crafted
+def no_dimension(file: h5py.File, _: Path) -> None:
+    values = file["mean_stress"][...]
+    del file["mean_stress"]
+    file["mean_stress"] = values
+
+
+@crafted
+def complex_numbers(file: h5py.File, _: Path) -> None:
+    values = file["mean_stress"][...] + 1j
+    del file["mean_stress"]
+    file["mean_stress"] = values
+
+
+@crafted
+def fewer_jumps(file: h5py.File, _: Path) -> None:
+    values = file["jump_energy_drop"][:-1]
+    del file["jump_energy_drop"]
+    file["jump_energy_drop"] = values
+
+
+ATTRIBUTES: dict[str, object] = {
+    "loss": 1.0,
+    "loss_error": -1.0,
+    "loss_from_drops": 1.0,
+    "work_gained": 0.0,
+    "max_penetration": 0.7,
+    "period": 2e-3,
+    "young": np.nan,
+    "poisson": "0.5",
+    "work_of_adhesion": -1.0,
+    "stiffness": 1e9,
+    "h_max": 2e-6,
+    "races": 3,
+    "adhesis_result": "path",
+    "method": "[" * 10_000,
+    "interior": '{"a": 1}',
+    "turning_point": h5py.Empty("f8"),
+    "note": "mine",
+}
+
+
+@pytest.mark.parametrize("name", [*CRAFTED, *ATTRIBUTES])
+def test_a_crafted_file_is_refused(name: str, content: bytes, tmp_path: Path) -> None:
+    path, pipe = tmp_path / "loop.nc", tmp_path / "pipe"
+    os.mkfifo(pipe)
+    path.write_bytes(content[:-SEAL])
+    with h5py.File(path, "r+") as file:
+        if name in CRAFTED:
+            CRAFTED[name](file, tmp_path)
+        else:
+            file.attrs[name] = ATTRIBUTES[name]
+    path.write_bytes(sealed(path.read_bytes()))
+    assert "checksum" not in refusal(path)
+
+
+def test_a_file_that_is_only_sealed_anew_is_loaded(
+    loop: adhesis.LoopResult, content: bytes, tmp_path: Path
+) -> None:
+    """Else the crafted files above could be refused for their checksum alone."""
+    path = tmp_path / "loop.nc"
+    path.write_bytes(content[:-SEAL])
+    with h5py.File(path, "r+") as file:
+        file["mean_stress"][3] = file["mean_stress"][3]
+    path.write_bytes(sealed(path.read_bytes()))
+    assert adhesis.load(path) == loop
+
+
+def test_the_method_of_a_saved_loop_keeps_its_settings(
+    loop: adhesis.LoopResult, content: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "loop.nc"
+    path.write_bytes(content)
+    with xr.open_dataset(path) as found:
+        assert json.loads(found.attrs["method"])["name"] == loop.method.name
+    assert adhesis.load(path).method.name == loop.method.name

@@ -1,0 +1,451 @@
+"""Staging of jobs/: whatever jobs do to each other, no row that was written is lost.
+
+Batch system and run are stand-ins: a run appends rows to the open results file, one after the
+other, and keeps others out by a lock, as adhesis does. Some jobs have the real run, with tasks that
+take no time.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from tests.support.campaign_support import (
+    adhesis_here,
+    campaign_text,
+    done_rows,
+    environment,
+    wait_until,
+)
+
+JOBS = Path(__file__).parent.parent.parent / "jobs"
+ROWS = 30
+
+# The file `ledger` has a line for each row that was written, `refused` for each run that did
+# nothing.
+ADHESIS = f"""#!/bin/bash
+if [ "$1" = status ]; then
+    [ -e "$2" ] || exit 2
+    held=null
+    if [ -e "$2.lock" ] && ! flock -n "$2.lock" true; then held='{{'; fi
+    printf '{{\\n "pending": %s,\\n "run": %s\\n}}\\n' $(({ROWS} - $(wc -l <"$2"))) "$held"
+    exit 0
+fi
+file=$4
+exec 8<>"$file.lock"
+if ! flock -n 8; then echo x >>refused; exit 2; fi
+trap 'exit 75' USR1
+exec 7>>"$file"
+declare -A done
+while read -r row; do done[$row]=yes; done <"$file"
+for ((row = 1; row <= {ROWS}; row++)); do
+    if [ -n "${{done[$row]:-}}" ]; then continue; fi
+    sleep 0.004
+    echo "$row" >&7
+    echo "$row" >>ledger
+done
+"""
+SCONTROL = """#!/bin/bash
+if [ "$1" = show ]; then echo "   JobState=RUNNING"; fi
+"""
+
+
+@dataclass
+class Site:
+    """A folder to submit from, with stand-ins, and the jobs that were started."""
+
+    folder: Path
+    env: dict[str, str] = field(default_factory=dict)
+    started: list[subprocess.Popen[str]] = field(default_factory=list)
+
+    def start(self, *options: str, **env: str) -> subprocess.Popen[str]:
+        """Start jobs/slurm.sh, in a process group of its own."""
+        programs = self.folder / "bin"
+        settings = {
+            "PATH": f"{programs}:/usr/bin:/bin",
+            "ADHESIS": str(programs / "adhesis"),
+            "JOBS": str(JOBS),
+            "LAUNCHER": "env",
+            "REPORT": "no",
+            "SLURM_JOB_ID": "7",
+            "SLURM_SUBMIT_DIR": str(self.folder),
+            "SLURM_JOB_NODELIST": "n1",
+            "SLURM_JOB_CPUS_PER_NODE": "1",
+            "SLURM_JOB_NAME": "study",
+        }
+        job = subprocess.Popen(
+            ["bash", JOBS / "slurm.sh", "s.toml", *options],
+            cwd=self.folder,
+            env=self.env | settings | env,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self.started.append(job)
+        return job
+
+    def lines(self, name: str) -> list[str]:
+        """The lines of a file, none if it is missing."""
+        path = self.folder / name
+        return path.read_text().split() if path.exists() else []
+
+    def is_quiet(self) -> bool:
+        """Whether all processes of all jobs have ended."""
+        for job in self.started:
+            job.poll()
+            try:
+                os.killpg(job.pid, 0)
+            except ProcessLookupError:
+                continue
+            return False
+        return True
+
+    def kept(self) -> list[str]:
+        """The rows of all staged copies."""
+        copies = self.folder.glob("disk*/*/s.h5")
+        return [row for copy in copies for row in copy.read_text().split()]
+
+
+@contextmanager
+def site(folder: Path) -> Iterator[Site]:
+    """Make a site; what still runs in the end is ended."""
+    (folder / "bin").mkdir(parents=True)
+    for name, text in {"adhesis": ADHESIS, "scontrol": SCONTROL}.items():
+        (folder / "bin" / name).write_text(text)
+        (folder / "bin" / name).chmod(0o755)
+    made = Site(folder)
+    try:
+        yield made
+    finally:
+        for job in made.started:
+            try:
+                os.killpg(job.pid, signal.SIGKILL)
+            except ProcessLookupError:
+                continue
+        for job in made.started:
+            job.communicate()
+
+
+@dataclass
+class Start:
+    """One start of a job, and what meets it when so many more rows have been written."""
+
+    disk: str
+    patience: str
+    end: str
+    rows: int
+
+
+@dataclass
+class Job:
+    """A job that starts, and comes back, when so many rows have been written."""
+
+    begin: int
+    starts: list[Start]
+    process: subprocess.Popen[str] | None = None
+    end: str = ""
+    at: int = 0
+
+    def go_on(self, here: Site, others_rest: bool) -> bool:
+        """Start, end or wait; returns whether there is more to come."""
+        written = len(here.lines("ledger"))
+        if self.process is None:
+            if not self.starts:
+                return False
+            if written >= self.begin or others_rest:
+                start = self.starts.pop(0)
+                self.begin, self.end, self.at = 0, start.end, written + start.rows
+                self.process = here.start("--patience", start.patience, STAGING=start.disk)
+        elif self.process.poll() is not None:
+            self.process = None
+        elif self.end and written >= self.at:
+            number = {"limit": signal.SIGUSR1, "cancel": signal.SIGTERM}.get(self.end)
+            if self.end == "kill all":
+                os.killpg(self.process.pid, signal.SIGKILL)
+            else:
+                self.process.send_signal(number or signal.SIGKILL)
+            self.end = ""
+        return True
+
+
+def drawn_job(draw: random.Random, disks: list[str], first: bool) -> Job:
+    """Draw a job that starts up to three times."""
+    ends = ["", "kill script", "kill all", "limit", "limit", "cancel"]
+    starts = [
+        Start(
+            draw.choice(disks),
+            draw.choice(["0", "0.1", "20"]),
+            draw.choice(ends),
+            draw.randrange(ROWS // 2),
+        )
+        for _ in range(draw.randint(1, 3))
+    ]
+    return Job(0 if first else draw.randrange(ROWS), starts)
+
+
+def interleave(folder: Path, seed: int) -> None:
+    """Two or three jobs of one campaign that start, are refused, killed, stopped and come back."""
+    draw = random.Random(seed)
+    disks = draw.choice([["disk1"], ["disk1"], ["disk1", "disk2"], ["disk1", "disk2", ""]])
+    jobs = [drawn_job(draw, disks, first) for first in (True, False, False)[: draw.randint(2, 3)]]
+    with site(folder) as here:
+        end = time.monotonic() + 120
+        while sum(
+            job.go_on(here, not any(o.process for o in jobs if o is not job)) for job in jobs
+        ):
+            assert time.monotonic() < end, f"seed {seed}"
+            time.sleep(0.003)
+        while not here.is_quiet():  # runs outlive scripts that were killed
+            assert time.monotonic() < end, f"seed {seed}"
+            time.sleep(0.01)
+        written, at_work = here.lines("ledger"), f"seed {seed}"
+        assert set(written) <= {*here.lines("s.h5"), *here.kept()}, at_work
+        if disks == ["disk1"]:
+            # A last job, alone, finds all that the others have left, and nothing was done twice.
+            last = here.start(STAGING="disk1")
+            text, _ = last.communicate(timeout=60)
+            assert last.returncode == 0, f"{at_work}: {text}"
+            assert sorted(map(int, here.lines("s.h5"))) == list(range(1, ROWS + 1)), at_work
+            assert len(here.lines("ledger")) == len(set(here.lines("ledger"))), at_work
+            assert [*(folder / "disk1").iterdir(), *folder.glob("s.h5.*")] == [], at_work
+
+
+@pytest.mark.parametrize("first", range(0, 100, 25))
+def test_no_interleaving_of_jobs_loses_a_row(tmp_path: Path, first: int) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        for done in [
+            pool.submit(interleave, tmp_path / f"{seed}", seed) for seed in range(first, first + 25)
+        ]:
+            done.result()
+
+
+# ------------------------------------------------------------------------------- the real run
+
+
+@pytest.fixture
+def real(tmp_path: Path) -> Iterator[Site]:
+    """A site with the real command, and a campaign of 40 tasks that take no time.
+
+    A run stays in its fourth task until there is a file `free`.
+    """
+    with site(tmp_path) as here:
+        (tmp_path / "s.toml").write_text(campaign_text(realisations="10"))
+        fake = JOBS.parent / "tests" / "support" / "fake_run.py"
+        (tmp_path / "bin" / "adhesis").write_text(
+            f'#!/bin/sh\nexec {sys.executable} {fake} "hold=${{HOLD:-3}} free=free" "$@"\n'
+        )
+        here.env = environment()
+        yield here
+
+
+def staged(here: Site, disk: str = "disk1") -> Path:
+    """The staged copy of the results file, if there is one."""
+    return next(here.folder.glob(f"{disk}/*/s.h5"), here.folder / "none")
+
+
+def test_a_second_job_touches_nothing_of_the_first(real: Site) -> None:
+    """Both have the same disk, or each its own; it is submitted twice, or requeued too early."""
+    first = real.start(STAGING="disk1")
+    wait_until(lambda: done_rows(staged(real)) == 3)
+    seen = sorted(real.folder.rglob("*"))
+    for disk in ("disk1", "disk2"):
+        second = real.start("--patience", "0", STAGING=disk)
+        text, _ = second.communicate(timeout=60)
+        assert second.returncode == 2, text
+        assert "s.h5 is held by another job with STAGING" in text
+        assert sorted(real.folder.rglob("*")) == seen
+    (real.folder / "free").touch()
+    text, _ = first.communicate(timeout=120)
+    assert first.returncode == 0, text
+    assert done_rows(real.folder / "s.h5") == 40
+    assert not staged(real).exists()
+
+
+def test_a_job_waits_for_the_run_of_a_script_that_was_killed(real: Site) -> None:
+    first = real.start(STAGING="disk1")
+    wait_until(lambda: done_rows(staged(real)) == 3)
+    first.kill()
+    first.wait()
+    refused = real.start("--patience", "0", STAGING="disk1")
+    assert refused.wait(60) == 2  # the run goes on alone
+    second = real.start("--patience", "60", STAGING="disk1")
+    (real.folder / "free").touch()
+    text, _ = second.communicate(timeout=120)
+    assert second.returncode == 0, text
+    assert "40 of 40 tasks done; 0 computed" in text
+    assert done_rows(real.folder / "s.h5") == 40
+
+
+def test_rows_of_a_killed_run_come_back(real: Site) -> None:
+    first = real.start(STAGING="disk1", LAUNCHER="setsid --wait")
+    wait_until(lambda: done_rows(staged(real)) == 3)
+    record = json.loads((staged(real).parent / "s.h5.lock").read_text())
+    os.kill(record["pid"], signal.SIGKILL)
+    text, _ = first.communicate(timeout=60)
+    assert first.returncode == 137, text
+    assert done_rows(real.folder / "s.h5") == 3
+    assert not staged(real).exists()
+
+
+def test_a_run_of_somebody_else_and_a_job_do_not_destroy_each_other(real: Site) -> None:
+    """The other run is not told of STAGING; it writes to the results file itself."""
+    by_hand = real.start(STAGING="")
+    results = real.folder / "s.h5"
+    wait_until(lambda: done_rows(results) == 3)
+    refused = real.start(STAGING="disk1")
+    text, _ = refused.communicate(timeout=60)
+    assert (refused.returncode, "s.h5 is being written by another run" in text) == (2, True), text
+    assert not (real.folder / "disk1").exists()
+    by_hand.send_signal(signal.SIGUSR1)
+    assert by_hand.wait(60) == 75
+    job = real.start(STAGING="disk1")
+    wait_until(lambda: done_rows(staged(real)) == 6)
+    by_hand = real.start(STAGING="", HOLD="0")  # writes no row before the job ends
+    wait_until(lambda: (real.folder / "s.h5.lock").exists())
+    job.send_signal(signal.SIGUSR1)
+    text, _ = job.communicate(timeout=60)
+    assert job.returncode == 74, text
+    assert f"stay in {staged(real).relative_to(real.folder)}" in text
+    (real.folder / "free").touch()
+    assert by_hand.wait(120) == 0
+    assert done_rows(results) == 40
+    joined = adhesis_here("merge", staged(real), "--out", results)
+    assert joined.returncode == 0, joined.stderr
+
+
+# ------------------------------------------------------------------------------- whose folder
+
+VICTIM, ATTACKER = 64_001, 64_002  # two accounts, which need no name
+root_only = pytest.mark.skipif(os.geteuid() != 0, reason="only root can act for other accounts")
+
+
+@pytest.fixture
+def shared() -> Iterator[Path]:
+    """A folder as /tmp, of which all accounts may use `disk`, and the first one `work`."""
+    # pytest's own folder is closed to others
+    top = Path(tempfile.mkdtemp(prefix="adhesis-staging-"))
+    for folder, mode in (top, 0o755), (top / "disk", 0o1777), (top / "work", 0o755):
+        folder.mkdir(exist_ok=True)
+        folder.chmod(mode)
+    shutil.copy(JOBS / "common.sh", top)
+    (top / "work" / "s.h5").write_text("rows of the victim")
+    if os.geteuid() == 0:
+        for path in (top / "work", top / "work" / "s.h5"):
+            os.chown(path, VICTIM, VICTIM)
+    yield top
+    shutil.rmtree(top)
+
+
+def shell(shared: Path, script: str, account: int = VICTIM) -> subprocess.CompletedProcess[str]:
+    """Run a script as an account where the tests may, in the folder of the results."""
+    other = {"user": account, "group": account, "extra_groups": []} if os.geteuid() == 0 else {}
+    return subprocess.run(
+        ["bash", "-c", f". ../common.sh\nSTAGING=../disk file=s.h5 options=()\n{script}"],
+        cwd=shared / "work",
+        env={"PATH": f"{shared}:/usr/bin:/bin", "stage": str(stage_of(shared))},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        **other,  # type: ignore[arg-type]
+    )
+
+
+def stage_of(shared: Path) -> Path:
+    """The folder that anybody can foretell."""
+    target = os.path.realpath(shared / "work" / "s.h5")
+    sum_of = subprocess.run(["cksum"], input=target.encode(), capture_output=True, check=True)
+    user = VICTIM if os.geteuid() == 0 else os.getuid()
+    return shared / "disk" / f"adhesis-{user}-{sum_of.stdout.split()[0].decode()}"
+
+
+@pytest.mark.parametrize(
+    ("account", "planted", "words"),
+    [
+        pytest.param(
+            ATTACKER,
+            "mkdir -m 777 $stage; ln -s ../../work/precious $stage/version",
+            "belongs to",
+            marks=root_only,
+        ),
+        pytest.param(
+            ATTACKER,
+            "mkdir -m 777 $stage; echo none >$stage/version; echo forged >$stage/s.h5",
+            "belongs to",
+            marks=root_only,
+        ),
+        pytest.param(
+            ATTACKER, "mkdir -m 777 ../disk/x; ln -s x $stage", "is a link", marks=root_only
+        ),
+        (VICTIM, "mkdir ../work/x; ln -s ../work/x $stage", "is a link"),
+        (VICTIM, "mkdir $stage; chmod 770 $stage", "others can write to"),
+        (VICTIM, "mkdir $stage; chmod 702 $stage", "others can write to"),
+        (VICTIM, "touch $stage", "cannot be made"),
+        (VICTIM, "mkfifo $stage", "cannot be made"),
+        (VICTIM, "mkdir -m 700 $stage", ""),
+        (VICTIM, "mkdir -m 755 $stage", ""),
+    ],
+)
+def test_a_folder_that_others_could_have_filled_is_refused(
+    shared: Path, account: int, planted: str, words: str
+) -> None:
+    (shared / "work" / "precious").write_text("a line")
+    if os.geteuid() == 0:
+        os.chown(shared / "work" / "precious", VICTIM, VICTIM)
+    assert shell(shared, planted, account).returncode == 0
+    done = shell(shared, "stage_in; code=0; stage_out; exit $code")
+    assert (done.returncode != 0) == bool(words), done.stderr
+    assert words in done.stderr
+    assert len(done.stderr.splitlines()) == bool(words)
+    assert (shared / "work" / "precious").read_text() == "a line"
+    assert (shared / "work" / "s.h5").read_text() == "rows of the victim"
+
+
+def test_a_folder_in_a_disk_where_others_can_rename_it_is_refused(shared: Path) -> None:
+    (shared / "disk").chmod(0o777)
+    done = shell(shared, "stage_in")
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "is not sticky" in done.stderr
+
+
+def test_the_folder_is_private_and_a_job_that_comes_back_finds_it(shared: Path) -> None:
+    done = shell(shared, "umask 0; stage_in; echo new rows >$results; kill -9 $$")
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert stat.S_IMODE(stage_of(shared).stat().st_mode) == 0o700
+    done = shell(shared, "stage_in; code=0; stage_out; exit $code")
+    assert done.returncode == 0, done.stderr
+    assert (shared / "work" / "s.h5").read_text() == "new rows\n"
+    assert not stage_of(shared).exists()
+
+
+@pytest.mark.parametrize("name", ["s.h5.copy", "s.h5.staging"])
+@pytest.mark.parametrize("planted", ["ln -s precious {}", "ln -s missing {}", "mkfifo {}"])
+def test_links_and_pipes_beside_the_results_are_not_followed(
+    shared: Path, name: str, planted: str
+) -> None:
+    assert shell(shared, f"echo a line >precious; {planted.format(name)}").returncode == 0
+    done = shell(shared, "stage_in; echo new rows >$results; code=0; stage_out; exit $code")
+    refused = name == "s.h5.staging"
+    assert done.returncode == (2 if refused else 0), done.stderr
+    assert ("is a link or no ordinary file" in done.stderr) == refused
+    rows = (shared / "work" / "s.h5").read_text()
+    assert rows == ("rows of the victim" if refused else "new rows\n")
+    assert (shared / "work" / "precious").read_text() == "a line\n"
+    assert not (shared / "work" / "missing").exists()
