@@ -13,8 +13,8 @@ from adhesis.ensemble.lengths import number_with_unit
 # of solids are below 10 J/m².
 LARGEST_IN_JOULES = 10.0  # J/m²
 
-_JOULES = {"J/m²": 1.0, "mJ/m²": 1e-3}
-_WITH_UNIT = re.compile(r"(.*J)\s*/\s*m(?:2|²|\^2)\s*", re.DOTALL)
+_JOULES = {"J/m²": 1.0, "mJ/m²": 1e-3, "N/m": 1.0, "mN/m": 1e-3}
+_WITH_UNIT = re.compile(r"(.*[JN])\s*/\s*m(2|²|\^2)?\s*", re.DOTALL)
 
 
 def work_of_adhesion(text: str) -> float:
@@ -27,6 +27,8 @@ def work_of_adhesion(text: str) -> float:
 
 def parse_work_of_adhesion(text: str, largest: float = math.inf) -> float:
     """Read a work of adhesion in J/m²: a number in J/m², or a number and its unit as in 20mJ/m2.
+
+    N/m and mN/m, the units of surface tensions, are J/m² and mJ/m².
 
     Whether it is positive and finite is left to the rule of the quantity.
 
@@ -65,10 +67,10 @@ def work_of_adhesion_with_unit(text: str) -> float:
     found = _WITH_UNIT.fullmatch(text)
     if not found:
         raise InputError(f"is {quoted(text)}: it must be {rule}")
-    return number_with_unit(found[1], _JOULES, _unit_or_none, rule)
+    area = "/m²" if found[2] else "/m"
 
+    def unit_or_none(name: str) -> str | None:
+        """Return the unit with this name before its slash, or None; capitals count."""
+        return name + area if name + area in _JOULES else None
 
-def _unit_or_none(joules: str) -> str | None:
-    """Return the unit of what stands before /m², or None; capitals count."""
-    unit = f"{joules}/m²"
-    return unit if unit in _JOULES else None
+    return number_with_unit(found[1], _JOULES, unit_or_none, rule)

@@ -22,6 +22,7 @@ from adhesis.ensemble.report.figures.style import (
     style,
 )
 from adhesis.ensemble.trace.answer import Answer
+from adhesis.ensemble.trace.page_files import FIGURES
 from adhesis.ensemble.trace.prepare import Prepared
 from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.ensemble.trace.variants import Cycle
@@ -45,12 +46,8 @@ def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
     """Draw all figures for which the answer has data, as PNG and PDF."""
     drawn = []
     with style():
-        for stem, title, build in (
-            ("trace", "The trace, as measured and as used", _trace),
-            ("spectrum", "Its power spectrum", _spectrum),
-            ("loop", "The loop", _loop),
-            ("cut-off", "Loss against the shortest wave kept", _cut_off),
-            ("tables", "Against work of adhesion and turning point", _tables),
+        for (stem, title), build in zip(
+            FIGURES.items(), (_trace, _spectrum, _loop, _cut_off, _tables), strict=True
         ):
             built = build(answer)
             if built is None:

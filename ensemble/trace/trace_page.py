@@ -14,6 +14,7 @@ from adhesis.ensemble.quantities import in_works_of_adhesion, with_error
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
+from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.zero_range import stress_text
 
@@ -98,7 +99,7 @@ def write_page(answer: Answer, folder: Path) -> None:
 
 def write_all(answer: Answer, folder: Path) -> Path:
     """Write the page, its figures and ``trace.json``; return the path of the page (OSError)."""
-    with staged_folder(folder) as staged:
+    with staged_folder(folder, FIGURE_FILES) as staged:
         write_page(answer, staged)
         write_json(staged / "trace.json", document(answer))
     return folder / "trace.html"

@@ -357,6 +357,19 @@ def test_what_changes_the_loss_most_stands_first_with_its_factor(spoiled_answer:
     assert (change.run.name, change.factor) == ("noise 1", 0.0)
 
 
+def test_figures_of_an_earlier_page_do_not_stay_beside_a_new_one(
+    spoiled_answer: Answer, tmp_path: Path
+) -> None:
+    """An answer with neither tables nor several cut-offs; a figure of the user's own stays."""
+    for name in ("tables.png", "tables.pdf", "cut-off.png", "loop.png", "mine.png"):
+        (tmp_path / name).write_bytes(b"old")
+    spoiled_answer.page(tmp_path)
+    figures = sorted(path.name for path in tmp_path.glob("*.png"))
+    assert figures == ["loop.png", "mine.png", "spectrum.png", "trace.png"]
+    assert not (tmp_path / "tables.pdf").exists()
+    assert (tmp_path / "loop.png").read_bytes() != b"old"
+
+
 def test_loops_that_failed_are_named_last_in_one_warning(spoiled_answer: Answer) -> None:
     losses = {"answer": 1.0, "cut-off × 1.41": 1.5, "noise 1": 1.0, "noise 2": 1.0}
     found = with_losses(spoiled_answer, losses, {"step": 1e-6})
