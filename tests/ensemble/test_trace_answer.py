@@ -518,7 +518,7 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     heights = np.fft.irfft(waves * np.exp(1j * rng.uniform(0, 7, n // 2 + 1)), n)
     trace = Trace(1e-6 * heights / heights.std(), 0.2e-6, "t.txt")
     found = prepare_trace(trace)
-    plan = make_plan(found, make_cycle(HALF_SPACE, 0.04, 0.9, 40, "auto", 1e-3), processes=2)
+    plan = make_plan(found, make_cycle(HALF_SPACE, 0.001, 0.9, 40, "auto", 1e-3), processes=2)
     assert plan.waves == pytest.approx(0.95 * n / 5, rel=0.01)
     sizes = {job.name: job.coefficients.size - 1 for job in plan.jobs}
     assert sizes["taper 5 %"] < 8000 < sizes["answer"]
@@ -587,3 +587,20 @@ def test_loop_takes_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         assert reported in capsys.readouterr().err
     assert main(["loop", "--hurst", "0.8", "--cut-off", "1um"]) == 2
     assert "--cut-off belongs to --trace" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("gamma", [0.04, 0.001])
+def test_a_plan_expects_no_more_patches_than_crests_that_are_reached(gamma: float) -> None:
+    """Under a high ridge few are; the energy of full contact alone lets fifty be expected."""
+    x = 1e-6 * np.arange(1000)
+    ridge = 9e-6 * np.exp(-(((x - 0.64e-3) / 12e-6) ** 2))
+    trace = prepare_trace(Trace(PROFILE.at(x) + ridge, 1e-6, "t.txt"))
+    plan = make_plan(trace, make_cycle(HALF_SPACE, gamma, 0.9, 40, "auto", 1e-3), processes=0)
+    (job,) = (job for job in plan.jobs if job.name == "answer")
+    found = run_plan(
+        trace,
+        make_cycle(HALF_SPACE, gamma, 0.9, 40, "auto", 1e-3),
+        dataclasses.replace(plan, runs=plan.runs[:1], jobs=(job,)),
+    ).main
+    assert found["patches"] / 3 <= plan.patches <= 3 * found["patches"]
+    assert plan.seconds["Δ 0.3"] < plan.seconds["answer"]
