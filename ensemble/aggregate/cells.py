@@ -16,6 +16,7 @@ from adhesis.ensemble.errors import InputError
 from adhesis.ensemble.results.read import Results
 from adhesis.ensemble.results.schema import DONE, FAILED, PENDING, axis_datasets
 from adhesis.ensemble.task.fields import FieldPlan, field_plan
+from adhesis.solver.loading.zero_range import least_range
 from adhesis.solver.model import problem
 from adhesis.solver.model.half_space import HalfSpace
 from adhesis.solver.model.profile import Array
@@ -29,13 +30,13 @@ _PER_TASK = (
     *("largest_contact_fraction", "work_gained", "work_spent", "full_contact_energy"),
     *("wall_time", "cpu_time", "states", "jump_count"),
     *("loss_error", "races", "energy_at_stake"),
-    *("valid_range", "edge_range", "largest_interior_tension"),
+    *("valid_range", "edge_range", "touch_range", "largest_interior_tension"),
     *("opening_strength", "openings", "barrier"),
     *("turning_penetration", "turning_stress", "preload_reached"),
 )
 # Of these the least or the largest of a cell counts; a range or a strength may be infinite.
 _NOT_AVERAGED = frozenset(
-    ("valid_range", "edge_range", "largest_interior_tension", "opening_strength")
+    ("valid_range", "edge_range", "touch_range", "largest_interior_tension", "opening_strength")
 )
 _WITH_INTERVAL = (
     "loss",
@@ -86,7 +87,7 @@ class Cell:
         ``effective_work_of_approach``, ``effective_work_of_separation`` (loss, work gained and work
         spent per largest contact area, in J/m²).
     estimates : dict of Estimate
-        Means of these, but not of ``valid_range``, ``edge_range``, ``largest_interior_tension``,
+        Means of these, but not of ranges of adhesion, ``largest_interior_tension`` and
         ``opening_strength``. Only losses, pull-off and largest contact have an interval.
     curves : dict of Curve
         ``loading_…`` and ``unloading_…`` with: ``mean_stress`` (Pa), ``mean_stress_dimensionless``
@@ -109,6 +110,13 @@ class Cell:
     values: dict[str, Array]
     estimates: dict[str, Estimate]
     curves: dict[str, Curve]
+
+    @property
+    def least_range(self) -> Array:
+        """Least of the three ranges of adhesion of each done task, in m, shape (done,)."""
+        return least_range(
+            *(self.values[name] for name in ("valid_range", "edge_range", "touch_range"))
+        )
 
     @property
     def precision(self) -> Precision | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -275,11 +276,7 @@ def _preload(data: Aggregate) -> list[str]:
 
 def _limit(data: Aggregate) -> list[str]:
     """Sentences on the ranges of adhesion below which the zero-range limit holds."""
-    found = [
-        (value, cell)
-        for cell in data.cells
-        if (value := least(cell.values["valid_range"])) is not None
-    ]
+    found = [(value, cell) for cell in data.cells if (value := least(cell.least_range)) is not None]
     if not found:
         return []
     opens = data.campaign.material.opens
@@ -287,8 +284,9 @@ def _limit(data: Aggregate) -> list[str]:
     if not opens:  # else patches open from inside where the limit ends
         low, cell = min(found, key=lambda entry: entry[0])
         out.append(
-            f"The zero-range limit holds for ranges of adhesion below {low:.3g} m: the least "
-            f"valid_range of all loops, at {cell_name(cell)}."
+            f"The zero-range limit holds for ranges of adhesion well below {low:.3g} m: the least "
+            "valid_range, edge_range or touch_range of all loops, at "
+            f"{cell_name(cell)}."
         )
     beyond = [
         (int(wrong.sum()), cell)
@@ -299,7 +297,10 @@ def _limit(data: Aggregate) -> list[str]:
                 cell.values["loss"],
                 cell.work_of_adhesion,
                 cell.values["largest_contact_fraction"],
-                *((cell.values["opening_strength"], cell.values["barrier"]) if opens else ()),
+                cell.values["opening_strength"] if opens else math.inf,
+                cell.values["barrier"],
+                cell.values["edge_range"],
+                cell.values["touch_range"],
             )
         ).any()
     ]

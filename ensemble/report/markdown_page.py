@@ -170,10 +170,10 @@ def _footnote(data: Aggregate) -> str:
         parts.append(
             "races: jumps that another rule of descent would have ended elsewhere, all loops"
         )
-    if any(np.isfinite(cell.values["valid_range"]).any() for cell in data.cells):
+    if any(np.isfinite(cell.least_range).any() for cell in data.cells):
         parts.append(
-            "range: range of adhesion below which the zero-range limit holds (valid_range), least "
-            "of all loops"
+            "range: range of adhesion below which the zero-range limit holds (the least of "
+            "valid_range, edge_range and touch_range of all loops)"
         )
     if paper.are_its_cells(data.shown.cells):
         parts.append(f"paper: {paper.REFERENCE}, Table 1, – where it gives none")

@@ -65,6 +65,12 @@ NO_RANGES = (
     f"was written before rows had {VALID_RANGE}: below which ranges of adhesion its losses hold is "
     "not known"
 )
+TOUCH_RANGE = "touch_range"
+# What a file of version 1.2 or 1.3 does not say, after its name.
+NO_TOUCH_RANGES = (
+    f"was written before rows had {TOUCH_RANGE}: whether earlier touches would change its losses "
+    "is not known"
+)
 _INSTEAD = "restore it from a copy, or compute the campaign again into another file"
 
 
@@ -359,6 +365,8 @@ class Results:
         out = [] if self.has_checksums else [f"{self.path} {NO_CHECKSUMS}"]
         if VALID_RANGE in self.lacking:
             out.append(f"{self.path} {NO_RANGES}")
+        elif TOUCH_RANGE in self.lacking:
+            out.append(f"{self.path} {NO_TOUCH_RANGES}")
         return tuple(out)
 
     def _checked_status(self) -> NDArray[np.uint8]:

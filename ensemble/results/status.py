@@ -22,6 +22,8 @@ from adhesis.ensemble.quantities import AXIS_UNITS, with_error
 from adhesis.ensemble.results.read import (
     NO_CHECKSUMS,
     NO_RANGES,
+    NO_TOUCH_RANGES,
+    TOUCH_RANGE,
     VALID_RANGE,
     Results,
     mixture,
@@ -30,7 +32,7 @@ from adhesis.ensemble.results.read import (
 from adhesis.ensemble.results.schema import DONE, FAILED, NOT_NEEDED, PENDING, axis_datasets
 from adhesis.ensemble.task.doubt import doubtful, why_beyond
 from adhesis.solver.checks import counted
-from adhesis.solver.loading.zero_range import beyond_limit
+from adhesis.solver.loading.zero_range import beyond_limit, least_range
 from adhesis.solver.values import finite
 
 _MOST_FAILURES_SHOWN = 10
@@ -38,6 +40,7 @@ _MOST_GROUPS_SHOWN = 60
 _CODES = {"done": DONE, "pending": PENDING, "failed": FAILED, "not_needed": NOT_NEEDED}
 _LIMIT = ("valid_range", "loss", "work_of_adhesion", "largest_contact_fraction")
 _STRENGTH = ("opening_strength", "barrier")
+_RANGES = ("valid_range", "edge_range", "touch_range")
 _TASK = ("hurst", "work_of_adhesion", "realisation", "seed")
 
 
@@ -49,22 +52,22 @@ def read_status(path: Path | str) -> dict[str, Any]:
     dict
         ``file``, ``tasks``, ``pending``, ``done``, ``failed``, ``not_needed``; ``damaged``, one
         dict for each row that does not have its checksum (it counts as nothing else), and
-        ``checksums`` and ``valid_ranges``, whether the file has any; ``computed_by``, the number of
-        done rows by the versions and the processor that computed them; ``seconds`` per done task
-        (``mean``, ``median``, ``max``, ``sum``; None without any); ``groups``, one dict for each
-        cell (a value of each of the ``axes``, in the ``axis_units``) with its counts, its mean
-        time, its mean loss with standard error (J/m², and W~), and with ``[stop]`` how well the
-        mean of the steered ``quantity`` is known: ``relative_error``, ``interval_low`` and
-        ``interval_high`` (None where unknown), ``wanted_relative_error``, whether it was ``met``
-        (None while tasks of the cell are pending), and all this as a sentence (``precision``);
-        ``failures``, one dict for each failed task; ``doubtful``, one for each loss whose own
-        checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the worst first;
-        ``beyond_limit``, one for each loss that is beyond what zero range describes
-        (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least valid range first;
-        ``opens``, whether patches may open from inside; ``under_load``, whether the loops are those
-        of a weight, and ``preload_not_reached``, the number of loops that did not reach their
-        preload (None without one); ``last_row``, when the file was last
-        written to (as ``time.time()`` counts), None before the first row.
+        ``checksums``, ``valid_ranges`` and ``touch_ranges``, whether the file has any;
+        ``computed_by``, the number of done rows by the versions and the processor that computed
+        them; ``seconds`` per done task (``mean``, ``median``, ``max``, ``sum``; None without any);
+        ``groups``, one dict for each cell (a value of each of the ``axes``, in the ``axis_units``)
+        with its counts, its mean time, its mean loss with standard error (J/m², and W~), and with
+        ``[stop]`` how well the mean of the steered ``quantity`` is known: ``relative_error``,
+        ``interval_low`` and ``interval_high`` (None where unknown), ``wanted_relative_error``,
+        whether it was ``met`` (None while tasks of the cell are pending), and all this as a
+        sentence (``precision``); ``failures``, one dict for each failed task; ``doubtful``, one for
+        each loss whose own checks say that it is wrong (:mod:`adhesis.ensemble.task.doubt`), the
+        worst first; ``beyond_limit``, one for each loss that is beyond what zero range describes
+        (:func:`adhesis.solver.loading.zero_range.beyond_limit`), the least range first; ``opens``,
+        whether patches may open from inside; ``under_load``, whether the loops are those of a
+        weight, and ``preload_not_reached``, the number of loops that did not reach their preload
+        (None without one); ``last_row``, when the file was last written to (as ``time.time()``
+        counts), None before the first row.
 
     Raises
     ------
@@ -87,7 +90,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
             "loss_dimensionless",
             "audit_residual",
             "loss_error",
-            *("valid_range", "largest_contact_fraction", *(_STRENGTH if opens else ())),
+            *(*_RANGES, "largest_contact_fraction", *(_STRENGTH if opens else ())),
             *(() if cycle.preload is None else ("preload_reached",)),
         )
         column = {name: results.column(name) for name in names}
@@ -96,6 +99,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         damaged = results.damaged()
         has_checksums, origins = results.has_checksums, results.origins()
         has_ranges = VALID_RANGE not in results.lacking
+        has_touch_ranges = TOUCH_RANGE not in results.lacking
     times = column["wall_time"][state == DONE]
     failures = [
         {
@@ -115,6 +119,7 @@ def read_status(path: Path | str) -> dict[str, Any]:
         "damaged": named(column, damaged),
         "checksums": has_checksums,
         "valid_ranges": has_ranges,
+        "touch_ranges": has_touch_ranges,
         "computed_by": origins,
         "seconds": _times(times) if times.size else None,
         "doubtful": _doubtful(state, column, accuracy),
@@ -163,14 +168,16 @@ def _beyond_limit(
     state: NDArray[np.uint8], column: dict[str, NDArray[Any]], *, opens: bool
 ) -> list[dict[str, Any]]:
     names = (*_LIMIT, *(_STRENGTH if opens else ()))
-    beyond = beyond_limit(*(column[name] for name in names))
+    further = {name: column[name] for name in ("edge_range", "touch_range")}
+    beyond = beyond_limit(*(column[name] for name in names), **further)
     rows = np.flatnonzero(beyond & (state == DONE))
-    rows = rows[np.argsort(column["valid_range"][rows], kind="stable")]
+    least = least_range(*(column[name][rows] for name in _RANGES))
+    rows = rows[np.argsort(least, kind="stable")]
     return [
         {
             "row": row,
             **{name: column[name][row].item() for name in (*_TASK, "loss")},
-            "valid_range": finite(column["valid_range"][row].item()),
+            **{name: finite(column[name][row].item()) for name in _RANGES},
         }
         for row in rows.tolist()
     ]
@@ -263,6 +270,8 @@ def as_text(status: dict[str, Any], pace: str = "") -> str:
         lines.append(f"the file {NO_CHECKSUMS}")
     if not status["valid_ranges"]:
         lines.append(f"the file {NO_RANGES}")
+    elif not status["touch_ranges"]:
+        lines.append(f"the file {NO_TOUCH_RANGES}")
     if mixed := mixture(status["computed_by"]):
         lines.append(f"the file {mixed}")
     if seconds := status["seconds"]:
@@ -339,9 +348,10 @@ def _doubt_lines(doubts: list[dict[str, Any]]) -> list[str]:
 def _limit_lines(rows: list[dict[str, Any]], opens: bool) -> list[str]:
     lines = [f"{len(rows)} losses are doubtful: {why_beyond(opens)}"]
     for d in rows[:_MOST_FAILURES_SHOWN]:
-        known = d["valid_range"]
-        shown = "unknown" if known is None else f"{known:.2g} m"
-        lines.append(f"  {_task(d)}: valid_range {shown}, loss {d['loss']:.3g} J/m²")
+        known = {name: d[name] for name in _RANGES if d[name] is not None}
+        least = min(known, key=lambda name: known[name]) if known else None
+        shown = "range unknown" if least is None else f"{least} {known[least]:.2g} m"
+        lines.append(f"  {_task(d)}: {shown}, loss {d['loss']:.3g} J/m²")
     if len(rows) > _MOST_FAILURES_SHOWN:
         lines.append(f"  … and {len(rows) - _MOST_FAILURES_SHOWN} more (--json lists all)")
     return lines

@@ -425,7 +425,7 @@ class _Session:
         contact = row["largest_contact_fraction"]
         beyond = beyond_limit(
             *(row["valid_range"], loss, task.work_of_adhesion, contact),
-            *(row["opening_strength"], row["barrier"]),
+            *(row["opening_strength"], row["barrier"], row["edge_range"], row["touch_range"]),
         )
         return RowSummary(loss, residual, error, bool(wrong), steered, bool(beyond))
 

@@ -19,16 +19,17 @@ from adhesis.solver.loading.zero_range import (
 )
 
 BEYOND_LIMIT = (
-    f"valid_range is below {DOUBTFUL_RANGE:g} m, or the loss above {DOUBTFUL_LOSS:g} times the "
-    "work of adhesion of the largest contact, so that an interface of finite range would open from "
-    "inside and lose less (docs/zero-range.md)"
+    f"valid_range, edge_range or touch_range is below {DOUBTFUL_RANGE:g} m, or the loss above "
+    f"{DOUBTFUL_LOSS:g} times the work of adhesion of the largest contact, so that an interface of "
+    "finite range would lose less (docs/zero-range.md)"
 )
 """Why losses are doubtful that are those of the zero-range limit alone."""
 
 BEYOND_STRENGTH = (
     f"the tension inside patches exceeds the strength more than {DOUBTFUL_EXCESS:g} times, or the "
-    f"barriers of openings are more than {DOUBTFUL_BARRIER:g} of the loss, so that how patches "
-    "open, which zero range leaves open, matters for it (docs/zero-range.md)"
+    f"barriers of openings are more than {DOUBTFUL_BARRIER:g} of the loss, or the range of "
+    "adhesion is longer than edge_range or touch_range, so that what zero range leaves open "
+    "matters for it (docs/zero-range.md)"
 )
 """Why losses are doubtful where patches open from inside."""
 

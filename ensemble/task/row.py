@@ -79,10 +79,10 @@ TIMES = (
     _task("wall_time", FLOAT, "s", "wall time"),
     _task("cpu_time", FLOAT, "s", "CPU time"),
 )
-# Below which ranges of adhesion the zero-range limit holds.
+# Below the least of three ranges of adhesion the zero-range limit holds.
 _RANGES = (
     _task(
-        *("valid_range", FLOAT, "m", "range of adhesion below which the zero-range limit holds"),
+        *("valid_range", FLOAT, "m", "range of adhesion below which no patch opens from inside"),
         lambda loop: loop.valid_range,
         since=(1, 2),
     ),
@@ -90,6 +90,11 @@ _RANGES = (
         *("edge_range", FLOAT, "m", "range whose cohesive zone is as long as what pins edges"),
         lambda loop: loop.edge_range,
         since=(1, 2),
+    ),
+    _task(
+        *("touch_range", FLOAT, "m", "range that changes the loss by 0.01 by earlier touches"),
+        lambda loop: loop.touch_range,
+        since=(1, 4),
     ),
     _task(
         *("largest_interior_tension", FLOAT, "Pa", "largest tension inside patches"),

@@ -225,11 +225,24 @@ class Answer(ByValue):
 
     @property
     def valid_range(self) -> float | None:
-        """Least range in m, of the answer's loop and its variants, below which the limit holds.
+        """Least ``valid_range`` in m of the answer's loop and its variants.
 
-        The zero-range limit: docs/zero-range.md. None if no loop has tension inside patches.
+        None if no loop has tension inside patches (docs/zero-range.md).
         """
-        found = (one["valid_range"] for one in self._alike())
+        return self._least("valid_range")
+
+    @property
+    def edge_range(self) -> float | None:
+        """Least ``edge_range`` in m of the answer's loop and its variants."""
+        return self._least("edge_range")
+
+    @property
+    def touch_range(self) -> float | None:
+        """Least ``touch_range`` in m of the answer's loop and its variants; None without touch."""
+        return self._least("touch_range")
+
+    def _least(self, name: str) -> float | None:
+        found = (one[name] for one in self._alike())
         return min((value for value in found if value is not None), default=None)
 
     @property
@@ -671,6 +684,8 @@ def document(answer: Answer) -> dict[str, Any]:
         "pull_off_stress": _plain(answer.pull_off_stress),
         "contact_fraction": _plain(answer.contact_fraction),
         "valid_range": answer.valid_range,
+        "edge_range": answer.edge_range,
+        "touch_range": answer.touch_range,
         "largest_interior_tension": answer.largest_interior_tension,
         "loop": dict(answer.main),
         "runs": run_rows(answer),

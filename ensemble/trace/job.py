@@ -68,7 +68,8 @@ def run(job: Job, report: Callable[[tuple[str, float]], None] | None = None) -> 
     small = sum(jump.energy_drop for jump in loop.jumps if jump.small_scale)
     return loop.numbers() | {
         "range_warnings": range_warnings(
-            problem, loop.valid_range, loop.loss, loop.contact_fraction
+            *(problem, loop.valid_range, loop.loss, loop.contact_fraction),
+            *(loop.edge_range, loop.touch_range),
         )
         + opening_warnings(loop.jumps, loop.loss),
         "strain_warnings": strain_warnings(

@@ -81,12 +81,19 @@ def _scope(answer: Answer) -> str:
 
 def _range(answer: Answer) -> str:
     """Describe below which range of adhesion the zero-range limit holds."""
-    if answer.valid_range is None:
-        return "no tension inside patches"
+    inside, ranges = "no tension inside patches", []
+    if answer.valid_range is not None:
+        tension = stress_text(answer.largest_interior_tension)
+        inside = f"tension inside patches of up to {tension}: {length_text(answer.valid_range, 3)}"
+        ranges.append(answer.valid_range)
+    outside = ""
+    for where, value in (("edges", answer.edge_range), ("touches", answer.touch_range)):
+        if value is not None:
+            outside += f"; at {where}: {length_text(value, 3)}"
+            ranges.append(value)
     return (
         "the zero-range model is valid if the real adhesion reaches less than "
-        f"{length_text(answer.valid_range, 3)} (tension inside patches of up to "
-        f"{stress_text(answer.largest_interior_tension)})"
+        f"{length_text(min(ranges), 3)} ({inside}{outside})"
     )
 
 

@@ -33,6 +33,8 @@ class Lattice:
         In m.
     origin : int
         Node at the highest crest.
+    equal_parts : int
+        Of the period.
     """
 
     elastic: ElasticGrid
@@ -42,6 +44,7 @@ class Lattice:
     control: Control
     h_max: float
     origin: int = 0
+    equal_parts: int = 1
 
     @classmethod
     def of(cls, problem: Problem, n: int) -> Lattice:
@@ -56,6 +59,7 @@ class Lattice:
             problem.control,
             profile.h_max,
             round(profile.highest_point[0] / elastic.dx) % n,
+            profile.equal_parts,
         )
 
     @property

@@ -19,6 +19,9 @@ from adhesis.solver.model.problem import Problem
 # Relative error of a loss times the number of nodes in the first equilibrium width on a crest of
 # rms curvature: larger in one of a hundred rough loops (docs/methods.md).
 _COARSE = 0.6
+# Drop of a patch that comes or goes, over γ times that width: 0.6 on a parabola, and more where
+# surfaces that touch are flatter than crests are.
+_UNSEEN = 2.0
 _OVERLAP = 1e-6  # of h_max: a smaller overlap counts as touch
 _NEAREST = 1e-8  # of the range: resolution of the location of first touch
 _LEAST_DISPLACEMENT = 0.1  # shortest waves between edges of different minima
@@ -81,23 +84,26 @@ class Steps:
         self.scale = problem.prescribed_range
         self.adhesion_scale = problem.work_of_adhesion * self.period
         self.openings = Openings(problem, relaxation)
-        # Relative error of a drop.
-        self.coarse = (
-            min(1.0, _COARSE * self.lattice.dx / first_width(problem))
-            if self.adhesion_scale
-            else 0.0
-        )
+        # Relative error of a drop, and size in J/m² of the drop in which a patch appears.
+        self.coarse = self.least_drop = 0.0
+        if self.adhesion_scale:
+            width = first_width(problem)
+            self.coarse = _COARSE * self.lattice.dx / width
+            self.least_drop = _UNSEEN * problem.work_of_adhesion * width / self.period
         # Displacement, in nodes, beyond which an edge has run and two end states are different
         # minima.
         wave = self.profile.shortest_wavelength / self.lattice.dx
         self.min_displacement = max(_FEWEST_NODES_APART, _LEAST_DISPLACEMENT * wave)
 
     def first_touch(self, separation: float) -> Contact:
-        """Return the contact at the separation at which the highest crests touch."""
+        """Return the contact at the separation at which the highest crest touches."""
         contact = self.solver.empty(separation)
         before = state_of(self.lattice, contact)
         self.states.append(before)
-        crests = np.rint(self.profile.crests().position / self.lattice.dx).astype(np.intp)
+        position = self.profile.crests().position
+        if self.adhesion_scale:
+            position = position[self.profile.first_of_equal(position)]
+        crests = np.rint(position / self.lattice.dx).astype(np.intp)
         contact.mask[crests % self.lattice.n] = True
         self.solver.solve(contact, self.relaxation.tight)
         if self.energy(contact) < 0:
@@ -144,6 +150,7 @@ class Steps:
                 continue
             self.count.substeps += 1
             if not located:
+                self.error += self._unseen_drops(contact, after)
                 self._append(after)
             left, contact = self._open(after)
             if not control.is_fixed and np.count_nonzero(~contact.mask) <= 1:
@@ -157,6 +164,15 @@ class Steps:
     def _is_late(self, excess: float, stride: float) -> bool:
         """Return whether a step passed an opening, and a shorter one would locate it better."""
         return excess < -_STRENGTH_EXCEEDED and stride > 0.05 * self.accuracy * self.scale
+
+    def _unseen_drops(self, before: Contact, after: Contact) -> float:
+        """Estimate the drops, in J/m², in which patches came or went without a jump.
+
+        With adhesion none comes or goes without one: where a few nodes make a patch it does so
+        smoothly, and its drop is lost.
+        """
+        one, other = (patch_ranges(contact.mask)[0].size for contact in (before, after))
+        return self.least_drop * abs(one - other)
 
     def _open(self, contact: Contact) -> tuple[float, Contact]:
         """Open patches inside where the tension has reached the strength, one after the other.

@@ -31,13 +31,17 @@ from adhesis.solver.grid.moves import (
     pair_moves,
 )
 from adhesis.solver.method import PathError
-from adhesis.solver.model.profile import EQUAL_CRESTS
+from adhesis.solver.model.profile import EQUAL_CRESTS, first_of_equal
 
 _MAX_SWEEPS = 1_000_000
 _MAX_ACTIVE_SETS = 1000
 
 Abort = Callable[[float, Contact], bool]
 """Called with the energy (J/m) and the contact after each admissible sweep; True stops."""
+
+
+# Nodes: how far the lowest nodes of equal minima may be from where these are alike.
+_SAME_NODE = 2.0
 
 
 class Relaxation:
@@ -130,7 +134,8 @@ class Relaxation:
         """Find the nodes away from all edges where the surfaces touch first; empty if none.
 
         The gap between nodes is a parabola through three of them, so that first touch is located
-        between nodes. Minima of equal gap touch together.
+        between nodes. Of minima of equal gap one is chosen, with its copies
+        (:func:`first_of_equal`).
         """
         gap = self.lattice.gap(contact)
         steps = np.diff(gap, append=gap[:1])
@@ -145,7 +150,12 @@ class Relaxation:
             return np.empty(0, dtype=np.intp)
         tied = crests[least <= lowest + self.tie_height]
         # A crest halfway between two nodes must nucleate only once.
-        return tied[np.diff(tied, prepend=tied[-1] - self.lattice.n) > 1]
+        tied = tied[np.diff(tied, prepend=tied[-1] - self.lattice.n) > 1]
+        if tied.size < 2:
+            return tied
+        lattice = self.lattice
+        part = lattice.n / lattice.equal_parts
+        return tied[first_of_equal(tied.astype(float), lattice.origin, part, lattice.n, _SAME_NODE)]
 
     def nucleate(self, contact: Contact) -> bool:
         """Add the nodes where the surfaces touch; returns True if there are any."""

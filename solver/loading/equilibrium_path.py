@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from adhesis.solver.checks import counted
 from adhesis.solver.loading.path_record import Record, integral, states_before_jumps
 from adhesis.solver.loading.zero_range import (
+    TOUCH_SHARE,
     InteriorTension,
     interior_tension,
+    least_range,
     narrowest_length,
     stress_text,
+    touch_stress,
 )
 from adhesis.solver.method import ContactState, Method, MethodReport
 from adhesis.solver.model.jump import Jump
@@ -129,7 +132,7 @@ class EquilibriumPath(ByValue, ResultViews):
 
     @property
     def valid_range(self) -> float:
-        """Range of adhesion in m below which the zero-range limit holds, γ/σ_in.
+        """Range of adhesion in m below which no patch opens from inside, γ/σ_in.
 
         Infinite if no patch is in tension inside (docs/zero-range.md).
         """
@@ -142,6 +145,31 @@ class EquilibriumPath(ByValue, ResultViews):
         """Range of adhesion in m whose cohesive zone at an edge is ``narrowest_length`` long."""
         gamma, modulus = self.problem.work_of_adhesion, self.problem.half_space.modulus
         return math.sqrt(4 * gamma * self.narrowest_length / (math.pi * modulus))
+
+    @property
+    def touch_range(self) -> float:
+        """Range of adhesion in m that changes the loss by a hundredth by earlier touches.
+
+        Infinite if no jump is a touch (docs/zero-range.md).
+        """
+        stress = touch_stress(
+            self.jumps, self.states_before_jumps(), self.separation, self.mean_stress,
+            self.patches, self.problem.control,
+        )  # fmt: skip
+        return TOUCH_SHARE * max(self.lost, 0.0) / stress if stress > 0 else math.inf
+
+    @property
+    def least_range(self) -> float:
+        """The least of ``valid_range``, ``edge_range`` and ``touch_range``, in m.
+
+        The zero-range limit holds for ranges of adhesion well below it (docs/zero-range.md).
+        """
+        return float(least_range(self.valid_range, self.edge_range, self.touch_range))
+
+    @property
+    def lost(self) -> float:
+        """Energy that is lost on the path, in J/m² of nominal area."""
+        return self.loss_from_drops
 
     @property
     def races(self) -> int:
@@ -193,22 +221,29 @@ class EquilibriumPath(ByValue, ResultViews):
         """Return one line for a terminal on the ranges for which the zero-range limit holds."""
         interior = self.interior
         strength = self.problem.strength
+        outside = (
+            f"at edges: {1e9 * self.edge_range:.3g} nm; at touches: {1e9 * self.touch_range:.3g} nm"
+        )
         if math.isfinite(strength):
             range_ = self.problem.work_of_adhesion / strength
             largest = 0.0 if interior is None else interior.tension
             return (
                 f"adhesion of a range of {range_:.3g} m: patches open from inside at "
                 f"{strength:.3g} Pa, {counted(self.openings, 'opening')} with barriers of "
-                f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; at "
-                f"edges {self.edge_range:.3g} m"
+                f"{self.barrier:.2g} J/m²; largest tension inside patches {largest:.3g} Pa; "
+                f"{outside}"
             )
-        if interior is None:
-            return "no tension inside patches"
+        inside = "no tension inside patches"
+        if interior is not None:
+            inside = (
+                f"tension inside patches of {stress_text(interior.tension)} on {interior.branch} "
+                f"at Δ/h_max = {interior.penetration:.4g}: {1e9 * self.valid_range:.3g} nm"
+            )
+        if self.problem.work_of_adhesion == 0:
+            return inside
         return (
             "the zero-range model is valid if the real adhesion reaches less than "
-            f"{1e9 * self.valid_range:.3g} nm (tension inside patches of "
-            f"{stress_text(interior.tension)} on {interior.branch} at Δ/h_max = "
-            f"{interior.penetration:.4g}; at edges: {1e9 * self.edge_range:.3g} nm)"
+            f"{1e9 * self.least_range:.3g} nm ({inside}; {outside})"
         )
 
     # ------------------------------------------------------------------ for tables and files
@@ -238,6 +273,7 @@ class EquilibriumPath(ByValue, ResultViews):
             "loss_over_work_of_adhesion": values["loss"] / gamma if gamma > 0 else None,
             "valid_range": finite(self.valid_range),
             "edge_range": finite(self.edge_range),
+            "touch_range": finite(self.touch_range),
             "seconds": self.seconds,
             "method": self.method.name,
         }

@@ -377,7 +377,7 @@ def unload(
                 "young and the heights, or try the other method"
             )
         if first - i >= _STROKES_AT_STEP * axis.load_steps:
-            wanted = _LONG_STEP * max(unit, -end) / (axis(i + 1) - end)
+            wanted = _LONG_STEP * max(unit, -end) / axis.step
             stride = max(1, min(2 * stride, int(wanted)))
         stops = []
         while ahead and ahead[-1] > end - axis.near:

@@ -19,7 +19,7 @@ from adhesis.solver.loading.loop_state import LoopState, state_at_stress
 from adhesis.solver.loading.mean_stress_event import has_reached
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.loading.zero_range import opening_warnings, range_warnings, stress_text
-from adhesis.solver.method import Method
+from adhesis.solver.method import Method, PathError
 from adhesis.solver.model.control import Control
 from adhesis.solver.model.jump import BRANCHES, Branch
 from adhesis.solver.model.problem import Problem
@@ -91,9 +91,14 @@ class LoopResult(EquilibriumPath):
             f"{self.load_steps} load steps, "
             f"{len(self.separation)} states, method {self.method.name!r},\n"
             f"  loss={self.loss:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
-            f"valid_range={self.valid_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
+            f"least_range={self.least_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
             f"{counted(len(self.warnings), 'warning')})"
         )
+
+    @property
+    def lost(self) -> float:
+        """The loss."""
+        return self.loss
 
     @property
     def audit_residual(self) -> float:
@@ -197,7 +202,10 @@ class LoopResult(EquilibriumPath):
                 f"the numerical error of the loss, {self.loss_error:.2g} J/m² of {self.loss:.3g} "
                 f"J/m², is larger than {most:g} of it, the relative error allowed"
             )
-        found += range_warnings(self.problem, self.valid_range, self.loss, self.contact_fraction)
+        found += range_warnings(
+            *(self.problem, self.valid_range, self.loss, self.contact_fraction),
+            *(self.edge_range, self.touch_range),
+        )
         found += opening_warnings(self.jumps, self.loss)
         return tuple(found)
 
@@ -400,10 +408,23 @@ def result_of(
     started: float,
     preload: float | None = None,
 ) -> LoopResult:
-    """Make the result from the record of a loop; ``started`` is its first CPU time, in s."""
+    """Make the result from the record of a loop; ``started`` is its first CPU time, in s.
+
+    Raises
+    ------
+    PathError
+        If the error of the loss is as large as the loss, or surfaces overlap where nothing touches.
+    """
     problem = method.problem
     fields = path_fields(method, record, started)
     loss = record.work(problem)
+    error = estimated_error(record, loss - fields["loss_from_drops"], problem)
+    if problem.work_of_adhesion > 0 and not error < abs(loss):
+        raise PathError(
+            f"the loss is not resolved: {loss:.3g} J/m² with a numerical error of {error:.2g} "
+            "J/m², as large as itself; a finer accuracy, more nodes, or the other method may "
+            "resolve it"
+        )
     turn = record.branches.index("unloading")  # the turning point's state stands in both branches
     gained = -record.slice(0, turn).work(problem)
     max_penetration = turning_point
@@ -416,7 +437,7 @@ def result_of(
         load_steps=load_steps,
         loss=loss,
         loss_dimensionless=loss / problem.loss_scale,
-        loss_error=estimated_error(record, loss - fields["loss_from_drops"], problem),
+        loss_error=error,
         work_gained=gained,
         work_spent=loss + gained,
         **fields,

@@ -140,7 +140,7 @@ class PathResult(EquilibriumPath):
             f"PathResult({points}{', out' if self.ends_out else ''}; {self.load_steps} load steps, "
             f"{len(self.separation)} states, method {self.method.name!r},\n"
             f"  work={self.work:.6g} J/m², loss_error={self.loss_error:.2g} J/m², "
-            f"valid_range={self.valid_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
+            f"least_range={self.least_range:.3g} m, {counted(len(self.jumps), 'jump')}, "
             f"{counted(len(self.minor_loops), 'minor loop')})"
         )
 
@@ -148,7 +148,10 @@ class PathResult(EquilibriumPath):
     def warnings(self) -> tuple[str, ...]:
         """Reasons to doubt the work, one sentence each; none for most paths."""
         lost = self.loss_from_drops
-        found = range_warnings(self.problem, self.valid_range, lost, self.contact_fraction)
+        found = range_warnings(
+            *(self.problem, self.valid_range, lost, self.contact_fraction),
+            *(self.edge_range, self.touch_range),
+        )
         found += strain_warnings(self.problem, self.mean_stress, self.separation, self.patches)
         return (*found, *opening_warnings(self.jumps, lost))
 

@@ -29,9 +29,14 @@ class Axis:
         return self.top if index == self.load_steps else self.top * index / self.load_steps
 
     @property
+    def step(self) -> float:
+        """One load step."""
+        return self.top / self.load_steps
+
+    @property
     def near(self) -> float:
         """Distance within which two values are equal but for rounding."""
-        return _NEAR * self.top / self.load_steps
+        return _NEAR * self.step
 
     def above(self, drive: float) -> int:
         """Return the index of the first load step at or above ``drive``."""

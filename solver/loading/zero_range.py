@@ -1,20 +1,28 @@
-"""Compute the limits of the zero-range model: tension inside patches, and the ranges it allows.
+"""Compute the three ranges of adhesion that bound the zero-range model.
 
 A zero range of adhesion is an infinite strength: inside a contact nothing opens, whatever the
 tension there. An interface of range δ gives way near σ_th = γ/δ. So with σ_in the largest local
-maximum of tension inside patches, away from their edges, where tension is singular, the limit holds
-for ranges below
+maximum of tension inside patches, away from their edges, where tension is singular, nothing opens
+inside for ranges below
 
     valid_range = γ/σ_in.
 
 At an edge a range δ smears the singularity over a cohesive zone of the length (π/8)(K/σ_th)² =
-(π/4) E* δ²/γ (Dugdale, with K² = 2E*γ). It has to be short beside the narrowest length l that
-decides where edges stand, which holds for ranges well below
+(π/4) E* δ²/γ (Dugdale, with K² = 2E*γ). At
 
-    edge_range = sqrt(4 γ l/(π E*)).
+    edge_range = sqrt(4 γ l/(π E*))
 
-l is the least of λ_min and of the patches and gaps beside the edges that move in the jumps which
-make up nine tenths of all drops, as long as these are before the jump.
+it is as long as l, the narrowest length that decides where edges stand: the least of λ_min and of
+the patches and gaps beside the edges that move in the jumps which make up nine tenths of all drops,
+as long as these are before the jump.
+
+Surfaces that attract each other from a distance δ jump into contact a way δ sooner. In first order
+in δ the loop then loses δ times the change of mean stress less at every touch, and a hundredth of
+the loss in all at
+
+    touch_range = 0.01 loss / Σ |Δp̄|,
+
+the sum over the jumps in which a patch appears or a gap closes.
 """
 
 from __future__ import annotations
@@ -29,12 +37,19 @@ from numpy.typing import NDArray
 
 from adhesis.solver.loading.path_record import Record
 from adhesis.solver.method import Method
-from adhesis.solver.model.jump import Branch, Jump
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.jump import Branch, Jump, JumpKind
 from adhesis.solver.model.problem import Problem
 from adhesis.solver.model.profile import Array
 
 DOUBTFUL_RANGE = 1e-9
-"""``valid_range`` below which a loss is doubtful, in m: real adhesion has 0.2 to 10 nm."""
+"""Least of the three ranges below which a loss is doubtful, in m: adhesion has 0.2 to 10 nm."""
+
+TOUCHES: frozenset[JumpKind] = frozenset({"snap-in", "merging"})
+"""Kinds of the jumps in which surfaces come into contact away from edges, or a gap closes."""
+
+TOUCH_SHARE = 0.01
+"""Share of the loss that is lost at ``touch_range``."""
 
 DOUBTFUL_LOSS = 20.0
 """Loss over γ A_max/A0 above which a loss is doubtful (docs/zero-range.md)."""
@@ -170,6 +185,51 @@ def _narrowest_moved(before: Array, after: Array, period: float) -> float:
     return float(np.concatenate(lengths).min(initial=math.inf))
 
 
+def touch_stress(
+    jumps: Sequence[Jump],
+    before: Sequence[int],
+    separation: Array,
+    mean_stress: Array,
+    patches: NDArray[np.int64],
+    control: Control,
+) -> float:
+    """Add up |Δp̄| over all touches, in Pa: how fast the loss falls with the range of adhesion.
+
+    Surfaces touch earlier by the range in s, hence by dx/ds times that in the prescribed value x,
+    and the loss falls by the change of its conjugate Y times that. At fixed separation that is
+    |Δp̄|. Otherwise dx/ds is that between the state before the jump and the one before that; before
+    first touch it is 1, and 0 under a load, which then moves nothing but the solid.
+
+    Parameters
+    ----------
+    jumps : sequence of Jump
+    before : sequence of int, shape (jumps,)
+        Index of the state before each jump.
+    separation, mean_stress, patches : array, shape (states,)
+    control : Control
+    """
+    x = control.prescribed(separation, mean_stress)
+    y = control.conjugate(separation, mean_stress, 0.0)
+    total = 0.0
+    for jump, k in zip(jumps, before, strict=True):
+        if jump.kind not in TOUCHES:
+            continue
+        rate = 0.0 if control.is_load and not patches[k] else 1.0
+        if not control.is_fixed and patches[k]:
+            earlier = np.flatnonzero(separation[:k] != separation[k])
+            if len(earlier):
+                i = earlier[-1]
+                rate = abs(float((x[k] - x[i]) / (separation[k] - separation[i])))
+        total += rate * abs(float(y[k + 1] - y[k]))
+    return total
+
+
+def least_range(valid_range: Any, edge_range: Any, touch_range: Any) -> NDArray[np.float64]:
+    """Return the least of the three ranges, in m; one that is unknown (NaN) does not count."""
+    ranges = np.broadcast_arrays(valid_range, edge_range, touch_range)
+    return np.asarray(np.fmin.reduce(np.array(ranges, dtype=np.float64)), dtype=np.float64)
+
+
 def stress_text(pascals: float) -> str:
     """Return a stress in a unit of its size: "100 kPa"."""
     return f"{1e-6 * pascals:.3g} MPa" if pascals >= 1e6 else f"{1e-3 * pascals:.3g} kPa"
@@ -201,51 +261,80 @@ def beyond_limit(
     largest_contact_fraction: Any,
     strength: Any = math.inf,
     barrier: Any = 0.0,
+    edge_range: Any = math.inf,
+    touch_range: Any = math.inf,
 ) -> NDArray[np.bool_]:
-    """Mark the losses that zero range alone makes so large; values or arrays of one shape.
+    """Mark the losses that an adhesion of finite range may not have; values or arrays of one shape.
 
-    Their valid range is below :data:`DOUBTFUL_RANGE`, or they are more than :data:`DOUBTFUL_LOSS`
-    times the work of adhesion of the largest contact. At a finite strength it is those at which
-    the tension inside patches exceeds it :data:`DOUBTFUL_EXCESS` times, or whose barriers are more
-    than :data:`DOUBTFUL_BARRIER` of them. None is where the strength is unknown (NaN).
+    The least of their ranges is below :data:`DOUBTFUL_RANGE`, or they are more than
+    :data:`DOUBTFUL_LOSS` times the work of adhesion of the largest contact. At a finite strength it
+    is those whose own range of adhesion, γ over the strength, is longer than the edges or the
+    touches allow, those at which the tension inside patches exceeds the strength
+    :data:`DOUBTFUL_EXCESS` times, or whose barriers are more than :data:`DOUBTFUL_BARRIER` of them.
+    None is where the strength is unknown (NaN).
     """
     loss, gamma = np.asarray(loss), np.asarray(work_of_adhesion)
     valid_range, strength = np.asarray(valid_range), np.asarray(strength)
     most = DOUBTFUL_LOSS * gamma * np.asarray(largest_contact_fraction)
-    closed = (valid_range < DOUBTFUL_RANGE) | ((loss > most) & (gamma > 0))
+    short = least_range(valid_range, edge_range, touch_range) < DOUBTFUL_RANGE
+    closed = (short | (loss > most)) & (gamma > 0)
     exceeded = gamma > DOUBTFUL_EXCESS * strength * valid_range
-    opened = exceeded | (np.asarray(barrier) > DOUBTFUL_BARRIER * np.abs(loss))
+    long = gamma > strength * least_range(math.inf, edge_range, touch_range)
+    opened = exceeded | long | (np.asarray(barrier) > DOUBTFUL_BARRIER * np.abs(loss))
     return np.asarray(np.where(np.isposinf(strength), closed, np.isfinite(strength) & opened))
 
 
+_WHAT_A_LONGER_RANGE_DOES = {
+    "valid_range": "patches would open from inside and lose less",
+    "edge_range": "edges would give way over zones as long as what holds them",
+    "touch_range": "surfaces would jump into contact from further away and lose less",
+}
+
+
 def range_warnings(
-    problem: Problem, range_: float, loss: float, contact_fraction: Sequence[float] | Array
+    problem: Problem,
+    range_: float,
+    loss: float,
+    contact_fraction: Sequence[float] | Array,
+    edge_range: float = math.inf,
+    touch_range: float = math.inf,
 ) -> list[str]:
     """Return warnings if a loss is that of the zero-range limit alone.
 
     At a finite strength patches open from inside; doubtful is then a tension that exceeds it where
-    no crack grows.
+    no crack grows, and a range of adhesion that edges or touches do not allow. ``range_`` is
+    ``valid_range``.
     """
     out: list[str] = []
+    bounds = {"edge_range": edge_range, "touch_range": touch_range}
+    gamma = problem.work_of_adhesion
     if math.isfinite(problem.strength):
-        excess = problem.work_of_adhesion / range_ / problem.strength
+        excess = gamma / range_ / problem.strength
         if excess > DOUBTFUL_EXCESS:
-            largest_tension = problem.work_of_adhesion / range_
+            largest_tension = gamma / range_
             out.append(
                 f"the tension inside patches reaches {largest_tension:.3g} Pa, {excess:.3g} times "
                 f"the strength ({problem.strength:.3g} Pa), where no crack that fits grows: how "
                 "such places yield, which zero range leaves open, may matter for the loss "
                 "(docs/zero-range.md)"
             )
+        own, least = gamma / problem.strength, min(bounds, key=lambda name: bounds[name])
+        if own > bounds[least]:
+            out.append(
+                f"the range of adhesion, {1e9 * own:.3g} nm, is longer than {least}, "
+                f"{1e9 * bounds[least]:.3g} nm: {_WHAT_A_LONGER_RANGE_DOES[least]}, which is not "
+                "in the model (docs/zero-range.md)"
+            )
         return out
-    if range_ < DOUBTFUL_RANGE:
+    bounds = {"valid_range": range_, **bounds}
+    least = min(bounds, key=lambda name: bounds[name])
+    if bounds[least] < DOUBTFUL_RANGE and gamma > 0:
         out.append(
-            f"valid_range is {1e9 * range_:.3g} nm: the zero-range limit holds only for ranges of "
-            f"adhesion below it, and below {1e9 * DOUBTFUL_RANGE:g} nm hardly any interface has "
-            "one, so patches would open from inside and lose less (docs/zero-range.md)"
+            f"{least} is {1e9 * bounds[least]:.3g} nm: the zero-range limit holds only for ranges "
+            f"of adhesion below it, and below {1e9 * DOUBTFUL_RANGE:g} nm hardly any interface has "
+            f"one, so {_WHAT_A_LONGER_RANGE_DOES[least]} (docs/zero-range.md)"
         )
     largest = float(np.max(contact_fraction, initial=0.0))
-    gamma = problem.work_of_adhesion
     if beyond_limit(math.inf, loss, gamma, largest):
         ratio = loss / (gamma * largest)
         out.append(

@@ -57,7 +57,14 @@ NORMALISATIONS = {"h_rms": HEIGHT, "m2": MEAN_SQUARE_SLOPE, "c0": HEIGHT_SQUARE}
 """Parameters that scale a self-affine spectrum, with their bounds."""
 
 EQUAL_CRESTS = 1e-9
-"""Crests whose heights differ by less than this share of h_max are equal: they touch together."""
+"""Crests whose heights differ by less than this share of h_max are equal. Waves whose amplitude is
+below it make no two parts of a period differ."""
+
+# Of h_max: waves may be so far from their mirror image. Jumps are hardly located more finely.
+_MIRRORED = 1e-6
+
+# Of the shortest wave: places in equal parts of the period that differ by less are copies.
+_SAME_PLACE = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -284,6 +291,37 @@ class Profile(ByValue):
         """Height of the highest point, in m."""
         return self.highest_point[1]
 
+    @cached_property
+    def equal_parts(self) -> int:
+        """Number of equal parts of the period: the greatest common divisor of its harmonics."""
+        return int(np.gcd.reduce(self._harmonics))
+
+    @cached_property
+    def mirror_axes(self) -> Array:
+        """Places x in m, from 0 to λ/2, about which the profile is nearly its own mirror image."""
+        harmonics, allowed = self._harmonics, _MIRRORED * self.h_max
+        first = int(harmonics[0])
+        angle = (np.pi * np.arange(first) - np.angle(self.coefficients[first])) / first
+        for m in harmonics[1:]:
+            odd = np.imag(self.coefficients[m] * np.exp(1j * m * angle))
+            angle = angle[np.abs(odd) < allowed]
+        return np.asarray(np.sort(angle % np.pi) / self.q0, dtype=np.float64)
+
+    @cached_property
+    def _harmonics(self) -> Integers:
+        """Harmonics whose amplitude makes parts of the profile differ, rising."""
+        return np.flatnonzero(np.abs(self.coefficients) > EQUAL_CRESTS * self.h_max)
+
+    def first_of_equal(self, position: Array) -> NDArray[np.intp]:
+        """Choose, of places in m where contact may begin alike, those where it does begin.
+
+        See :func:`first_of_equal`.
+        """
+        near = _SAME_PLACE * self.shortest_wavelength
+        return first_of_equal(
+            position, self.highest_point[0], self.period / self.equal_parts, self.period, near
+        )
+
     # ------------------------------------------------------------------ transformations
 
     def shifted(self, distance: float) -> Profile:
@@ -300,6 +338,36 @@ class Profile(ByValue):
         """Return the profile with heights multiplied by ``height`` and the period by ``length``."""
         height, length = real("height", height), real("length", length)
         return Profile(self.period * length, self.coefficients * height)
+
+
+def first_of_equal(
+    position: Array, origin: float, part: float, period: float, near: float
+) -> NDArray[np.intp]:
+    """Choose, of places where contact may begin alike, those where it does begin.
+
+    That is the first to the right of the highest crest, with its copies in the other equal parts of
+    the period. The rest are its mirror images, or equal it by chance: in any other profile one of
+    them comes first, however little they differ.
+
+    Parameters
+    ----------
+    position : array, shape (n,)
+        n ≥ 1; the other lengths are in its unit.
+    origin : float
+        The highest crest.
+    part, period : float
+        Length of one of the equal parts, and of all.
+    near : float
+        Error of the positions, at most.
+
+    Returns
+    -------
+    int array
+        Indices of the places that are chosen.
+    """
+    away = (position - origin + near) % period
+    apart = (position - position[np.argmin(away)] + 0.5 * part) % part - 0.5 * part
+    return np.flatnonzero(np.abs(apart) <= near)
 
 
 def self_affine_profile(

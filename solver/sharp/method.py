@@ -213,8 +213,9 @@ class SharpMethod(Method):
             history = self._history(state, target)
         except FullContact:
             raise PathError(self.problem.full_contact(prescribed)) from None
-        except NoState as failed:
-            where = self.problem.describe_prescribed(self.states.to_si(failed.at))
+        except (NoState, FloatingPointError) as failed:
+            at = failed.at if isinstance(failed, NoState) else target.at
+            where = self.problem.describe_prescribed(self.states.to_si(at))
             raise PathError(
                 f"method 'sharp' finds no state at {where}: {failed}; the method 'grid', another "
                 "accuracy or other load steps may get past it"

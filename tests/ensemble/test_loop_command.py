@@ -91,9 +91,12 @@ def test_json_holds_the_promised_keys_and_the_exact_loop(wave_file, tmp_path, ca
     assert "unloading" in text.err
 
 
+DEPTHS = "it must be a positive number from 1e-12 to 0.999999"
+
 # Units of what a JSON document may hold; a number that is none of these is dimensionless.
 DIMENSIONAL = {
-    "m": {"h_max", "h_rms", "period", "separation", "patch_length", "valid_range", "edge_range"},
+    "m": {"h_max", "h_rms", "period", "separation", "patch_length"}
+    | {"valid_range", "edge_range", "touch_range"},
     "m²": {"m0"},
     "1/m²": {"m4"},
     "Pa": {
@@ -328,7 +331,8 @@ def test_a_loss_beyond_the_zero_range_limit_is_said_and_strict(
     assert (data["valid_range"] < 1e-9) == (code == 1)
     assert data["valid_range"] == data["work_of_adhesion"] / data["largest_interior_tension"]
     assert data["interior_tension"]["branch"] == "unloading"
-    assert f"reaches less than {1e9 * data['valid_range']:.3g} nm (tension" in text.out
+    least = min(data["valid_range"], data["edge_range"], data["touch_range"])
+    assert f"reaches less than {1e9 * least:.3g} nm (tension" in text.out
     assert [f"adhesis loop: {warning}" for warning in data["warnings"]] == text.err.splitlines()
     assert bool(data["warnings"]) == (code == 1)
     assert not any(turn["warnings"] for turn in data.get("turns", []))
@@ -379,8 +383,10 @@ def no_computing(monkeypatch):
         ((*OK, "--work-of-adhesion", "inf"), "--work-of-adhesion is inf: it must be 0 or"),
         ((*OK, "--young", 0), "--young is 0.0: it must be a positive number"),
         ((*OK, "--poisson", 0.6), "--poisson is 0.6: it must be a number above -1 and at most 0.5"),
-        ((*OK, "--max-penetration", 1), "--max-penetration is 1.0: it must be a number between"),
-        ((*OK, "--max-penetration", 0), "--max-penetration is 0.0: it must be a number between"),
+        *(
+            ((*OK, "--max-penetration", value), f"--max-penetration is {float(value)}: {DEPTHS}")
+            for value in (1, 0, 1e-15, 1 - 2**-53)
+        ),
         ((*OK, "--load-steps", 0), "--load-steps is 0: it must be a whole number from 1 to 100000"),
         ((*OK, "--method", "magic"), "--method is 'magic': it must be one of grid"),
         ((*OK, "--accuracy", 0), "--accuracy is 0.0: it must be a number of at least 1e-10"),

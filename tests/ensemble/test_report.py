@@ -920,21 +920,27 @@ def test_losses_beyond_the_zero_range_limit_are_said(tmp_path):
     sound = aggregate(write(tmp_path / "sound.h5", plan, values))
     least = values["valid_range"].min()
     (sentence,) = (text for text in findings.quality(sound) if "zero-range limit holds" in text)
-    assert f"below {least:.3g} m" in sentence
+    assert f"well below {least:.3g} m" in sentence
     assert not read_status(tmp_path / "sound.h5")["beyond_limit"]
     values["valid_range"][2] = 0.5e-9
     values["valid_range"][3] = np.inf
+    values["touch_range"][5] = 0.4e-9
+    values["edge_range"][7] = 0.3e-9
     values["loss"][6] = 21 * 0.02 * 0.5
     path = write(tmp_path / "r.h5", plan, values)
     data, status = aggregate(path), read_status(path)
-    (warning,) = (text for text in findings.quality(data) if "valid_range is below" in text)
-    assert warning.startswith("WARNING: 2 of 8 losses")
-    assert [row["row"] for row in status["beyond_limit"]] == [2, 6]
-    assert "2 losses are doubtful: valid_range is below 1e-09 m" in as_text(status)
+    (warning,) = (text for text in findings.quality(data) if "touch_range is below" in text)
+    assert warning.startswith("WARNING: 4 of 8 losses")
+    assert [row["row"] for row in status["beyond_limit"]] == [7, 5, 2, 6]
+    told = "4 losses are doubtful: valid_range, edge_range or touch_range is below 1e-09 m"
+    assert told in as_text(status)
+    assert "touch_range 4e-10 m" in as_text(status)
     table = loss_tables.losses(data)
     names = [column.name for column in table.columns]
     shown = [row[names.index("valid_range_least [m]")] for row in table.rows]
     assert shown == pytest.approx([0.5e-9, values["valid_range"][4:].min()])
+    shown = [row[names.index("range_least [m]")] for row in table.rows]
+    assert shown == pytest.approx([0.5e-9, 0.3e-9])
 
 
 def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
@@ -949,12 +955,13 @@ def test_losses_whose_openings_are_beyond_zero_range_are_said(tmp_path):
     assert not read_status(sound)["beyond_limit"]
     values["valid_range"][1] /= 1.02
     values["barrier"][3] = 0.11 * values["loss"][3]
+    values["touch_range"][2] = 0.99 * 0.02 / 1e9
     path = write(tmp_path / "r.h5", plan, values)
     status = read_status(path)
-    assert [row["row"] for row in status["beyond_limit"]] == [1, 3]
-    assert "2 losses are doubtful: the tension inside patches exceeds" in as_text(status)
+    assert [row["row"] for row in status["beyond_limit"]] == [1, 2, 3]
+    assert "3 losses are doubtful: the tension inside patches exceeds" in as_text(status)
     (warning,) = (text for text in findings.quality(aggregate(path)) if "barriers" in text)
-    assert warning.startswith("WARNING: 2 of 4 losses")
+    assert warning.startswith("WARNING: 3 of 4 losses")
 
 
 def test_the_method_of_the_interval_is_the_one_that_was_used(tmp_path, undrawn):

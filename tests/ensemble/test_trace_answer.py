@@ -527,7 +527,7 @@ def test_long_traces_measure_their_doubts_with_fewer_waves() -> None:
     assert sizes["blend 10 %"] == pytest.approx(sizes["cut-off × 4"], rel=0.06)
     assert any(hint.startswith("cut_off") for hint in plan.hints)
     assert any("quick" in hint for hint in plan.hints)
-    assert plan.jobs[0].name == "cut-off × 16"
+    assert plan.jobs[0].name == min(plan.seconds, key=lambda name: plan.seconds[name])
 
 
 def test_what_the_solver_refuses_is_refused_before_any_loop() -> None:

@@ -152,8 +152,8 @@ NUMBERS: dict[str, tuple[Callable[[Any], Any], list[Any], str]] = {
     ),
     "max_penetration": (
         lambda v: loop(max_penetration=v),
-        [0, 1, -0.2, 400],
-        "a number between 0 and 1, both excluded (in units of h_max",
+        [0, 1, -0.2, 400, 1e-15, 5e-324, 1 - 1e-7, np.nextafter(1, 0)],
+        "a positive number from 1e-12 to 0.999999 (in units of h_max",
     ),
     "max_stress": (
         lambda v: loop(method=UNDER_LOAD, max_penetration=None, max_stress=v),
@@ -419,7 +419,7 @@ OTHERS: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
         "run_loops",
         lambda: loops([0.5, 1.5]),
         ValueError,
-        "max_penetration is 1.5: it must be a number between 0 and 1",
+        "max_penetration is 1.5: it must be a positive number from 1e-12 to 0.999999",
     ),
     (
         "run_loops",

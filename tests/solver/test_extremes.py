@@ -43,6 +43,33 @@ def wave_problem(share: float, stiffness: float = np.inf, young: float = 1e6) ->
     return Problem(WAVE, HalfSpace(young, 0.5), share * FULL, Control(stiffness * unit))
 
 
+# ---------------------------------------------------------------------- turning points
+
+
+@pytest.mark.parametrize("name", ["sharp", "grid"])
+def test_shallow_and_deep_loops_tend_to_limits(name):
+    """At first touch alone, and next to full contact, where only the last gap closes further."""
+    problem = Problem(ROUGH, HALF_SPACE, 0.02)
+
+    def loss(max_penetration: float) -> tuple[float, float]:
+        method = make_method(name, problem)
+        loop = run_loop(method, max_penetration=max_penetration, load_steps=6)
+        assert abs(loop.loss - loop.loss_from_drops) < loop.loss_error
+        return loop.loss, loop.loss_error
+
+    for near, nearest in ((1e-6, 1e-12), (1 - 1e-4, 1 - 1e-6)):
+        (one, error), (other, further) = loss(near), loss(nearest)
+        assert abs(one - other) < error + further
+
+
+def test_a_load_that_is_next_to_none_ends():
+    """Unloading by steps that vanish beside the tension at which contact is lost."""
+    problem = wave_problem(1e-3, stiffness=0.0)
+    loop = run_loop(make_method("sharp", problem), max_stress=1e-30, load_steps=6)
+    deep = run_loop(make_method("sharp", problem), max_stress=1e-3, load_steps=6)
+    assert loop.loss == pytest.approx(deep.loss, rel=1e-3)
+
+
 # ---------------------------------------------------------------------- adhesion
 
 

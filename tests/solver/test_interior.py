@@ -23,9 +23,19 @@ from adhesis import (
     single_wave,
 )
 from adhesis.solver.loading.loop_result import strain_warnings
-from adhesis.solver.loading.zero_range import _narrowest_moved, beyond_limit
+from adhesis.solver.loading.zero_range import (
+    TOUCHES,
+    _narrowest_moved,
+    beyond_limit,
+    range_warnings,
+    touch_stress,
+)
+from adhesis.solver.model.control import Control
+from adhesis.solver.model.jump import Jump
 from adhesis.solver.peaks import highest_peaks
+from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.exact_wave import ExactWave
+from adhesis.solver.references.single_wave import SingleWave
 from tests.support.explicit_solution import explicit_openings, explicit_solution
 
 PERIOD = 2e-3
@@ -191,6 +201,7 @@ def test_ranges_keep_the_symmetries_of_the_problem(change, times):
     loop, reference = run_loop(method, max_penetration=0.9, load_steps=20), loop_of(1e8)
     assert loop.valid_range == pytest.approx(times * reference.valid_range, rel=1e-3)
     assert loop.edge_range == pytest.approx(times * reference.edge_range, rel=1e-3)
+    assert loop.touch_range == pytest.approx(times * reference.touch_range, rel=1e-3)
 
 
 def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
@@ -198,6 +209,7 @@ def test_a_stiff_scene_is_doubtful_and_a_soft_one_is_not():
     assert loop_of(1e7).warnings == ()
     stiff = loop_of(1e11, 4)
     range_, loss = stiff.warnings
+    assert stiff.least_range == stiff.valid_range
     assert range_.startswith(f"valid_range is {1e9 * stiff.valid_range:.3g} nm")
     assert "times the work of adhesion of the largest contact" in loss
 
@@ -278,3 +290,83 @@ def test_the_narrowest_length_is_beside_an_edge_that_moves(before, after, narrow
 )
 def test_peaks_stand_out_from_what_lies_beside_them(values, peaks):
     assert highest_peaks(np.array(values, dtype=float), 5) == peaks
+
+
+# ---------------------------------------------------------------------- ranges at edges and touches
+
+
+def dugdale_scene(alpha: float) -> tuple[LoopResult, SingleWave]:
+    """One wave of 1 µm and A = 10 nm, E* = 1 GPa, with zero range and in closed form."""
+    wave = SingleWave.with_alpha(alpha, 1e-8, 1e-6, 1e9)
+    problem = Problem(single_wave(1e-8, 1e-6), HalfSpace(1e9, 0.0), wave.work_of_adhesion)
+    return run_loop(make_method("sharp", problem), max_penetration=0.8, load_steps=20), wave
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.3, 0.5])
+def test_at_half_of_the_least_range_the_exact_loss_is_less_than_a_tenth_off(alpha):
+    loop, wave = dugdale_scene(alpha)
+    assert loop.valid_range == math.inf
+    assert loop.least_range < math.inf
+    exact = DugdaleWave(wave, 0.5 * loop.least_range).loss
+    assert exact == pytest.approx(wave.loop.loss, rel=0.1)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.3, 0.5])
+def test_at_the_touch_range_the_exact_loss_is_a_hundredth_less(alpha):
+    loop, wave = dugdale_scene(alpha)
+    exact = DugdaleWave(wave, loop.touch_range).loss
+    assert 1 - exact / wave.loop.loss == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_single_wave_whose_touches_come_earlier_is_doubtful():
+    """α = 0.3: its loss is 22 % less at a range of 1 nm."""
+    loop, wave = dugdale_scene(0.3)
+    assert loop.touch_range < 1e-10
+    (doubt,) = (text for text in loop.warnings if "zero-range limit" in text)
+    assert doubt.startswith(f"touch_range is {1e9 * loop.touch_range:.3g} nm")
+    exact = DugdaleWave(wave, 1e-9).loss
+    assert exact / wave.loop.loss == pytest.approx(0.784, abs=2e-3)
+
+
+def test_a_range_of_adhesion_longer_than_edges_or_touches_allow_is_doubtful():
+    loop, _ = dugdale_scene(0.3)
+    gamma = loop.problem.work_of_adhesion
+    for share, doubtful in ((0.9, False), (1.1, True)):
+        problem = replace(loop.problem, strength=gamma / (share * loop.least_range))
+        found = range_warnings(
+            *(problem, math.inf, loop.loss, loop.contact_fraction),
+            *(loop.edge_range, loop.touch_range),
+        )
+        assert len(found) == doubtful
+        marked = beyond_limit(
+            *(math.inf, loop.loss, gamma, loop.largest_contact_fraction),
+            *(problem.strength, 0.0, loop.edge_range, loop.touch_range),
+        )
+        assert bool(marked) == doubtful
+
+
+def test_the_touch_range_is_that_of_all_jumps_in_which_a_gap_closes():
+    loop = loop_of(1e8)
+    before = loop.states_before_jumps()
+    change = np.abs(np.diff(loop.mean_stress))
+    touches = [
+        change[k] for jump, k in zip(loop.jumps, before, strict=True) if jump.kind in TOUCHES
+    ]
+    assert len(touches) > 1
+    assert loop.touch_range == pytest.approx(0.01 * loop.loss / sum(touches))
+    numbers = loop.numbers()
+    ranges = [numbers[name] for name in ("valid_range", "edge_range", "touch_range")]
+    assert loop.least_range == min(ranges)
+    assert f"less than {1e9 * min(ranges):.3g} nm (tension" in loop.range_summary()
+
+
+def test_a_soft_control_moves_the_touches_by_what_it_gives():
+    """With a spring k the touch comes sooner by dx/ds; under a load first touch moves nothing."""
+    states = np.array([2.0, 1.0, 0.9]), np.array([0.0, 0.5, 0.7]), np.array([1, 1, 2])
+    jump = Jump("loading", 1.0, 1.0, "snap-in", 1, 2, 0.1, 0.2, 1.0)
+    assert touch_stress([jump], [1], *states, Control()) == pytest.approx(0.2)
+    spring = touch_stress([jump], [1], *states, Control(2.0))  # x = s - p/k: 1.25 of s
+    assert spring == pytest.approx(1.25 * 0.2)
+    assert touch_stress([jump], [1], *states, Control(0.0)) == pytest.approx(0.5 * 0.1)
+    free = np.array([1.0, 1.0]), np.array([0.0, 0.0]), np.array([0, 1])
+    assert touch_stress([jump], [0], *free, Control(0.0)) == 0

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from adhesis import self_affine_profile, single_wave
+from adhesis.solver.references.dugdale_wave import DugdaleWave
 from adhesis.solver.references.full_contact import full_contact_energy, full_contact_stress
 from adhesis.solver.references.parabola import parabola_load, parabola_pull_off
 from adhesis.solver.references.periodic_punch import pull_off_stress
@@ -169,3 +170,60 @@ def test_parabola_load_solves_the_integral_equation(a):
     radius, gamma = 2.5, 0.05
     solved = solved_load(lambda x: x / radius, a, gamma)
     assert float(parabola_load(a, radius, MODULUS, gamma)) == pytest.approx(solved, rel=1e-10)
+
+
+# ---------------------------------------------------------------------- Dugdale's wave
+
+
+@pytest.mark.parametrize(
+    ("alpha", "ratios"),
+    [
+        (0.1, [0.949, 0.550, 0.0, 0.0]),
+        (0.3, [0.982, 0.902, 0.784, 0.398]),
+        (0.5, [0.988, 0.938, 0.871, 0.722]),
+    ],
+)
+def test_losses_of_a_finite_range_are_those_of_another_computation(alpha, ratios):
+    """Loss over that of zero range at δ/A = 0.01, 0.05, 0.1 and 0.2, computed apart."""
+    wave = SingleWave.with_alpha(alpha, 1e-6, 1e-3, MODULUS)
+    losses = [DugdaleWave(wave, share * 1e-6).loss for share in (0.01, 0.05, 0.1, 0.2)]
+    np.testing.assert_allclose(np.array(losses) / wave.loop.loss, ratios, atol=2e-3)
+
+
+def test_the_gap_has_its_range_where_the_zone_ends_and_no_stress_is_singular():
+    """By the displacement of all stresses of a state, over the periodic logarithmic kernel."""
+    wave = SingleWave.with_alpha(0.3, 1e-3, 1.0, MODULUS)
+    dugdale, a = DugdaleWave(wave, 5e-5), 0.1
+    c, (separation, mean) = dugdale.zone_end(a), dugdale.state(a)
+    n = 1 << 15
+    x = (np.arange(n) + 0.5) / n - 0.5
+    # the stress in contact follows from the displacement there; here by least squares on a grid
+    q = np.fft.rfftfreq(n, 1 / n)
+    symbol = np.zeros(q.size)
+    symbol[1:] = 2 / (MODULUS * 2 * np.pi * q[1:])
+    inside = np.abs(x) < a
+    zone = (np.abs(x) < c) & ~inside
+    fixed = np.where(zone, -wave.work_of_adhesion / 5e-5, 0.0)
+    height = 1e-3 * np.cos(2 * np.pi * x)
+
+    def displaced(stress):
+        return np.fft.irfft(symbol * np.fft.rfft(stress), n)
+
+    target = (height - separation - displaced(fixed))[inside]
+    stress, rest = np.zeros(n), target.copy()
+    way = np.zeros(n)
+    way[inside] = rest
+    square = rest @ rest
+    for _ in range(400):  # conjugate gradients
+        pushed = displaced(way)[inside]
+        step = square / (way[inside] @ pushed)
+        stress += step * way
+        rest -= step * pushed
+        square, before = rest @ rest, square
+        way[inside] = rest + square / before * way[inside]
+        if square < 1e-24 * (target @ target):
+            break
+    total = stress + fixed
+    assert total.mean() == pytest.approx(mean, rel=1e-2)
+    gap = displaced(total) - height + separation
+    assert np.interp(c, x, gap) == pytest.approx(5e-5, rel=1e-2)

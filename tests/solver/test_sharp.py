@@ -198,7 +198,7 @@ def test_almost_closed_gaps():
 
 @pytest.mark.parametrize("penetration", [1.0, 1.2, np.nan])
 def test_no_state_at_full_penetration(penetration):
-    with pytest.raises(ValueError, match="between 0 and 1"):
+    with pytest.raises(ValueError, match=r"from 1e-12 to 0.999999 \(in units of h_max"):
         loop(rough(), 0.01, max_penetration=penetration)
 
 

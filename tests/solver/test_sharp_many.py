@@ -9,6 +9,7 @@ import pytest
 
 from adhesis import HalfSpace, Problem, self_affine_profile
 from adhesis.solver.loading.loop import run_loop
+from adhesis.solver.loading.loop_result import LoopResult
 from adhesis.solver.sharp.descent.gradient_flow import NO_FIELD
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
@@ -30,7 +31,12 @@ from adhesis.solver.sharp.field.edge_derivatives import derivatives
 from adhesis.solver.sharp.field.exterior import NO_EXTERIOR
 from adhesis.solver.sharp.field.hierarchical_solver import solve_many
 from adhesis.solver.sharp.field.separate_gaps import solve_separately
-from adhesis.solver.sharp.field.solution import FIXED_SEPARATION, FieldModel, LoadingDevice
+from adhesis.solver.sharp.field.solution import (
+    FIXED_SEPARATION,
+    FieldModel,
+    LoadingDevice,
+    no_solution,
+)
 from adhesis.solver.sharp.field.tree_factor import (
     downward_pass,
     factor_tree,
@@ -43,6 +49,7 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.gap.quadrature import GAUSS_RULES, choose_orders
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.method import SharpMethod
+from adhesis.solver.sharp.system import hierarchical as many_gaps
 from adhesis.solver.sharp.system.hierarchical import HierarchicalSystem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.system.window_descent import descend_in_window
@@ -664,3 +671,25 @@ def test_windows_are_let_go_without_a_search_for_circles(profile):
         gc.enable()
     assert loop.patches.max() > 6
     assert alive <= 2
+
+
+def test_a_fold_whose_window_has_no_solution_is_solved_with_all_gaps(profile, monkeypatch):
+    """As in steep profiles, where the exterior's linear response leaves the window none."""
+
+    def loop() -> LoopResult:
+        method = SharpMethod(Problem(profile, HalfSpace(1e6, 0.5), 0.01), accuracy=1e-2)
+        method.edges.many = 4
+        return run_loop(method, max_penetration=0.5, load_steps=4)
+
+    def unsolved(gaps, prescribed, orders, fields, model, exterior):
+        return no_solution(map_gaps(gaps), orders, model.device)
+
+    whole = loop()
+    monkeypatch.setattr(many_gaps, "solve", unsolved)
+    assert loop().loss == pytest.approx(whole.loss, rel=1e-6)
+
+
+def test_edges_without_a_field_have_no_response():
+    device = LoadingDevice(1.0, 0.0)
+    with pytest.raises(FloatingPointError, match="not positive definite"):
+        respond_at_fixed_edges(no_solution(np.ones((1, 6)), np.ones(1, dtype=np.int64), device))

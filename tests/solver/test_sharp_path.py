@@ -164,7 +164,7 @@ def test_vanishing_adhesion_ends_and_tells_what_it_misses():
     )
     assert abs(fair.audit_residual) < 1e-3
     assert fair.loss_error < 1e-3 * fair.loss
-    assert fair.warnings == ()
+    assert all("nm" in text for text in fair.warnings)  # only so short a range of adhesion
     for result in (fair, faint):
         assert min(jump.energy_drop for jump in result.jumps) > 0
         assert abs(result.loss - result.loss_from_drops) < result.loss_error

@@ -32,11 +32,11 @@ def places(of: Nucleation, overlaps: list[float]) -> list[float]:
     return [touch.theta for touch in of.choose_seeds(Minima(theta, opening, curvature))]
 
 
-def test_the_deepest_place_gets_a_patch_and_those_that_equal_it() -> None:
+def test_the_deepest_place_gets_a_patch_and_of_equal_ones_the_first_from_the_crest_on() -> None:
     adhesive = nucleation(0.01)
     assert places(adhesive, [1e-3, 2e-3]) == []
     assert places(adhesive, [-1e-5, -3e-5, 1e-3, -2e-5]) == [1]
-    assert places(adhesive, [-3e-5, -3e-5, -2e-5]) == [0, 1]
+    assert places(adhesive, [-3e-5, -3e-5, -2e-5]) == [0]  # the crest is at θ = 0
     # Without adhesion nothing runs, so that the order does not matter.
     assert places(nucleation(0.0), [-1e-2, -3e-2, 1.0, -2e-2]) == [0, 1, 3]
 

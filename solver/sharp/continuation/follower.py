@@ -9,11 +9,13 @@ import numpy as np
 
 from adhesis.solver.crack import MOST_OPENINGS, Crack
 from adhesis.solver.model.contact_state import ContactState
+from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.branch import Branch, Target
 from adhesis.solver.sharp.continuation.events import Accepted, Fold
 from adhesis.solver.sharp.continuation.history import ComputedJump, History
 from adhesis.solver.sharp.continuation.jump import Jumps, Orders
 from adhesis.solver.sharp.continuation.resolution import Resolution
+from adhesis.solver.sharp.descent.saddle import positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.griffith import step_limits
 from adhesis.solver.sharp.errors import NoState
@@ -27,6 +29,7 @@ from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
 from adhesis.solver.sharp.output.contact_states import BranchData, ContinuationData, States
 from adhesis.solver.sharp.tolerances import (
+    EQUAL_AMPLITUDES,
     LATE_REFINEMENT,
     LEAST_REFINEMENT,
     SAME_BRANCH,
@@ -304,7 +307,7 @@ class Follower:
         response = system.response_before_fold(point)
         before = self.states.at_fixed_edges(last, point.field, response, fold.at)
         jump = self.jumps.compute(
-            before, point.field.gaps, fold.at, target.branch, known=point,
+            before, self._start_at_fold(fold), fold.at, target.branch, known=point,
             orders=self._orders_of_folds(fold),
         )  # fmt: skip
         after = jump.states[-1]
@@ -328,15 +331,33 @@ class Follower:
         displaced = abs(self.edges.system(point.gaps).fold_displacement(point))
         if two.apart > max(self.resolution.order, SECOND_FOLD_DISPLACED * displaced):
             return None
-        way = fold.at - point.at
-        furthest = max(fold.at, two.beyond) if way > 0 else min(fold.at, two.beyond)
-        longest = step_limits(map_gaps(point.gaps), self.edges.longest_step)
-        starts = []
-        for edge in two.edges:
-            motion = np.zeros(point.gaps.size)
-            motion[edge] = math.copysign(longest[edge], point.rate[edge] * way)
-            starts.append(point.gaps + (outward(point.gaps) * motion).reshape(-1, 2))
-        return Orders(furthest, tuple(starts))
+        furthest = max(fold.at, two.beyond) if fold.at > point.at else min(fold.at, two.beyond)
+        longest = self.edges.longest_step
+        return Orders(furthest, tuple(self._moved_on(fold, edge, longest) for edge in two.edges))
+
+    def _start_at_fold(self, fold: Fold) -> Array:
+        """Return the edges from which a descent at a fold starts.
+
+        Of edges that are mirror images in a state that is its own image, one is moved on a little:
+        the first to the right of the highest crest. If they hold each other back, it goes first, as
+        one does in any other profile; if they help each other, they go together all the same.
+        """
+        point = fold.point
+        if not self.jumps.mirror.is_symmetric(point.gaps):
+            return point.gaps
+        rate = np.abs(point.rate)
+        fastest = np.flatnonzero(rate >= EQUAL_AMPLITUDES * rate.max())
+        away = positions(map_gaps(point.gaps), self.edges.law.origin)[fastest]
+        return self._moved_on(fold, int(fastest[np.argmin(away)]), self.edges.law.rest_step)
+
+    def _moved_on(self, fold: Fold, edge: int, length: float) -> Array:
+        """Return the gaps before a fold, one edge moved on by a length in θ or its limit."""
+        point = fold.point
+        longest = step_limits(map_gaps(point.gaps), length)
+        motion = np.zeros(point.gaps.size)
+        motion[edge] = math.copysign(longest[edge], point.rate[edge] * (fold.at - point.at))
+        moved: Array = point.gaps + (outward(point.gaps) * motion).reshape(-1, 2)
+        return moved
 
     def _early_closure_error(self, before: ContactState, point: Point, way: float) -> float:
         """Bound the work in J/m² that a loop under a load misses, as it is closed before the fold.

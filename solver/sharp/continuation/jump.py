@@ -11,7 +11,7 @@ from adhesis.solver.method import ContactState
 from adhesis.solver.model.jump import Branch
 from adhesis.solver.model.profile import Array
 from adhesis.solver.sharp.continuation.history import ComputedJump
-from adhesis.solver.sharp.continuation.races import RaceCheck
+from adhesis.solver.sharp.continuation.races import MirrorCheck, RaceCheck
 from adhesis.solver.sharp.descent.track import Track
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.errors import FullContact, NoState
@@ -59,6 +59,8 @@ class Jumps:
     def __init__(self, edges: EdgeMechanics, nucleation: Nucleation, states: States) -> None:
         self.edges, self.nucleation, self.states = edges, nucleation, states
         self.races = RaceCheck(edges)
+        profile = states.problem.profile
+        self.mirror = MirrorCheck(edges, profile.q0 * profile.mirror_axes)
 
     def compute(
         self,
@@ -76,7 +78,8 @@ class Jumps:
         The gaps are those of a ``known`` equilibrium, or nearly, or with cracks in its patches;
         ``barrier`` is that of these. The point of the result is the minimum as it was found: next
         to a fold it may not be found again from its own edges. The jump raced, too, if another of
-        two events that may come in either of ``orders`` leads elsewhere in the end.
+        two events that may come in either of ``orders`` leads elsewhere in the end, or if it ends
+        on one of two sides that are mirror images.
         """
         rivals: list[Rival] = []
         point = self._descend(start, at, touches or [], rivals, known)
@@ -97,6 +100,9 @@ class Jumps:
             at_stake = 0.0
         except NoState:  # a comparison that does not come to rest is no failure of the path
             pass
+        left = start if known is None else known.gaps
+        if at_stake is None and point is not None and self.mirror.is_broken(left, point.gaps):
+            at_stake = 0.0
         jump = self.states.jump(before, after, branch, at_stake, barrier)
         return ComputedJump(at, (after,), jump, point, known)
 

@@ -47,7 +47,8 @@ def step_off_saddle(
     """Choose the step from edges without force: off a saddle, or ``step`` where they are stable.
 
     Both directions are tried by linear kinetics. The one on which energy falls more is taken,
-    of equal ones the outward one. Also returns the number of fields.
+    of equal ones the outward one. Where energy rises on both, half the step is tried: just beyond a
+    pitchfork the minima beside the saddle are near. Also returns the number of fields.
     """
     if equal_speeds:
         if is_definite(model.matrix):
@@ -57,11 +58,15 @@ def step_off_saddle(
         return step, 0
     order = positions(map_gaps(gaps), problem.law.origin)
     way = leaving_step(model.values, model.matrix, model.limit, order)
-    onwards = slope_along(move_edges(gaps, way), way, prescribed, orders, problem)
-    backwards = slope_along(move_edges(gaps, -way), -way, prescribed, orders, problem)
-    if not max(onwards, backwards) > 0:
-        return step, 2
-    return (way if onwards >= backwards * (1 - EQUAL_GAINS) else -way), 2
+    tried = 0
+    while np.abs(way).max() >= problem.law.rest_step:
+        onwards = slope_along(move_edges(gaps, way), way, prescribed, orders, problem)
+        backwards = slope_along(move_edges(gaps, -way), -way, prescribed, orders, problem)
+        tried += 2
+        if max(onwards, backwards) > 0:
+            return (way if onwards >= backwards * (1 - EQUAL_GAINS) else -way), tried
+        way = 0.5 * way
+    return step, tried
 
 
 @compiled

@@ -94,7 +94,8 @@ class FixedEdgeResponse(NamedTuple):
 
 
 def respond_at_fixed_edges(solution: Solution) -> FixedEdgeResponse:
-    """Differentiate a solution by d, at fixed edges."""
+    """Differentiate a solution by d, at fixed edges; FloatingPointError if there is none."""
+    check_definite(solution)
     pressure = -2 * np.pi / float(solution.mean.resistance)
     separation = -float(solution.mean.unit_mean) * pressure / (2 * np.pi)
     unit = np.ascontiguousarray(-pressure * solution.solved[:, 1:2])

@@ -142,7 +142,7 @@ class Nucleation:
         Gaps as they were when they were last searched; set by a caller that continues from another
         state.
     equal : float
-        Touches whose clearances differ by less nucleate together, in units of 1/q0.
+        Touches whose clearances differ by less are equal, in units of 1/q0.
     tolerance : float
         Overlap that is allowed in a state, in units of 1/q0.
     """
@@ -164,12 +164,13 @@ class Nucleation:
     def first_touch(self) -> tuple[float, list[Touch]]:
         """Return the separation q0 s at which the first seeds are put, and the touches.
 
-        These are at every crest as high as the highest.
+        These are at the highest crest (:meth:`Profile.first_of_equal`).
         """
         profile = self.problem.profile
         crests = profile.crests()
-        curvature = crests.curvature / profile.q0
-        theta = crests.position * profile.q0
+        chosen = self._choose(crests.position)
+        curvature = crests.curvature[chosen] / profile.q0
+        theta = crests.position[chosen] * profile.q0
         highest = [Touch(float(a), 0.0, float(c)) for a, c in zip(theta, curvature, strict=True)]
         overlap = float(self.clearance(np.zeros_like(curvature), curvature).max())
         return profile.h_max * profile.q0 - overlap, highest
@@ -179,17 +180,25 @@ class Nucleation:
         return clearances(opening, curvature, self._lengths)
 
     def choose_seeds(self, minima: Minima) -> list[Touch]:
-        """Choose the touch of the largest overlap, and those that equal it."""
+        """Choose the touch of the largest overlap; of equal ones, one and its copies."""
         over = self.clearance(minima.opening, minima.curvature)
         least = float(over.min(initial=np.inf))
         if least > 0:
             return []
         # without adhesion patches come and go smoothly, in any order
         equal = self.equal if self.edges.critical > 0 else np.inf
+        deepest = np.flatnonzero(over <= min(least + equal, 0.0))
+        deepest = deepest[self._choose(minima.theta[deepest] / self.problem.profile.q0)]
         return [
             Touch(float(minima.theta[i]), float(minima.opening[i]), float(minima.curvature[i]))
-            for i in np.flatnonzero(over <= min(least + equal, 0.0))
+            for i in deepest
         ]
+
+    def _choose(self, position: Array) -> Integers:
+        """Choose those of equal touches at which contact begins; without adhesion all."""
+        if self.edges.critical > 0:
+            return self.problem.profile.first_of_equal(position)
+        return np.arange(len(position))
 
     def minimum(self, field: GapField) -> tuple[float, Minima]:
         """Return the least clearance of a field, and the minima of the gaps that may have closed.

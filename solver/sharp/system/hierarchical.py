@@ -94,22 +94,27 @@ class HierarchicalSystem(EdgeSystem):
         return point.fold_displacement(change, response.opening[:count], near.edges)
 
     def _solve_next_to_fold(self, point: Point) -> SolutionNextToFold:
-        """Solve the gaps around the fastest edge, more accurately; all gaps if others may fold."""
+        """Solve the gaps around the fastest edge, more accurately; all gaps if others may fold.
+
+        All gaps, too, where the others leave the window no solution.
+        """
         if self._next_to_fold is None or self._next_to_fold.point is not point:
-            self._problem.count.fields += 1
             window = self.start(point).window(point.gaps)
-            edges: Integers
-            if window is None or not window.exterior_is_stable:
-                solution = self.solution(point.gaps, point.at, FINER_FIELD, 1)
-                edges = np.arange(point.gaps.size)
-            else:
+            solution = None
+            if window is not None and window.exterior_is_stable:
                 model, orders = self._accuracy(window.gaps, FINER_FIELD)
                 orders[-1] = 0
+                self._problem.count.fields += 1
                 solution = solve(
                     window.gaps, point.at, np.maximum(orders, window.orders), 1, model,
                     window.exterior,
                 )  # fmt: skip
-                edges = np.add.outer(2 * window.inside, np.arange(2)).ravel()
+                edges: Integers = np.add.outer(2 * window.inside, np.arange(2)).ravel()
+            # In steep profiles the exterior's linear response may leave the window no solution.
+            if solution is None or not math.isfinite(solution.pressure):
+                self._problem.count.fields += 1
+                solution = self.solution(point.gaps, point.at, FINER_FIELD, 1)
+                edges = np.arange(point.gaps.size)
             self._next_to_fold = SolutionNextToFold(point, solution, edges)
         return self._next_to_fold
 

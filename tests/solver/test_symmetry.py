@@ -1,0 +1,98 @@
+"""Mirror-symmetric profiles: their loops are those of profiles that are hardly asymmetric."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesis import HalfSpace, Problem, Profile, make_method, run_loop
+from adhesis.solver.loading.loop_result import LoopResult
+from tests.support.grids import grid_of
+
+SOFT = HalfSpace(1e6, 0.5)
+SHIFT = np.exp(1e-7j)
+
+
+def bumpy(wave: int, amplitude: float, shift: complex = 1.0) -> Profile:
+    """One wave of 1 mm with a small one on it, E* = 1 and q0 = 1."""
+    coefficients = np.zeros(wave + 1, dtype=complex)
+    coefficients[1], coefficients[wave] = 5e-4, amplitude / 2 * shift
+    return Profile(2 * np.pi, coefficients)
+
+
+def loop_of_bumps(wave: int, amplitude: float, gamma: float, shift: complex = 1.0) -> LoopResult:
+    problem = Problem(bumpy(wave, amplitude, shift), HalfSpace(1.0, 0.0), gamma)
+    method = make_method("sharp", problem, accuracy=1e-4)
+    return run_loop(method, max_penetration=0.8, load_steps=30)
+
+
+@pytest.mark.parametrize(
+    ("wave", "amplitude", "gamma"), [(8, 6e-5, 3e-6), (12, 3e-5, 2e-6)], ids=["8", "12"]
+)
+def test_a_symmetric_state_is_left_where_its_antisymmetric_mode_softens(wave, amplitude, gamma):
+    """On one patch that rocks from bump to bump; 1.2e-4 and 9e-5 apart where it was held."""
+    symmetric = loop_of_bumps(wave, amplitude, gamma)
+    shifted = loop_of_bumps(wave, amplitude, gamma, SHIFT)
+    assert abs(symmetric.loss - shifted.loss) < symmetric.loss_error
+    assert symmetric.method.newton_steps < 2 * shifted.method.newton_steps
+    # which side it takes is a convention: a race whose other end has the same energy
+    assert symmetric.races > 0
+    assert symmetric.energy_at_stake == pytest.approx(0.0, abs=1e-9 * symmetric.loss)
+
+
+def even_profile(seed: int) -> tuple[Profile, Profile, float, float]:
+    """Draw an even profile of 2 to 24 waves, the same with one phase shifted, γ, and Δ~max."""
+    rng = np.random.default_rng(seed)
+    waves = int(np.round(2 * 12 ** rng.uniform()))
+    m = np.arange(1, waves + 1)
+    amplitude = np.append(0.0, m ** -rng.uniform(0.7, 1.4) * rng.choice([-1, 1], waves))
+    amplitude *= 1e-6 / np.sqrt(2 * np.sum(amplitude**2))
+    unit = SOFT.modulus * 1e-12 * 2 * np.pi / 2e-3
+    gamma, depth = 10 ** rng.uniform(-2, 0) * unit, rng.uniform(0.3, 0.95)
+    shifted = amplitude.astype(complex)
+    shifted[rng.integers(2, waves + 1)] *= SHIFT
+    return Profile(2e-3, amplitude.astype(complex)), Profile(2e-3, shifted), gamma, depth
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_random_symmetric_profile_loses_what_one_hardly_asymmetric_does(seed, accuracy):
+    """Of touches and folds that are mirror images one comes first, in both."""
+    even, shifted, gamma, depth = even_profile(seed)
+    one, other = (
+        run_loop(
+            make_method("sharp", Problem(profile, SOFT, gamma), accuracy=accuracy),
+            max_penetration=depth,
+            load_steps=10,
+        )
+        for profile in (even, shifted)
+    )
+    assert abs(one.loss - other.loss) < one.loss_error
+    assert one.method.newton_steps < 2 * other.method.newton_steps
+
+
+def test_grid_takes_mirror_images_one_after_the_other_too():
+    """Two outer crests of one height, which touch at once; the trough between them stays open."""
+    profile = Profile(2e-3, np.array([0, 1e-7, -4e-7, -1e-7], dtype=complex))
+    assert len(profile.crests().position) == 2
+    problem = Problem(profile, SOFT, 2e-4)
+    sharp, grid = (
+        run_loop(method, max_penetration=0.5, load_steps=10)
+        for method in (make_method("sharp", problem), grid_of(problem, nodes=1024))
+    )
+    for loop in (sharp, grid):
+        assert loop.jumps[0].patches_after == 1
+    assert sharp.jumps[0].raced
+    assert abs(grid.loss - sharp.loss) < grid.loss_error + sharp.loss_error
+
+
+def test_axes_and_equal_parts_of_a_profile():
+    even = bumpy(8, 6e-5)
+    assert even.mirror_axes.tolist() == [0.0]
+    shifted = even.shifted(0.3)
+    np.testing.assert_allclose(shifted.mirror_axes, [0.3])
+    assert len(bumpy(8, 6e-5, np.exp(0.1j)).mirror_axes) == 0
+    assert (even.equal_parts, Profile(1.0, np.array([0, 0, 0, 0, 1e-6, 0, 1e-7])).equal_parts) == (
+        1,
+        2,
+    )
