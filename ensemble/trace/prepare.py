@@ -181,7 +181,7 @@ def prepare_trace(
         Keep spikes.
     invert : bool
         Change the sign of the heights, for an instrument whose z points into the sample.
-    exclude : sequence of pairs
+    exclude : sequence of pairs, shape (k, 2)
         Ranges that are treated as drop-outs of any length: begin and end in m, from the first
         point of the trace, as in ``[(1.2e-3, 1.3e-3)]``.
 
