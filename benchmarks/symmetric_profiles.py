@@ -62,7 +62,9 @@ def run(drawn: Scene, profile: Profile, accuracy: float) -> tuple[LoopResult, fl
 
 def main() -> None:
     """Print a row for each profile and accuracy, and how many are beyond either bound."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = argparse.ArgumentParser(
+        description=__doc__.splitlines()[0] if __doc__ else None, allow_abbrev=False
+    )
     parser.add_argument("--profiles", type=int, default=40)
     profiles = parser.parse_args().profiles
     run(scene(0), scene(0).even, 1e-2)  # compile

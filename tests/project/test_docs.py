@@ -414,7 +414,8 @@ def test_exit_codes_stand_in_one_place_and_are_those_of_run() -> None:
         }
         for page in PAGES
     }
-    codes = {run.DONE, run.SOME_FAILED, run.BAD_INPUT, run.OUR_ERROR, run.WRITE_FAILED, run.RESUME}
+    codes = {run.DONE, run.SOME_FAILED, run.BAD_INPUT, run.OUR_ERROR, run.TOO_FEW_RESOURCES}
+    codes |= {run.WRITE_FAILED, run.RESUME}
     signals = {launch.KILLED, INTERRUPTED, TERMINATED}
     assert tables.pop("docs/troubleshooting.md") == codes | signals
     assert [name for name, reported in tables.items() if run.RESUME in reported] == []
