@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 from setuptools import setup
 from setuptools.command.build_py import build_py
 from setuptools.command.sdist import sdist
+
+# Said before pip looks for packages, whose versions for an older Python fill a screen.
+if sys.version_info < (3, 11):  # noqa: UP036  # pip runs this file before it checks the version
+    sys.exit(
+        "Python 3.11 or newer is needed, and this is Python "
+        f"{sys.version_info[0]}.{sys.version_info[1]}: make .venv with a newer one, as in "
+        "python3.12 -m venv .venv"
+    )
 
 ROOT = Path(__file__).resolve().parent
 

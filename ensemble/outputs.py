@@ -290,10 +290,16 @@ def write_netcdf(path: Path, dataset: xr.Dataset) -> None:
 
 
 @contextmanager
-def staged_folder(folder: Path) -> Iterator[Path]:
+def staged_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
     """Make a folder and one inside it to write files into, which are then moved to their place.
 
     If the writing fails, none of the files is moved, and older ones of the same names stay.
+
+    Parameters
+    ----------
+    folder : Path
+    names : iterable of str
+        Names that the writer uses: an older file of one that is not written now is removed.
 
     Raises
     ------
@@ -304,8 +310,11 @@ def staged_folder(folder: Path) -> Iterator[Path]:
     staging = Path(tempfile.mkdtemp(dir=folder, prefix=".writing-"))
     try:
         yield staging
-        for path in sorted(staging.iterdir()):
+        written = sorted(staging.iterdir())
+        for path in written:
             os.replace(path, folder / path.name)
+        for name in set(names) - {path.name for path in written}:
+            (folder / name).unlink(missing_ok=True)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 

@@ -229,6 +229,12 @@ missing_system_packages() {
 }
 
 # Python first: what needs no MPI goes on while the rest is installed.
+needed="Python 3.11 or newer is needed"
+if ! find_python; then
+    here=$("${PYTHON:-python3}" -V 2>/dev/null) && needed+=", and ${PYTHON:-python3} is $here"
+    if [ -n "${PYTHON:-}" ] || ! can_apt; then die "$needed (say which with PYTHON=…)"; fi
+    say "$needed: trying apt-get"
+fi
 wanted=
 if can_apt; then missing_system_packages; fi
 for name in $wanted; do
@@ -245,7 +251,7 @@ if [ -n "${others:-}" ]; then
     if find_python && has_venv; then begin_tools; fi
     finish system || warn "apt-get could not install$others (see .setup/system.log)"
 fi
-find_python || die "Python 3.11 or newer is missing (say which with PYTHON=…)"
+find_python || die "$needed (say which with PYTHON=…)"
 has_venv || die "the venv module of $python is missing (Debian: apt-get install python3-venv)"
 if [ -z "${pid[tools]:-}" ]; then begin_tools; fi
 

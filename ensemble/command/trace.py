@@ -14,15 +14,11 @@ from adhesis.ensemble.reporter import StatusLine
 from adhesis.ensemble.trace.answer import NoAnswer, check, document, make_cycle, run_plan
 from adhesis.ensemble.trace.loops import Loops
 from adhesis.ensemble.trace.options import prepared_of, trace_of, what_was_read
+from adhesis.ensemble.trace.page_files import FIGURE_FILES, FILES
 from adhesis.ensemble.trace.variants import Plan, make_plan
 from adhesis.solver.model.half_space import HalfSpace
 
 _SECONDS_BETWEEN_LINES = 10.0
-_FIGURES = ("trace", "spectrum", "loop", "cut-off", "tables")
-_FILES = (
-    *("trace.json", "trace.html", "trace.md"),
-    *(f"{name}.{suffix}" for name in _FIGURES for suffix in ("png", "pdf")),
-)
 
 
 def execute(args: argparse.Namespace) -> int:
@@ -44,7 +40,7 @@ def execute(args: argparse.Namespace) -> int:
             args.adhesion_range, args.strength, at_preload=turns.are_preloads, latest=turns.latest,
         )  # fmt: skip
     if args.to is not None:
-        check_output_folder("--to", args.to, _FILES, {"the command": args.file})
+        check_output_folder("--to", args.to, FILES, {"the command": args.file})
     prepared = prepared_of(args, trace_of(args, args.file))
     source = input_record(args.file)
     with refused_as_input(vars(args)):
@@ -73,7 +69,10 @@ def execute(args: argparse.Namespace) -> int:
         numbers = document(answer)
         numbers["provenance"] = provenance(args.words, source, None, numbers)
         write_json(args.to / "trace.json", numbers)
-    with writing.output("--to", args.to / "trace.html"), staged_folder(args.to) as folder:
+    with (
+        writing.output("--to", args.to / "trace.html"),
+        staged_folder(args.to, FIGURE_FILES) as folder,
+    ):
         write_page(answer, folder)
     print(summary(answer))
     if not writing.failures:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from adhesis.ensemble.errors import parameter
 from adhesis.ensemble.quantities import length_text, with_error
 from adhesis.ensemble.reporter import bar
 from adhesis.ensemble.trace.loops import Loops, Result, Watch
 from adhesis.ensemble.trace.prepare import Prepared
-from adhesis.ensemble.trace.variants import Cycle, Plan, default_tables, make_plan
+from adhesis.ensemble.trace.variants import Cycle, Plan, Run, default_tables, make_plan
 from adhesis.solver import views
 from adhesis.solver.checks import (
     ACCURACY,
@@ -74,6 +76,10 @@ _SHORTER_WAVES = {
     "tip": "a sharper tip would resolve shorter waves",
     "given": "the trace holds shorter waves than the cut-off that was given",
 }
+# Groups of the loops with another decision about the trace.
+_DECISIONS = (*DOUBTS, "single features")
+# One patch that carries all contact is that of a single crest up to this share of the period.
+_ONE_PATCH = 0.25
 # The longest cut-offs are drawn, and no doubts.
 _FOR_THE_FIGURE = ("cut-off × 16", "cut-off × 8", "cut-off × 4", "cut-off × 2")
 
@@ -108,6 +114,26 @@ class Quantity:
     def relative(self) -> float:
         """Half-width of the interval over the value."""
         return self.uncertainty / abs(self.value) if self.value else 0.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """Change of the loss by one loop.
+
+    Attributes
+    ----------
+    run : Run
+    factor : float
+        Its loss over that of the loop with which it is compared; 0 if it loses nothing.
+    """
+
+    run: Run
+    factor: float
+
+    @property
+    def size(self) -> float:
+        """Absolute logarithm of the factor."""
+        return abs(math.log(self.factor)) if self.factor > 0 else math.inf
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -229,6 +255,24 @@ class Answer(ByValue):
         names = [run.name for run in self.plan.runs if run.group not in tables]
         found = (self.result(name) for name in names)
         return [one for one in found if one is not None]
+
+    @property
+    def largest_changes(self) -> tuple[Change, ...]:
+        """The decision about the trace that changes the loss most.
+
+        If it is a longer cut-off, the one of the other decisions that does so follows. A mirror
+        image does not count: it is another body.
+        """
+        changes = []
+        for run in self.plan.runs:
+            change = self.change(run.name)
+            if run.group in _DECISIONS and change is not None:
+                changes.append(Change(run, max(1 + change, 0.0)))
+        changes.sort(key=lambda change: -change.size)
+        others = [change for change in changes[1:] if change.run.group != "cut-off"]
+        if changes and changes[0].run.group == "cut-off":
+            return (changes[0], *others[:1])
+        return tuple(changes[:1])
 
     def group(self, name: str) -> list[tuple[str, str, Result]]:
         """Name, words and numbers of the loops of one doubt or table that came to their end."""
@@ -507,18 +551,8 @@ def _neighbours(answer: Answer) -> list[str]:
 
 
 def _warnings(answer: Answer, loss: Quantity) -> list[str]:
-    found = [*answer.main["range_warnings"], *answer.main["strain_warnings"]]
-    for run in answer.plan.runs:
-        of_run = answer.result(run.name)
-        for text in of_run["preload_warnings"] if of_run is not None else ():
-            found.append(text if run.name == "answer" else f"the loop “{run.name}”: {text}")
-    for run in answer.plan.runs:
-        text = answer.results.get(run.name)
-        if isinstance(text, str):
-            counts = run.group in DOUBTS and not run.name.startswith(_FOR_THE_FIGURE)
-            lacks = "its doubt is not counted" if counts else "it is missing from table and figure"
-            found.append(f"the loop “{run.name}” did not end ({text}): {lacks}")
-    found += _not_converged(answer)
+    """Return what is doubtful: what changes the answer most first, loops that failed last."""
+    found = [*answer.main["preload_warnings"], *_one_patch(answer), *_not_converged(answer)]
     if loss.relative > 0.5:
         largest = max(loss.doubts, key=lambda name: loss.doubts[name])
         found.append(
@@ -526,13 +560,44 @@ def _warnings(answer: Answer, loss: Quantity) -> list[str]:
             f"“{largest}” ({DOUBTS.get(largest, 'error of the loop itself')}; standard uncertainty "
             f"{100 * loss.doubts[largest]:.0f} %): {_REMEDIES[largest]}"
         )
+    found += [*answer.main["range_warnings"], *answer.main["strain_warnings"]]
     races = answer.main["races"]
     if races:
         found.append(
             f"{counted(round(races), 'jump')} would have ended elsewhere under another rule of "
             f"descent ({answer.main['energy_at_stake'] or 0:.2g} J/m² at stake)"
         )
-    return found
+    for run in answer.plan.runs:
+        of_run = answer.result(run.name) if run.name != "answer" else None
+        for text in of_run["preload_warnings"] if of_run is not None else ():
+            found.append(f"the loop “{run.name}”: {text}")
+    failed = []
+    for run in answer.plan.runs:
+        text = answer.results.get(run.name)
+        if isinstance(text, str):
+            counts = run.group in DOUBTS and not run.name.startswith(_FOR_THE_FIGURE)
+            lacks = "its doubt is not counted" if counts else "it is missing from table and figure"
+            failed.append(f"the loop “{run.name}” did not end ({text}): {lacks}")
+    return [*found, "; ".join(failed)] if failed else found
+
+
+def _one_patch(answer: Answer) -> list[str]:
+    """Return a warning where one crest carries all contact at the turning point."""
+    states = answer.main["states"]
+    turn = max(i for i, branch in enumerate(states["branch"]) if branch == "loading")
+    share = states["contact_fraction"][turn]
+    if states["patches"][turn] != 1 or share > _ONE_PATCH:
+        return []
+    prepared = answer.prepared
+    profile = prepared.profile()
+    heights = profile.heights(8 * profile.highest_harmonic)
+    place = prepared.start + profile.period * int(np.argmax(heights)) / heights.size
+    return [
+        f"one crest at {length_text(place)} carries all contact at the turning point "
+        f"({100 * share:.2g} % of the period): the loss is that of this crest, not of the "
+        "roughness; press deeper or measure a longer trace, or leave it out "
+        f"({parameter('exclude')}) if it is no part of the surface"
+    ]
 
 
 def _not_converged(answer: Answer) -> list[str]:
@@ -593,6 +658,8 @@ def document(answer: Answer) -> dict[str, Any]:
         "preparation": [
             {"name": step.name, "said": step.description, **step.numbers} for step in prepared.steps
         ],
+        "excluded": [{"begin": begin, "end": end} for begin, end in prepared.excluded],
+        "single_features": [asdict(feature) for feature in prepared.features],
         "cut_off": prepared.cut_off,
         "cut_off_limits": prepared.limits,
         "degree": prepared.degree,
@@ -629,6 +696,9 @@ def document(answer: Answer) -> dict[str, Any]:
             "processes": plan.processes,
             "hints": list(plan.hints),
         },
+        "largest_changes": [
+            {"name": change.run.name, "factor": change.factor} for change in answer.largest_changes
+        ],
         "warnings": list(answer.warnings),
         "seconds": answer.seconds,
     }

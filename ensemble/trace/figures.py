@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -21,6 +22,9 @@ from adhesis.ensemble.report.figures.style import (
     style,
 )
 from adhesis.ensemble.trace.answer import Answer
+from adhesis.ensemble.trace.page_files import FIGURES
+from adhesis.ensemble.trace.prepare import Prepared
+from adhesis.ensemble.trace.single_features import single_features_text
 from adhesis.ensemble.trace.variants import Cycle
 from adhesis.solver.model.measured_profile import trace_spectrum
 from adhesis.solver.model.profile import Array
@@ -42,12 +46,8 @@ def draw_all(answer: Answer, folder: Path) -> list[Drawn]:
     """Draw all figures for which the answer has data, as PNG and PDF."""
     drawn = []
     with style():
-        for stem, title, build in (
-            ("trace", "The trace, as measured and as used", _trace),
-            ("spectrum", "Its power spectrum", _spectrum),
-            ("loop", "The loop", _loop),
-            ("cut-off", "Loss against the shortest wave kept", _cut_off),
-            ("tables", "Against work of adhesion and turning point", _tables),
+        for (stem, title), build in zip(
+            FIGURES.items(), (_trace, _spectrum, _loop, _cut_off, _tables), strict=True
         ):
             built = build(answer)
             if built is None:
@@ -82,12 +82,12 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
     prepared = answer.prepared
     heights = prepared.trace.heights
     level, profile = prepared.level(), prepared.profile()
-    x = prepared.step * np.arange(level.size)
+    x = prepared.start + prepared.step * np.arange(level.size)
     by_x, unit_x = _scale(prepared.trace.length)
     figure = new_figure(2, 1, TWO_COLUMNS, 3.3, sharex=True)
     above, below = figure.axes
     by_z, unit_z = _scale(prepared.trace.height_range)
-    measured = x[0] + prepared.step * np.arange(heights.size)
+    measured = prepared.step * np.arange(heights.size)
     above.plot(by_x * measured, by_z * heights, color=_GREY, lw=0.7)
     fit = prepared.filled - level
     sign = -1.0 if any(step.name == "turned over" for step in prepared.steps) else 1.0
@@ -102,20 +102,46 @@ def _trace(answer: Answer) -> tuple[Figure, str]:
             color="k",
             label="interpolated",
         )
+    marked = _mark(figure.axes, by_x, prepared)
     above.set(ylabel=f"measured ({unit_z})")
     above.legend(loc="best")
     by_z, unit_z = _scale(float(np.ptp(level)))
     below.plot(*_thinned(by_x * x, by_z * level), color=_GREY, lw=0.7, label="level")
     n = max(4 * profile.highest_harmonic, 2000) + 1
     used = profile.heights(n)
-    at = profile.period * np.arange(n) / n
+    at = prepared.start + profile.period * np.arange(n) / n
     below.plot(*_thinned(by_x * at, by_z * used), color=_BLUE, lw=0.8, label="used, one period")
     below.set(xlabel=f"position ({unit_x})", ylabel=f"height ({unit_z})")
     below.legend(loc="best", ncols=2)
     return figure, (
         "Above: heights as read, the form that is subtracted, and interpolated heights. "
-        "Below: the level trace, and the period of the profile that is used."
+        "Below: the level trace, and the period of the profile that is used." + marked
     )
+
+
+def _mark(panels: Sequence[Axes], by: float, prepared: Prepared) -> str:
+    """Shade what is excluded and the single features; return sentences for the caption."""
+    marks = (
+        ("excluded", _GREY, prepared.excluded),
+        ("single feature", _ORANGE, [(one.begin, one.end) for one in prepared.features]),
+    )
+    for panel, axes in enumerate(panels):
+        for label, colour, ranges in marks:
+            for index, (begin, end) in enumerate(ranges):
+                axes.axvspan(
+                    by * begin,
+                    by * min(end, prepared.trace.length),
+                    color=colour,
+                    alpha=0.3,
+                    lw=0,
+                    label=None if index or panel else label,
+                )
+    sentences = ""
+    if prepared.excluded:
+        sentences += " Shaded in grey: what is excluded."
+    if prepared.features:
+        sentences += f" Shaded in orange: {single_features_text(prepared.features)}."
+    return sentences
 
 
 def _spectrum(answer: Answer) -> tuple[Figure, str]:

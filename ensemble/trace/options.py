@@ -5,15 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adhesis.ensemble.errors import InputError
+from adhesis.ensemble.errors import InputError, quoted
 from adhesis.ensemble.escape import printable
+from adhesis.ensemble.quantities import LENGTH
 from adhesis.ensemble.trace.prepare import Prepared, prepare_trace
 from adhesis.ensemble.trace.reading.measured_trace import Trace, read_trace
 from adhesis.ensemble.trace.reading.printed_numbers import DELIMITERS
 
 _NAMES = (
     *("unit", "step", "columns", "delimiter", "decimal", "row", "channel", "degree", "cut_off"),
-    *("tip_radius", "longest_gap", "keep_outliers", "invert"),
+    *("tip_radius", "longest_gap", "keep_outliers", "invert", "exclude"),
 )
 
 
@@ -59,7 +60,23 @@ def prepared_of(args: argparse.Namespace, trace: Trace) -> Prepared:
         longest_gap=args.longest_gap,
         keep_outliers=args.keep_outliers,
         invert=args.invert,
+        exclude=[_range(text) for text in args.exclude or ()],
     )
+
+
+def _range(text: str) -> tuple[float, float]:
+    """Read a range of positions in m, as 1.2mm:1.3mm."""
+    words = text.split(":")
+    if len(words) != 2:
+        raise InputError(
+            f"--exclude is {quoted(text)}: it must be two positions with a colon between them, as "
+            "in 1.2mm:1.3mm; give it once for each range"
+        )
+    try:
+        begin, end = (LENGTH.read(word) for word in words)
+    except InputError as error:
+        raise InputError(f"--exclude is {quoted(text)}: a position of it {error}") from None
+    return begin, end
 
 
 def what_was_read(prepared: Prepared) -> str:

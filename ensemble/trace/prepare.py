@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from adhesis.ensemble.errors import InputError, parameter, refused_as_input
 from adhesis.ensemble.quantities import length_text, percent
-from adhesis.ensemble.trace.reading.measured_trace import Trace
-from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, real, whole
+from adhesis.ensemble.trace.reading.measured_trace import MIN_POINTS, Trace
+from adhesis.ensemble.trace.single_features import Feature, single_features
+from adhesis.solver.checks import LENGTH, Bounds, counted, flag, instance, number_of, real, whole
 from adhesis.solver.model.measured_profile import (
     Continuation,
     TraceSpectrum,
@@ -23,6 +26,8 @@ from adhesis.solver.model.measured_profile import (
 )
 from adhesis.solver.model.profile import Array, Profile
 from adhesis.solver.values import ByValue
+
+Mask = NDArray[np.bool_]
 
 MAX_DEGREE = 6
 _DEGREE = Bounds(0, MAX_DEGREE, whole=True)
@@ -63,6 +68,12 @@ class Prepared(ByValue):
     trace : Trace
     filled : array, shape (n,)
         Heights in m without outliers and gaps, not yet level.
+    start : float
+        Position of the first of them in the trace, in m: 0 unless heights are missing there.
+    excluded : tuple
+        Begin and end of the ranges that were excluded, in m from the first point of the trace.
+    features : tuple of Feature
+        Single crests and troughs that stand far out of all others.
     degree : int
         Degree of the polynomial that is subtracted.
     form_is_sure : bool
@@ -80,6 +91,9 @@ class Prepared(ByValue):
     trace: Trace
     filled: Array
     gaps: Array
+    start: float
+    excluded: tuple[tuple[float, float], ...]
+    features: tuple[Feature, ...]
     outliers: int
     degree: int
     form_is_sure: bool
@@ -101,9 +115,18 @@ class Prepared(ByValue):
         """Distance of two heights, in m."""
         return self.trace.step
 
-    def level(self, degree: int | None = None) -> Array:
+    def level(self, degree: int | None = None, *, without_features: bool = False) -> Array:
         """Subtract the form, also one of another degree; return heights in m."""
-        return self.filled - polynomial_form(self.filled, self.degree if degree is None else degree)
+        heights = self._without_features() if without_features else self.filled
+        return heights - polynomial_form(heights, self.degree if degree is None else degree)
+
+    def _without_features(self) -> Array:
+        """Return heights with straight lines in place of the single crests and troughs."""
+        index = np.arange(self.filled.size)
+        kept = np.ones(index.size, dtype=bool)
+        for feature in self.features:
+            kept &= ~_within(feature.begin, feature.end, self.start, self.step, index.size)
+        return np.interp(index, index[kept], self.filled[kept])
 
     def profile(
         self,
@@ -113,12 +136,14 @@ class Prepared(ByValue):
         part: float = 0.05,
         cut_off: float | None = None,
         noise_seed: int | None = None,
+        without_features: bool = False,
     ) -> Profile:
         """Make one period of a profile of the trace; arguments replace single decisions.
 
-        ``noise_seed`` adds white noise of the size that the instrument is estimated to add.
+        ``noise_seed`` adds white noise of the size that the instrument is estimated to add,
+        ``without_features`` bridges the single crests and troughs.
         """
-        heights = self.level(degree)
+        heights = self.level(degree, without_features=without_features)
         if noise_seed is not None:
             noise = np.random.default_rng(noise_seed).standard_normal(heights.size)
             heights = heights + self.spectrum.noise * noise
@@ -135,6 +160,7 @@ def prepare_trace(
     longest_gap: float | None = None,
     keep_outliers: bool = False,
     invert: bool = False,
+    exclude: Sequence[tuple[float, float]] = (),
 ) -> Prepared:
     """Remove outliers and form, fill gaps, and choose the shortest wave to keep.
 
@@ -155,6 +181,9 @@ def prepare_trace(
         Keep spikes.
     invert : bool
         Change the sign of the heights, for an instrument whose z points into the sample.
+    exclude : sequence of pairs, shape (k, 2)
+        Ranges that are treated as drop-outs of any length: begin and end in m, from the first
+        point of the trace, as in ``[(1.2e-3, 1.3e-3)]``.
 
     Raises
     ------
@@ -176,16 +205,20 @@ def prepare_trace(
         cut_off = _length("cut_off", cut_off, LENGTH)
         tip_radius = _length("tip_radius", tip_radius, _LENGTH_OR_NONE)
         longest_gap = _length("longest_gap", longest_gap, _LENGTH_OR_NONE)
+    ranges = _ranges(exclude)
     steps: list[Step] = []
     warnings: list[str] = []
     heights = -trace.heights if invert else trace.heights.copy()
     if invert:
         steps.append(Step("turned over", "heights turned over: z pointed into the sample"))
-    heights = _without_ends(heights, trace, steps)
+    excluded = _excluded(heights, ranges, trace, steps)
+    heights[excluded] = np.nan
+    heights, first = _without_ends(heights, trace, steps)
+    excluded, start = excluded[first : first + heights.size], first * trace.step
     count = 0
     if not keep_outliers:
         heights, count = _without_outliers(heights, steps, warnings)
-    filled, gaps = _filled(heights, trace, longest_gap, steps)
+    filled, gaps = _filled(heights, excluded, trace, start, longest_gap, steps)
     chosen = _degree(filled, degree, steps, warnings)
     level = filled - polynomial_form(filled, chosen)
     rms = float(np.sqrt(np.mean(level**2)))
@@ -197,10 +230,14 @@ def prepare_trace(
     limits = trusted_wavelength(spectrum, trace.step, radius or 0.0)
     shortest = _cut_off(trace, filled.size, rms, cut_off, limits, radius, spectrum, steps, warnings)
     _long_waves(spectrum, rms, warnings)
+    features = single_features(level, trace.step, start)
     return Prepared(
         trace=trace,
         filled=filled,
         gaps=gaps,
+        start=start,
+        excluded=ranges,
+        features=features,
         outliers=count,
         degree=chosen,
         form_is_sure=_prominence(form_shares(filled), chosen) > _SURE_FORM,
@@ -208,7 +245,7 @@ def prepare_trace(
         limits=limits,
         spectrum=spectrum,
         steps=tuple(steps),
-        warnings=tuple(warnings),
+        warnings=(*(feature.warning for feature in features), *warnings),
     )
 
 
@@ -219,8 +256,72 @@ def _length(name: str, value: float | None, bounds: Bounds) -> float | None:
 # ---------------------------------------------------------------------- gaps and outliers
 
 
-def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
-    """Cut missing heights off both ends, where interpolation is impossible."""
+def _ranges(exclude: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Return the excluded ranges as pairs of floats, in order (TypeError, InputError)."""
+    name = parameter("exclude")
+    rule = "pairs of positions in m, as in [(1.2e-3, 1.3e-3)]"
+    if isinstance(exclude, str | bytes) or not hasattr(exclude, "__iter__"):
+        raise TypeError(f"{name} is {exclude!r}: it must hold {rule}")
+    pairs = []
+    for pair in exclude:
+        numbers = [number_of(value) for value in pair] if hasattr(pair, "__iter__") else []
+        if len(numbers) != 2 or None in numbers:
+            raise TypeError(f"{name} holds {pair!r}: it must hold {rule}")
+        begin, end = (float(value) for value in pair)
+        if not 0 <= begin < end < np.inf:
+            raise InputError(
+                f"{name} holds the range from {length_text(begin, 6)} to {length_text(end, 6)}: a "
+                "range must begin at 0 or later, and end beyond its beginning"
+            )
+        pairs.append((begin, end))
+    return tuple(sorted(pairs))
+
+
+def _within(begin: float, end: float, start: float, step: float, size: int) -> Mask:
+    """Return which heights lie in a range, its ends included."""
+    position = start + step * np.arange(size)
+    rounding = 1e-6 * step
+    return np.asarray((position >= begin - rounding) & (position <= end + rounding))
+
+
+def _excluded(
+    heights: Array, ranges: Sequence[tuple[float, float]], trace: Trace, steps: list[Step]
+) -> Mask:
+    """Return which heights are excluded."""
+    excluded = np.zeros(heights.size, dtype=bool)
+    for begin, end in ranges:
+        inside = _within(begin, end, 0.0, trace.step, heights.size)
+        words = f"{length_text(begin, 6)} to {length_text(end, 6)}"
+        if not inside.any():
+            raise InputError(
+                f"{parameter('exclude')} holds the range from {words}, in which there is no "
+                f"height: {trace.source} reaches from 0 to {length_text(trace.length, 6)} in steps "
+                f"of {length_text(trace.step)}"
+            )
+        count = int(inside.sum())
+        steps.append(
+            Step(
+                "excluded",
+                f"{words}, as given: {counted(count, 'height')} treated as "
+                f"{'a drop-out' if count == 1 else 'drop-outs'}",
+                {"begin": begin, "end": end, "points": count},
+            )
+        )
+        excluded |= inside
+    left = int(np.isfinite(heights[~excluded]).sum())
+    if ranges and left < MIN_POINTS:
+        raise InputError(
+            f"{parameter('exclude')} leaves {counted(left, 'height')} of {trace.source}: at least "
+            f"{MIN_POINTS} must be left"
+        )
+    return excluded
+
+
+def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> tuple[Array, int]:
+    """Cut missing heights off both ends, where interpolation is impossible.
+
+    Returns the others, and the index of the first of them.
+    """
     good = np.flatnonzero(np.isfinite(heights))
     first, last = int(good[0]), int(good[-1]) + 1
     lost = heights.size - (last - first)
@@ -232,7 +333,7 @@ def _without_ends(heights: Array, trace: Trace, steps: list[Step]) -> Array:
                 {"points": lost, "length": lost * trace.step},
             )
         )
-    return heights[first:last]
+    return heights[first:last], first
 
 
 def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) -> tuple[Array, int]:
@@ -271,22 +372,32 @@ def _without_outliers(heights: Array, steps: list[Step], warnings: list[str]) ->
 
 
 def _filled(
-    heights: Array, trace: Trace, longest: float | None, steps: list[Step]
+    heights: Array,
+    excluded: Mask,
+    trace: Trace,
+    start: float,
+    longest: float | None,
+    steps: list[Step],
 ) -> tuple[Array, Array]:
-    """Fill gaps by straight lines; return heights, and which of them were filled."""
+    """Fill gaps by straight lines; return heights, and which of them were filled.
+
+    What was excluded does not count in the length of a gap.
+    """
     gaps = ~np.isfinite(heights)
     if not gaps.any():
         return heights, gaps
     edges = np.flatnonzero(np.diff(np.concatenate([[False], gaps, [False]]).astype(int)))
     starts, ends = edges[::2], edges[1::2]
-    longest_here = float((ends - starts).max() + 1) * trace.step
+    missing = np.add.reduceat((gaps & ~excluded).astype(int), starts)
+    worst = int(np.argmax(missing))
+    longest_here = float(missing[worst] + 1) * trace.step
     allowed = (
         max(_GAP_STEPS * trace.step, _GAP_SHARE * heights.size * trace.step)
         if longest is None
         else longest
     )
-    if longest_here > allowed * (1 + 1e-9):
-        at = int(starts[np.argmax(ends - starts)]) * trace.step
+    if missing[worst] and longest_here > allowed * (1 + 1e-9):
+        at = start + int(starts[worst]) * trace.step
         raise InputError(
             f"{trace.source} has a gap of {length_text(longest_here)} at {length_text(at)}: "
             f"up to {length_text(allowed)} "
@@ -294,20 +405,22 @@ def _filled(
         )
     share = float(gaps.mean())
     if share > _MAX_MISSING:
+        with_these = f", with what {parameter('exclude')} removes" if excluded.any() else ""
         raise InputError(
-            f"{trace.source} lacks {100 * share:.1f} % of its heights: up to "
+            f"{trace.source} lacks {100 * share:.1f} % of its heights{with_these}: up to "
             f"{100 * _MAX_MISSING:.0f} % may lack{_why_missing(trace)}"
         )
     index = np.arange(heights.size)
     filled = heights.copy()
     filled[gaps] = np.interp(index[gaps], index[~gaps], heights[~gaps])
+    longest_filled = float((ends - starts).max() + 1) * trace.step
     steps.append(
         Step(
             "drop-outs",
             f"{counted(int(gaps.sum()), 'height')} ({percent(share)}) in "
             f"{counted(starts.size, 'gap')} interpolated by "
-            f"straight lines, the longest over {length_text(longest_here)}",
-            {"points": int(gaps.sum()), "gaps": starts.size, "longest": longest_here},
+            f"straight lines, the longest over {length_text(longest_filled)}",
+            {"points": int(gaps.sum()), "gaps": starts.size, "longest": longest_filled},
         )
     )
     return filled, gaps

@@ -133,5 +133,11 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="G",
         help="drop-outs up to this length are interpolated: 20um",
     )
+    making.add_argument(
+        "--exclude",
+        action="append",
+        metavar="A:B",
+        help="a range of positions to bridge, 1.2mm:1.3mm; may be given several times",
+    )
     making.add_argument("--keep-outliers", action="store_true", help="leave spikes in")
     making.add_argument("--invert", action="store_true", help="z points into the sample: turn it")

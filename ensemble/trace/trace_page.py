@@ -19,6 +19,7 @@ from adhesis.ensemble.quantities import (
 from adhesis.ensemble.report.html import html_page
 from adhesis.ensemble.trace.answer import COVERAGE, DOUBTS, LEAST, Answer, Quantity, document
 from adhesis.ensemble.trace.figures import Drawn, draw_all
+from adhesis.ensemble.trace.page_files import FIGURE_FILES
 from adhesis.solver.checks import counted
 
 
@@ -31,6 +32,7 @@ def summary(answer: Answer) -> str:
         f"{_note(answer)}",
         f"pull-off    {_value(answer.pull_off_stress, 1e-3, 'kPa')} mean tension",
         f"contact     {_value(answer.contact_fraction, 1.0, 'of the nominal area', 1.0)} at most",
+        f"changes     {_largest_changes(answer)}",
         f"loop        γ = {answer.cycle.works_of_adhesion[0]:g} J/m², to "
         f"{answer.cycle.turn(answer.cycle.turning_points[0])} with h_max = "
         f"{length_text(loop['h_max'], 4)}; "
@@ -48,6 +50,22 @@ def summary(answer: Answer) -> str:
         *(f"WARNING     {w}" for w in answer.warnings if w not in answer.prepared.warnings),
     ]
     return printable("\n".join(lines))
+
+
+def _largest_changes(answer: Answer) -> str:
+    """Say which decision changes the loss most, by what factor, and whether the interval has it."""
+    relative = answer.loss.relative
+    low, high = max(1 - relative, 0.0), 1 + relative
+    clauses: list[str] = []
+    for change in answer.largest_changes:
+        run = change.run
+        against = "" if run.reference == "answer" else f", against “{run.reference}”"
+        of = "of the other decisions " if clauses else "most "
+        beyond = "" if low <= change.factor <= high else ", beyond the interval"
+        clauses.append(
+            f"{of}by “{run.name}” ({run.description}{against}): × {change.factor:.3g}{beyond}"
+        )
+    return "; ".join(clauses) or "no other decision about the trace could be run"
 
 
 def _note(answer: Answer) -> str:
@@ -94,7 +112,7 @@ def write_page(answer: Answer, folder: Path) -> None:
 
 def write_all(answer: Answer, folder: Path) -> Path:
     """Write the page, its figures and ``trace.json``; return the path of the page (OSError)."""
-    with staged_folder(folder) as staged:
+    with staged_folder(folder, FIGURE_FILES) as staged:
         write_page(answer, staged)
         write_json(staged / "trace.json", document(answer))
     return folder / "trace.html"
@@ -130,6 +148,7 @@ def page_text(answer: Answer, figures: Sequence[Drawn]) -> str:
         f"{cycle.turn(cycle.turning_points[0])} (h_max = {length_text(answer.main['h_max'], 4)}) "
         f"and off again, with γ = {cycle.works_of_adhesion[0]:g} J/m², E = {half_space.young:g} "
         f"Pa, ν = {half_space.poisson:g}.",
+        f"**What changes the loss:** {_largest_changes(answer)}.",
         *(f"> **Warning:** {markdown(warning)}" for warning in answer.warnings),
         "## What was read",
         f"- {code_span(name)}: {markdown('; '.join(trace.notes))}\n- {trace.summary}",

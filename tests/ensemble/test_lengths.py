@@ -165,6 +165,7 @@ def test_other_keys_take_no_unit() -> None:
         ("young", '"1 mPa"', "Pa, kPa, MPa, GPa"),
         ("period", '"1 kPa"', "m, cm, mm, µm, nm, Å, inch, mil, µin"),
         ("work_of_adhesion", '["20 kJ/m2"]', "J/m², mJ/m², N/m, mN/m"),
+        ("work_of_adhesion", '["20 mN/m2"]', "J/m², mJ/m², N/m, mN/m"),
     ],
 )
 def test_a_campaign_lists_the_units_where_one_is_wrong(key: str, value: str, units: str) -> None:
@@ -214,9 +215,9 @@ def test_a_campaign_file_is_asked_for_units_as_the_options_are(
 
 
 def test_a_work_of_adhesion_has_a_unit_or_is_in_joules() -> None:
-    texts = ("0.02", "20mJ/m2", "20 mJ/m²", "20mN/m", "40J/m^2", "40 N/m")
+    texts = ("0.02", "20mJ/m2", "20 mJ/m²", "20mN/m", "20 mN / m", "40J/m^2", "40 N/m")
     read = [WORK_OF_ADHESION.option(text) for text in texts]
-    assert read == [0.02, 0.02, 0.02, 0.02, 40.0, 40.0]
+    assert read == [0.02, 0.02, 0.02, 0.02, 0.02, 40.0, 40.0]
     for text, sentence in (
         ("20", "is 20, which would be 20 J/m²: give its unit, as in 20mJ/m2 (20J/m2, if J/m² are"),
         (
@@ -225,6 +226,9 @@ def test_a_work_of_adhesion_has_a_unit_or_is_in_joules() -> None:
         ),
         ("0,02", "is '0,02': it must be a number in J/m² with a decimal point"),
         ("20kJ/m2", "its unit must be one of J/m², mJ/m², N/m, mN/m"),
+        ("20J/m", "its unit must be one of J/m², mJ/m², N/m, mN/m"),
+        ("20mN/m²", "its unit must be one of J/m², mJ/m², N/m, mN/m"),
+        ("20Nm", "it must be a number in J/m²"),
     ):
         with pytest.raises(argparse.ArgumentTypeError) as refusal:
             WORK_OF_ADHESION.option(text)

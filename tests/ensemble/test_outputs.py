@@ -242,6 +242,25 @@ def test_staged_files_are_moved_together_or_not_at_all(tmp_path: Path) -> None:
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "new", "b": "more"}
 
 
+def test_older_files_of_the_writers_own_names_are_removed(tmp_path: Path) -> None:
+    """Once all is written: after a failure they stay, and other files stay always."""
+    for name in ("a", "b", "notes"):
+        (tmp_path / name).write_text("old")
+
+    def fail() -> None:
+        with staged_folder(tmp_path, ("a", "b", "c")):
+            raise OSError("full")
+
+    with pytest.raises(OSError, match="full"):
+        fail()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "notes"]
+    with staged_folder(tmp_path, ("a", "b", "c")) as folder:
+        (folder / "a").write_text("new")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
+        **{"a": "new", "notes": "old"}
+    }
+
+
 # ---------------------------------------------------------------------- folders of other commands
 
 TRACE = ("trace", "ow/trace.md", *CONTACT, "--unit", "um", "--to")

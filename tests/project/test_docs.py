@@ -83,6 +83,9 @@ NOT_RUN = {
     "test_precision.py asks four kinds of a thousand",
     '.venv/bin/pip install "SurfaceTopography>=1.27"': "needs a network",
     "python3 -m venv .venv && .venv/bin/pip install .": "needs a network; see check-package",
+    "python3 -m pip wheel -w wheelhouse .": "as before",
+    "python3 -m venv .venv && .venv/bin/pip install --no-index --find-links wheelhouse "
+    "wheelhouse/*.whl": "needs the folder that the line before makes",
     ". .venv/bin/activate": "the reader's shell",
     "adhesis run big.toml --dry-run": "a minute of pilot loops; tests/ensemble/test_price.py",
     "adhesis report big.h5 --to big": "a minute; tests/ensemble/test_report.py",

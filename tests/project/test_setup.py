@@ -142,6 +142,31 @@ def test_set_up_changes_nothing_when_nothing_has_changed() -> None:
     assert stamp.stat().st_mtime_ns == before
 
 
+def test_an_older_python_is_named_before_anything_is_installed(tmp_path: Path) -> None:
+    """By set-up, and by what pip runs before it looks for packages."""
+    old = tmp_path / "python3.10"
+    old.write_text('#!/bin/sh\n[ "$1" = -V ] && echo Python 3.10.13 && exit 0\nexit 1\n')
+    old.chmod(0o755)
+    shutil.copytree(ROOT / "tools", tmp_path / "tools")
+    for name in ("pyproject.toml", "requirements.lock", "requirements-test.lock"):
+        shutil.copy(ROOT / name, tmp_path)
+    env = os.environ | {"PYTHON": str(old)}
+    words = [tmp_path / "tools" / "setup.sh"]
+    done = subprocess.run(words, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert done.stderr == (
+        f"setup: failed: Python 3.11 or newer is needed, and {old} is Python 3.10.13 (say which "
+        "with PYTHON=…)\n"
+    )
+    program = "import sys; sys.version_info = (3, 10, 13); exec(open('setup.py').read())"
+    words = [sys.executable, "-c", program]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Python 3.11 or newer is needed, and this is Python 3.10: ")
+    assert done.stderr.count("\n") == 1
+
+
 def parts(tmp_path: Path, text: str) -> tuple[int, list[str]]:
     """Run a script with tools/parts.sh; its exit code and what it says."""
     (tmp_path / ".setup").mkdir(exist_ok=True)
