@@ -59,6 +59,7 @@ def read_heights(
     """
     given = None if unit is None else _unit(unit)
     source = source_of(path)
+    source.beginning()  # refuses what is missing, empty or packed
     if not holds_numbers(source):
         raise InputError(
             source.container()

@@ -269,15 +269,17 @@ def test_the_warning_goes_to_stderr_json_and_exit_code(
         code = main(["loop", *map(str, (*words, *more))])
         return code, capsys.readouterr().err
 
+    # The wave is so small that the zero-range limit is doubtful, which is another warning.
     code, reported = run("--heights", "a.csv")
-    (sentence,) = reported.splitlines()
+    (sentence,) = (line for line in reported.splitlines() if "_range" not in line)
     assert code == 0
     assert sentence.startswith("adhesis loop: the ends of a.csv do not meet")
     data = json.loads(Path("o.json").read_text())
-    assert data["warnings"] == [sentence.removeprefix("adhesis loop: ")]
+    assert sentence.removeprefix("adhesis loop: ") in data["warnings"]
     assert run("--heights", "a.csv", "--strict") == (1, reported)
-    assert run("--heights", "b.csv", "--strict") == (0, "")
-    assert json.loads(Path("o.json").read_text())["warnings"] == []
+    assert "do not meet" not in run("--heights", "b.csv")[1]
+    warnings = json.loads(Path("o.json").read_text())["warnings"]
+    assert not any("do not meet" in warning for warning in warnings)
     Path("few.csv").write_text("\n".join(METRES[:7]))
     code, reported = run("--heights", "few.csv", "--strict")
     assert code == 1

@@ -101,7 +101,7 @@ DIMENSIONAL = {
     "1/m²": {"m4"},
     "Pa": {
         *("young", "mean_stress", "pull_off_stress", "largest_interior_tension"),
-        *("turning_stress", "preload"),
+        *("turning_stress", "preload", "strength"),
     },
     "J/m": {"energy", "elastic_energy", "adhesion_energy"},
     "J/m²": {
@@ -431,7 +431,7 @@ def test_heights_take_a_period_and_no_spectrum(wave_file, capsys):
         ("complex.npy", np.ones(4) * 1j, "heights are real numbers"),
         ("object.npy", np.array([{}, 1, 2], dtype=object), "is no .npy of numbers"),
         ("nan.csv", "1\n2\n3\nnan\n4\n", "has no finite height on line 4: --heights needs every"),
-        ("early.csv", "1\nnan\n2\n3\n4\n", "line 1 of "),
+        ("early.csv", "1\nnan\n2\n3\n4\n", "has no finite height on line 2: --heights needs every"),
         ("one.csv", "1.0\n", "holds 1 row of numbers: at least 3 are needed"),
         ("empty.csv", "", "empty.csv is empty"),
         ("two.csv", "0,1\n1,2\n2,1\n3,0\n", "holds 4 × 2 numbers: --heights takes one column"),

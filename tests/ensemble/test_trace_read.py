@@ -356,7 +356,7 @@ CONTACT = ["--work-of-adhesion", "0.04", "--young", "1e6", "--poisson", "0.5"]
         (["--plan", "--unit", "um", "--tip-radius=-1um"], "--tip-radius is -1e-06: it must be"),
         (["--plan", "--unit", "um", "--cut-off", "nan"], "--cut-off is nan: it must be"),
         (["--plan", "--unit", "um", "--longest-gap", "5 parsec"], "'5 parsec': its unit must be"),
-        (["--plan", "--unit", "um", "--max-stress", "5"], "give --stiffness 0 with it"),
+        (["--plan", "--unit", "um", "--max-stress", "5"], "a weight or a machine?"),
         (["--plan", "--unit", "um", "--stiffness", "0"], "(--stiffness 0) needs --max-stress"),
         (["--plan", "--unit", "um", "--stiffness", "0", "--max-stress", "0"], "--max-stress is 0"),
         (
