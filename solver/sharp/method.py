@@ -41,6 +41,7 @@ from adhesis.solver.sharp.gap.full_contact_stress import StressSource
 from adhesis.solver.sharp.mechanics import EdgeMechanics
 from adhesis.solver.sharp.nucleation.nucleation import Nucleation, Touch
 from adhesis.solver.sharp.nucleation.opening import Openings
+from adhesis.solver.sharp.one_tree.tree_mechanics import TreeMechanics
 from adhesis.solver.sharp.output.contact_states import States, loading_device
 from adhesis.solver.sharp.output.grid_fields import fields_of, openings_of
 from adhesis.solver.sharp.output.interior_tension import largest_tension
@@ -106,6 +107,9 @@ class SharpMethod(Method):
         separation of jumps and the density of the states.
     chosen : str, optional
         See ``method.Method``.
+    one_tree : bool, optional
+        Whether all gaps are solved on one tree, however few, and descend together, without dense
+        matrices and windows. It is not the default yet.
     """
 
     name = "sharp"
@@ -116,7 +120,12 @@ class SharpMethod(Method):
     resolved_adhesion: ClassVar[tuple[float, float]] = (1e-8, 1e10)
 
     def __init__(
-        self, problem: Problem, *, accuracy: float = 1e-3, chosen: str | None = None
+        self,
+        problem: Problem,
+        *,
+        accuracy: float = 1e-3,
+        chosen: str | None = None,
+        one_tree: bool = False,
     ) -> None:
         super().__init__(problem, chosen=chosen)
         keep_freed()
@@ -147,7 +156,10 @@ class SharpMethod(Method):
             exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
             tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance)
-        self.edges = EdgeMechanics(source, critical, tolerance, loading_device(problem))
+        mechanics = TreeMechanics if one_tree else EdgeMechanics
+        self.edges: EdgeMechanics = mechanics(
+            source, critical, tolerance, loading_device(problem)
+        )
         self.states = States(problem, source, self.edges.count)
         finest = max(FIELD_RESOLVES * tolerance, LEAST_JUMP_RESOLUTION)
         self.resolution = Resolution(

@@ -266,6 +266,40 @@ FURTHEST_FOLLOWING = 5.0
 given up. Of 639 windows (40 gaps, waves to m = 10,000) 5 % are; where another patch near its fold
 followed by 6 λ_min, the wrong one vanished, and the loss was wrong by 4e-3."""
 
+# ---------------------------------------------------------------- all gaps on one tree
+
+FEW_REFERENCES = 8
+"""Gaps: fewer count as so many for that."""
+SOFT_EDGE = 6.0
+"""Compliance of an edge, over that of its gap by itself or by roughness of the shortest wave. A
+softer edge is taken to be next to a fold, where its tangent changes fast, too: it may leave its
+reference by less. In loops at the paper's scale half of all edges have 2 to 4. Without this folds
+were found up to 6e-4 h_max late."""
+FURTHER_CHARGES = 1.25
+"""Factor on the charges of the runs that hold such a gap."""
+RUNNING = 0.01
+"""C_c. Edges further out of balance run, those nearer to it follow by their tangent."""
+FOLLOWING = 0.2
+"""Longest steps; edges that Newton's step of all edges moves further run."""
+SOFT_SHARE = 0.3
+"""Of the softness of the softest gap; softer ones run where the edges are not stable."""
+LEAST_DAMPING = 2.0
+"""Times the tangent of their gaps: damping of running edges. With once that, it may cancel it."""
+DAMPING_GROWTH = 16.0
+"""Times by which that grows where the edges are not stable with it."""
+MOST_DAMPING = 1e6
+"""Times that tangent; where the edges are not stable with it, they have no field."""
+SHORT_REACH = 3.0
+"""Longest steps: reach of a step near balance."""
+SHORTEST_REACH = 0.1
+"""Longest steps; so short a step is not rejected."""
+FAINT_SADDLE = 0.01
+"""Faintest forces (``FAINT_FORCE``); at a saddle smaller ones are not followed."""
+MODEL_SHORT_STEP = 0.1
+"""Longest steps (0.005 λ_min) of one step through the model near balance, where modes of different
+edges may compete, and their times decide: with twenty times this a loop (γ = 0.04, seed 1) lost
+6e-5 less, as another edge came first."""
+
 # ---------------------------------------------------------------- nucleation
 
 FASTEST_CLOSING = 4.0

@@ -60,7 +60,7 @@ class Charges(NamedTuple):
 
 
 @compiled_sums
-def _eliminate(a: Array, x: Array) -> bool:
+def eliminate(a: Array, x: Array) -> bool:
     """Solve a y = x for the columns of x, both overwritten; returns whether det a is negative."""
     n = a.shape[0]
     columns = x.shape[1]
@@ -149,7 +149,7 @@ def factor_run(tree: Tree, factor: TreeFactor, run: int) -> None:
             matrix[i, j] = -matrix[i, j]
         inverse[i, i] = 1.0
         matrix[i, i] += 1.0
-    odd = _eliminate(matrix, inverse)
+    odd = eliminate(matrix, inverse)
     count = max(negative[one], negative[two])
     if (negative[one] + negative[two] + count + (1 if odd else 0)) % 2 == 1:
         count += 1
@@ -185,7 +185,7 @@ def _add(a: Array, out: Array) -> None:
 
 
 @compiled_sums
-def _add_apply(a: Array, x: Array, out: Array) -> None:
+def add_apply(a: Array, x: Array, out: Array) -> None:
     """Add a x to ``out``, a flat."""
     n = x.shape[0]
     for i in range(out.shape[0]):
@@ -227,16 +227,16 @@ def charge_run(tree: Tree, factor: TreeFactor, run: int, charges: Charges, work:
         # g1 = -(1 - H R1)⁻¹ K12 (q2° + R2 K21 q1°);  g2 = -K21 q1
         g2[:] = 0.0
         _add_transposed(kernel, q1, g2)
-        _add_apply(second, g2, q2)
+        add_apply(second, g2, q2)
         g[:] = 0.0
-        _add_apply(kernel, q2, g)
+        add_apply(kernel, q2, g)
         g1[:] = 0.0
-        _add_apply(inverse, g, g1)  # still with the other sign
-        _add_apply(first, g1, q1)
+        add_apply(inverse, g, g1)  # still with the other sign
+        add_apply(first, g1, q1)
         q2[:] = isolated[run_span(tree.node_start, two)]
         g2[:] = 0.0
         _add_transposed(kernel, q1, g2)
-        _add_apply(second, g2, q2)
+        add_apply(second, g2, q2)
         for i in range(n):
             g1[i] = -g1[i]
         for i in range(m):
@@ -292,7 +292,7 @@ def downward_pass(
             for column in range(potential.shape[0]):
                 potential[column, own] = charges.potential_of_sibling[column, own]
                 outer = potential[column][run_span(tree.node_start, run)]
-                _add_apply(inward[at : at + size], outer, potential[column][own])
+                add_apply(inward[at : at + size], outer, potential[column][own])
             at += size
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from adhesis.solver.model.profile import Array
-from adhesis.solver.sharp.equilibrium.linear_response import LinearResponse
 from adhesis.solver.sharp.equilibrium.renewal import settle_response
 from adhesis.solver.sharp.equilibrium.response_setup import (
     count_unknown,
@@ -25,7 +26,7 @@ class KeptResponse:
 
     Attributes
     ----------
-    response : LinearResponse
+    response : LinearResponse or TreeResponse
     settled : array, optional
         Gaps for which it was last solved.
     is_outgrown : bool
@@ -34,7 +35,7 @@ class KeptResponse:
         Changes whenever the response does; no other response has it.
     """
 
-    def __init__(self, response: LinearResponse) -> None:
+    def __init__(self, response: Any) -> None:
         self.response = response
         self.settled: Array | None = None
         self.is_outgrown, self.version = False, 0
@@ -96,7 +97,7 @@ class KeptResponses:
         problem = self._problem
         return int(count_unknown(known.response, gaps, problem.law, problem.model))
 
-    def _new(self, gaps: Array, prescribed: float, least: Integers) -> LinearResponse | None:
+    def _new(self, gaps: Array, prescribed: float, least: Integers) -> Any:
         """Set up a response of these gaps, from the last one if there is one."""
         problem = self._problem
         law, model = problem.law, problem.model

@@ -1,0 +1,3 @@
+"""All gaps on one tree, for any number of them, and one implicit flow; not the default yet."""
+
+from __future__ import annotations

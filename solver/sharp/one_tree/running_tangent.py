@@ -1,0 +1,204 @@
+"""Tangent of a few edges with all others following, from the tree of the linear response; compiled.
+
+Forces on a few edges move all edges by the compliance Z of the response. Its part among these
+edges is the inverse of their tangent, with the others following: a Schur complement.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adhesis.solver.model.profile import Array
+from adhesis.solver.runtime.jit import compiled, compiled_for_both
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.field.cluster_tree import run_span
+from adhesis.solver.sharp.field.solution import LoadingDevice
+from adhesis.solver.sharp.field.tree_factor import Charges, add_apply, charge_run, eliminate
+from adhesis.solver.sharp.gap.quadrature import Integers
+from adhesis.solver.sharp.one_tree.tree_response import (
+    Flags,
+    TreeResponse,
+    TreeSolution,
+    solve_response,
+)
+
+
+@compiled
+def push_edges(
+    response: TreeResponse, edges: Integers, force: Array, wanted: Flags
+) -> tuple[Array, Array]:
+    """Compute the motions at fixed p by forces, as -(C_e - C_c), on some edges, and the potentials.
+
+    Of the gaps that are not ``wanted`` they are not computed.
+    """
+    tree, factor, count = response.tree, response.factor, response.held.shape[0]
+    runs = tree.rank.shape[0]
+    size = tree.node_start[runs]
+    charges = Charges(np.zeros((1, size)), np.zeros((1, size)))
+    potential = np.zeros((1, size))
+    isolated, by_edge, offset = charges.isolated, response.charge_by_edge, response.nodes.offset
+    alone = np.zeros(2 * count)
+    loaded = np.zeros(runs, dtype=np.bool_)
+    for c in range(edges.shape[0]):
+        k = edges[c] // 2
+        loaded[k] = True
+        for side in range(2):
+            alone[2 * k + side] += response.compliance[2 * k + side, edges[c] % 2] * force[c]
+    for k in range(count):
+        if loaded[k]:
+            for i in range(offset[k], offset[k + 1]):
+                isolated[0, i] = by_edge[i, 0] * alone[2 * k] + by_edge[i, 1] * alone[2 * k + 1]
+    inside = np.zeros(runs, dtype=np.bool_)
+    inside[:count] = wanted
+    work = np.empty((3, tree.rank.max()))
+    for run in range(count, runs):
+        one, two = tree.children[run, 0], tree.children[run, 1]
+        inside[run] = inside[one] or inside[two]
+        if loaded[one] or loaded[two]:
+            loaded[run] = True
+            charge_run(tree, factor, run, charges, work)
+    for run in range(runs - 1, count - 1, -1):
+        at = tree.interpolation_start[run]
+        for half in range(2):
+            child = tree.children[run, half]
+            size = tree.rank[child] * tree.rank[run]
+            if inside[run] and inside[child]:
+                own = run_span(tree.node_start, child)
+                potential[0, own] = charges.potential_of_sibling[0, own]
+                outer = potential[0, run_span(tree.node_start, run)]
+                add_apply(factor.inner_potential[at : at + size], outer, potential[0, own])
+            at += size
+    follows = response.motion_by_potential
+    for k in range(count):
+        if wanted[k]:
+            for i in range(offset[k], offset[k + 1]):
+                g = potential[0, i]
+                alone[2 * k] += follows[i, 0] * g
+                alone[2 * k + 1] += follows[i, 1] * g
+    return alone, potential[0]
+
+
+@compiled
+def pressure_by_force(
+    response: TreeResponse, e: int, now: TreeSolution, device: LoadingDevice
+) -> float:
+    """Compute by how much a unit of force on an edge changes p at the prescribed d.
+
+    By reciprocity the mean opening, times 2π, follows a force as C_e follows p, times π/4.
+    """
+    by_pressure = device.separation_weight * response.mean[1] - 2 * np.pi * device.compliance
+    opened = device.separation_weight * response.opening[e] * now.by_pressure[e]
+    value: float = 0.25 * np.pi * opened / by_pressure
+    return value
+
+
+@compiled
+def compliance_of(
+    response: TreeResponse, edges: Integers, now: TreeSolution, device: LoadingDevice
+) -> Array:
+    """Compute the motions of some edges by forces on each of them, at the prescribed d."""
+    count = edges.shape[0]
+    wanted = np.zeros(response.held.shape[0], dtype=np.bool_)
+    for c in range(count):
+        wanted[edges[c] // 2] = True
+    out = np.empty((count, count))
+    unit = np.zeros(count)
+    for c in range(count):
+        unit[:] = 0.0
+        unit[c] = 1.0
+        motion, _ = push_edges(response, edges, unit, wanted)
+        more = pressure_by_force(response, edges[c], now, device)
+        for f in range(count):
+            out[f, c] = motion[edges[f]] + now.by_pressure[edges[f]] * more
+    return out
+
+
+@compiled
+def invert(matrix: Array) -> Array:
+    """Invert a matrix."""
+    factor, inverse = matrix.copy(), np.eye(matrix.shape[0])
+    eliminate(factor, inverse)
+    return inverse
+
+
+@compiled
+def stiffness_of(
+    response: TreeResponse, edges: Integers, now: TreeSolution, device: LoadingDevice
+) -> Array:
+    """Compute ∂(C_e - C_c)/∂n_f between some edges, with their damping, all others following."""
+    compliance = compliance_of(response, edges, now, device)
+    out = np.eye(edges.shape[0])
+    eliminate(compliance, out)
+    return out
+
+
+@compiled
+def undamped(stiffness: Array, response: TreeResponse, edges: Integers) -> Array:
+    """Return the tangent of some edges without their damping."""
+    out = stiffness.copy()
+    for e in range(edges.shape[0]):
+        out[e, e] -= response.damping[edges[e]]
+    return out
+
+
+@compiled
+def condensed_residual(
+    stiffness: Array, response: TreeResponse, edges: Integers, now: TreeSolution
+) -> Array:
+    """Compute C_e - C_c at some edges where they are, all others following."""
+    count = edges.shape[0]
+    out = np.zeros(count)
+    for e in range(count):
+        for f in range(count):
+            out[e] -= stiffness[e, f] * (now.motion[edges[f]] - response.here[edges[f]])
+    return out
+
+
+@compiled
+def follow_edges(
+    stiffness: Array,
+    response: TreeResponse,
+    edges: Integers,
+    motion: Array,
+    now: TreeSolution,
+    device: LoadingDevice,
+) -> tuple[Array, float]:
+    """Compute the motions of all edges from their references when some have a given ``motion``.
+
+    Also returns p. The potentials of the response are those with these motions from now on.
+    """
+    count = edges.shape[0]
+    force = np.zeros(count)
+    more = 0.0
+    for e in range(count):
+        for f in range(count):
+            force[e] += stiffness[e, f] * (motion[f] - now.motion[edges[f]])
+        more += force[e] * pressure_by_force(response, edges[e], now, device)
+    everywhere = np.ones(response.held.shape[0], dtype=np.bool_)
+    out, potential = push_edges(response, edges, force, everywhere)
+    for e in range(out.shape[0]):
+        out[e] += now.motion[e] + now.by_pressure[e] * more
+    for i in range(potential.shape[0]):
+        response.potential[0, i] += potential[i]
+    return out, now.pressure + more
+
+
+@compiled_for_both
+def tangent_between(
+    response: TreeResponse,
+    edges: Integers,
+    prescribed: float,
+    law: EdgeLaw,
+    device: LoadingDevice,
+) -> Array:
+    """Compute ∂(C_e - C_c)/∂n_f between some edges, all others following."""
+    now = solve_response(response, prescribed, law, device)
+    return undamped(stiffness_of(response, edges, now, device), response, edges)
+
+
+@compiled_for_both
+def is_stable(
+    response: TreeResponse, prescribed: float, law: EdgeLaw, device: LoadingDevice
+) -> bool:
+    """Return whether the edges are stable without damping."""
+    return solve_response(response, prescribed, law, device).stable
