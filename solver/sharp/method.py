@@ -109,7 +109,7 @@ class SharpMethod(Method):
         See ``method.Method``.
     one_tree : bool, optional
         Whether all gaps are solved on one tree, however few, and descend together, without dense
-        matrices and windows. It is not the default yet.
+        matrices and windows. It is not the default yet, and not for γ = 0.
     """
 
     name = "sharp"
@@ -156,7 +156,7 @@ class SharpMethod(Method):
             exact = max(work / problem.full_contact_energy, LEAST_FIELD_TOLERANCE)
             tolerance = min(tolerance, exact)
         source = StressSource(profile, tolerance)
-        mechanics = TreeMechanics if one_tree else EdgeMechanics
+        mechanics = TreeMechanics if one_tree and critical > 0 else EdgeMechanics
         self.edges: EdgeMechanics = mechanics(
             source, critical, tolerance, loading_device(problem)
         )

@@ -44,6 +44,7 @@ from adhesis.solver.sharp.tolerances import (
     EQUAL_GAINS,
     FINER_FIELD,
     FIRST_REACH,
+    RAN,
     RESPONSE_TRIALS,
     RESTS,
 )
@@ -257,6 +258,28 @@ class TreeMechanics(EdgeMechanics):
     def stiffness(self, point: Point, edges: Integers) -> Array:
         """Return ∂(C_e - C_c)/∂n_f between some edges, n outward, all others following."""
         return self._tree.stiffness(point, edges)
+
+    def relax(
+        self,
+        gaps: Array,
+        prescribed: float,
+        reach: float,
+        *,
+        equal_speeds: bool = False,
+        track: Track | None = None,
+        start: KnownState | None = None,
+    ) -> Point | Array:
+        """Descend in energy at a prescribed value to the next minimum; see the base class.
+
+        A descent with equal speeds that stays next to the fold where it begins shows no other end.
+        """
+        found = super().relax(
+            gaps, prescribed, reach, equal_speeds=equal_speeds, track=track, start=start
+        )
+        if equal_speeds and track is not None and isinstance(found, Point):
+            stayed = found.gaps.shape == gaps.shape
+            track.rejoined = stayed and np.abs(found.gaps - gaps).max() < RAN * self.wave
+        return found
 
     def start(self, point: Point | None) -> KnownState | None:
         """Return None: a descent needs no window to begin in."""
