@@ -1,3 +1,4 @@
-"""All gaps on one tree, for any number of them, and one implicit flow; not the default yet."""
+"""All gaps on one tree, for any number of them, and one implicit flow; not the default yet.
 
-from __future__ import annotations
+Import :class:`adhesis.solver.sharp.one_tree.tree_mechanics.TreeMechanics`.
+"""
