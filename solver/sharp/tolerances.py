@@ -281,7 +281,7 @@ RUNNING = 0.01
 """C_c. Edges further out of balance run, those nearer to it follow by their tangent."""
 FOLLOWING = 0.2
 """Longest steps; edges that Newton's step of all edges moves further run."""
-SOFT_SHARE = 0.3
+SOFT_SHARE = 0.7
 """Of the softness of the softest gap; softer ones run where the edges are not stable."""
 LEAST_DAMPING = 2.0
 """Times the tangent of their gaps: damping of running edges. With once that, it may cancel it."""

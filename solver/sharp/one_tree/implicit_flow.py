@@ -34,7 +34,7 @@ from adhesis.solver.sharp.equilibrium.griffith import (
     step_limits,
 )
 from adhesis.solver.sharp.field.solution import FieldModel
-from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.conformal_map import LEFT_PATCH, map_gaps
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.one_tree.running_edges import model_about
@@ -140,7 +140,9 @@ def flow_edges(
             event = NO_FIELD
             break
         if not now.stable:
-            if not _run_soft(runs, response, damped > DAMPING_GROWTH):
+            everywhere = damped > LEAST_DAMPING * DAMPING_GROWTH**2
+            first = damped == LEAST_DAMPING
+            if not ((first or everywhere) and _run_soft(runs, response, everywhere)):
                 damped *= DAMPING_GROWTH
             if damped > MOST_DAMPING:
                 if not judges:
@@ -227,12 +229,19 @@ def force_at(
 
 @compiled
 def _damp(damping: Array, runs: Flags, times: float, response: TreeResponse) -> None:
-    """Damp the edges that run by so many times the tangent of their gaps."""
-    tangent = response.tangent
-    for e in range(damping.shape[0]):
+    """Damp the edges that run by so many times their tangent, in their gap and across their patch.
+
+    The latter is that of the openings of both edges, over the length of the patch.
+    """
+    tangent, opening, table = response.tangent, response.opening, response.nodes.table
+    count = damping.shape[0]
+    for e in range(count):
         damping[e] = 0.0
         if runs[e]:
-            damping[e] = times * (abs(tangent[e, 0]) + abs(tangent[e, 1]))
+            side = e % 2
+            beyond = (e - 1 + 2 * side) % count
+            across = max(abs(opening[e]), abs(opening[beyond])) / table[e // 2, LEFT_PATCH + side]
+            damping[e] = times * (abs(tangent[e, 0]) + abs(tangent[e, 1]) + across)
 
 
 @compiled
@@ -248,12 +257,15 @@ def _run_soft(runs: Flags, response: TreeResponse, everywhere: bool) -> bool:
 
 @compiled
 def _run_more(runs: Flags, response: TreeResponse, ahead: Array, law: EdgeLaw) -> bool:
-    """Let edges run that are out of balance or move far; returns whether they are more."""
-    more = False
+    """Let edges run that are out of balance; returns whether they are more.
+
+    If none runs yet, those run, too, that Newton's step moves far.
+    """
+    more, none = False, not runs.any()
     for e in range(runs.shape[0]):
         unbalanced = abs(response.residual[e]) > RUNNING * law.critical
         far = abs(ahead[e]) > FOLLOWING * law.longest_step
-        if (unbalanced or far) and not runs[e]:
+        if (unbalanced or (none and far)) and not runs[e]:
             runs[e], more = True, True
     return more
 
