@@ -134,7 +134,7 @@ LOOPS = {
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_a_loop_is_that_of_the_default_mechanics(name):
-    """Losses within both errors, the same jumps, and an audit as close."""
+    """Losses within both errors, the same jumps but for negligible ones, and the audit closes."""
     problem = LOOPS[name]
     turn = {"max_stress": 3e3} if problem.control.is_load else {"max_penetration": 0.8}
     loops = [
@@ -143,7 +143,9 @@ def test_a_loop_is_that_of_the_default_mechanics(name):
     ]
     default, tree = loops
     assert tree.loss == pytest.approx(default.loss, abs=default.loss_error + tree.loss_error)
-    assert len(tree.jumps) == pytest.approx(len(default.jumps), abs=1)
+    kinds = [[j.kind for j in loop.jumps if j.energy_drop > 1e-6 * loop.loss] for loop in loops]
+    assert kinds[0] == kinds[1]
+    assert tree.races == default.races
     assert abs(tree.audit_residual) < 1e-3
 
 
