@@ -113,6 +113,8 @@ new one. At 0.3, 53 of 857 failures of Newton's iteration were of states that de
 (γ = 0.0025 at the paper's scale), at 0.1 eight."""
 REFERENCE_MOST_FAR = 0.25
 """Share of all gaps that may move so far before all are solved anew."""
+FEW_REFERENCES = 8
+"""Gaps: fewer count as so many for that."""
 REFERENCE_PATCH = 0.2
 """Share of a patch by which it may change before the nodes beside it are placed anew."""
 FURTHER_ORDERS = 2
@@ -187,6 +189,10 @@ RUNNING_ENDS = 0.01
 """Longest steps; a shorter one ends the flow through the model."""
 RUNNING_LENGTH = 0.5
 """Longest steps; edges that move further in the model run."""
+RUNNING = 0.003
+"""C_c. Edges further out of balance run, those nearer to it follow by their tangent."""
+MOST_DAMPING = 1e4
+"""Times the least 1/Δτ, at which all edges are damped."""
 SLOWEST = 0.01
 """Of the largest force. With equal speeds edges with less force than this are slower."""
 TIME_TRIES = 20

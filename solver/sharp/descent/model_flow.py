@@ -14,7 +14,6 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
-from adhesis.solver.sharp.descent.edge_forces import norm
 from adhesis.solver.sharp.descent.edge_model import (
     EdgeModel,
     advance,
@@ -42,36 +41,30 @@ class ModelFlow(NamedTuple):
 
     Attributes
     ----------
-    motion : array, shape (2L,)
+    motion : array, shape (n,)
         Outward motion of the contact at every edge.
-    opening : array, shape (2L,)
+    opening : array, shape (n,)
         C of the model at the end.
-    points : array, shape (n, 2L)
-        Edges after each step.
-    lengths : array, shape (n,)
+    lengths : array, shape (steps,)
         Largest motion up to each step.
-    residuals : array, shape (n, 2L)
+    residuals : array, shape (steps, n)
         C - C_c of the model after each step.
-    interaction : array, shape (2L, 2L)
-        Force, as C², that the motion of each edge (columns) took from every edge (rows).
     is_at_limit : bool
         Whether an edge came to its limit.
     """
 
     motion: Array
     opening: Array
-    points: Array
     lengths: Array
     residuals: Array
-    interaction: Array
     is_at_limit: bool
 
 
 @compiled
 def no_flow() -> ModelFlow:
-    """Make a flow without points."""
+    """Make a flow without steps."""
     none, nothing = np.empty((0, 0)), np.empty(0)
-    return ModelFlow(nothing, nothing, none, nothing, none, none, False)
+    return ModelFlow(nothing, nothing, nothing, none, False)
 
 
 @compiled
@@ -85,9 +78,9 @@ def flow_through(
     so far.
     """
     edges = model.opening.shape[0]
-    points, residuals = np.empty((MODEL_STEPS, edges)), np.empty((MODEL_STEPS, edges))
+    residuals = np.empty((MODEL_STEPS, edges))
     lengths = np.empty(MODEL_STEPS)
-    interaction, matrix = np.zeros((edges, edges)), np.empty((edges, edges))
+    matrix = np.empty((edges, edges))
     force, step = np.empty(edges), np.empty(edges)
     factor = np.empty((edges, padded(edges)))
     longest = MODEL_STEP * law.longest_step
@@ -105,17 +98,15 @@ def flow_through(
         share = share_within(model.motion, step, limit)
         if share < 1:
             step *= share
-        add_forces(matrix, step, interaction)
         advance(model, step)
         evaluate(model, law, panels)
-        points[count] = model.theta
         residuals[count] = model.opening - model.critical
         length = max(length, largest(model.motion))
         lengths[count] = length
         count += 1
     return ModelFlow(
-        model.motion, model.opening, points[:count], lengths[:count], residuals[:count],
-        interaction, share < 1,
+        model.motion, model.opening, lengths[:count], residuals[:count],
+        share < 1,
     )  # fmt: skip
 
 
@@ -182,8 +173,9 @@ def share_within(motion: Array, step: Array, limit: Array) -> float:
 
 
 @compiled
-def add_forces(matrix: Array, step: Array, interaction: Array) -> None:
-    """Add the force that each edge's step (columns) takes from every edge (rows)."""
-    for e in range(step.shape[0]):
-        for f in range(step.shape[0]):
-            interaction[e, f] += matrix[e, f] * step[f]
+def norm(force: Array) -> float:
+    """Compute the Euclidean norm."""
+    square = 0.0
+    for e in range(force.shape[0]):
+        square += force[e] * force[e]
+    return float(np.sqrt(square))

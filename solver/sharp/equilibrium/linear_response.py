@@ -55,8 +55,22 @@ class LinearResponse(NamedTuple):
         Potentials and p of the references.
     scaled_opening : array, shape (N,)
         f there.
-    residual, isolated_correction : array, shape (2L,)
-        C_e - C_c in the reference, and the motion that would balance its gap by itself.
+    opening, residual, opening_by_pressure : array, shape (2L,)
+        C_e and C_e - C_c in the reference, and ∂C_e/∂p between held edges.
+    tangent : array, shape (2L, 2)
+        ∂(C_e - C_c)/∂n_f between both edges of a gap, in the potential of the others.
+    opening_by_potential, charge_by_edge : array, shape (N, 2)
+        ∂C_e/∂g of both edges of a gap by the potential at its nodes, with the other sign; and the
+        charges by the motion of each edge.
+    held_charge : array, shape (N, 2)
+        Charges between held edges in the reference, and by a unit of p.
+    damping, here : array, shape (2L,)
+        1/Δτ: force, as C_c² - C², that resists a unit of an edge's motion from where it is now, and
+        its motion from the reference up to there.
+    compliance : array, shape (2L, 2)
+        Inverse of the tangent with the damping.
+    isolated_correction : array, shape (2L,)
+        Motion that would balance a gap by itself.
     motion : array, shape (2L, 2)
         Motions of its edges without potentials and p, and by a unit of p.
     motion_by_potential : array, shape (N, 2)
@@ -81,7 +95,16 @@ class LinearResponse(NamedTuple):
     about: Array
     about_pressure: Array
     scaled_opening: Array
+    opening: Array
     residual: Array
+    opening_by_pressure: Array
+    tangent: Array
+    opening_by_potential: Array
+    charge_by_edge: Array
+    held_charge: Array
+    damping: Array
+    here: Array
+    compliance: Array
     isolated_correction: Array
     motion: Array
     motion_by_potential: Array
@@ -98,6 +121,8 @@ class ResponseSolution(NamedTuple):
     ----------
     motion, rate : array, shape (2L,)
         Outward motion n from the reference, and dn/dd along the branch.
+    by_pressure : array, shape (2L,)
+        ∂n/∂p.
     pressure, separation : float
         p and q0 s.
     slope : float
@@ -108,6 +133,7 @@ class ResponseSolution(NamedTuple):
 
     motion: Array
     rate: Array
+    by_pressure: Array
     pressure: float
     separation: float
     slope: float
@@ -118,7 +144,7 @@ class ResponseSolution(NamedTuple):
 def no_motion(gaps: int) -> ResponseSolution:
     """Make a solution in which no edge moves."""
     none = np.zeros(2 * gaps)
-    return ResponseSolution(none, none, np.nan, np.nan, np.nan, False)
+    return ResponseSolution(none, none, none, np.nan, np.nan, np.nan, False)
 
 
 @compiled
@@ -139,7 +165,16 @@ def allocate_response(
         about=np.zeros(n),
         about_pressure=np.zeros(count),
         scaled_opening=np.zeros(n),
+        opening=np.zeros(2 * count),
         residual=np.zeros(2 * count),
+        opening_by_pressure=np.zeros(2 * count),
+        tangent=np.zeros((2 * count, 2)),
+        opening_by_potential=np.zeros((n, 2)),
+        charge_by_edge=np.zeros((n, 2)),
+        held_charge=np.zeros((n, 2)),
+        damping=np.zeros(2 * count),
+        here=np.zeros(2 * count),
+        compliance=np.zeros((2 * count, 2)),
         isolated_correction=np.zeros(2 * count),
         motion=np.zeros((2 * count, 2)),
         motion_by_potential=np.zeros((n, 2)),
@@ -180,6 +215,7 @@ def solve_response(
     return ResponseSolution(
         motion=motion[:, 0] + pressure * motion[:, 1],
         rate=rates,
+        by_pressure=motion[:, 1].copy(),
         pressure=pressure,
         separation=separation,
         slope=rate if weight != 0 else rate * mean[1] / (2 * np.pi),

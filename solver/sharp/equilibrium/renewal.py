@@ -12,11 +12,12 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.equilibrium.gap_response import linearise_gap
+from adhesis.solver.sharp.equilibrium.gap_response import condense_gap, linearise_gap
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.equilibrium.linear_response import (
     Flags,
     LinearResponse,
+    motion_to,
     pressure_at,
     solve_response,
 )
@@ -33,7 +34,9 @@ from adhesis.solver.sharp.gap.conformal_map import (
     convergence_rate,
     map_gaps,
 )
+from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
+    FEW_REFERENCES,
     REFERENCE_BALANCE,
     REFERENCE_FAR,
     REFERENCE_MOST_FAR,
@@ -124,6 +127,7 @@ def outdated_references(
 def move_references(
     response: LinearResponse,
     gaps: Array,
+    damping: Array,
     pressure: float,
     prescribed: float,
     law: EdgeLaw,
@@ -131,17 +135,15 @@ def move_references(
 ) -> bool:
     """Move the references of gaps to these edges where they have departed from them.
 
-    ``pressure`` is p, with which the last solution gives the potentials. Returns False where a gap
-    or run needs more nodes than it has, or many gaps are far from their references: then another
-    response is to be set up.
+    ``damping`` is that of every edge from now on. ``pressure`` is p, with which the last solution
+    gives the potentials. Returns False where a gap or run needs more nodes than it has, or many
+    gaps are far from their references: then another response is to be set up.
     """
     table = map_gaps(gaps)
     nodes, counts = response.nodes, model.rules.counts
     changed, far = outdated_references(response, table, law)
     indices = np.flatnonzero(changed)
-    if indices.shape[0] == 0:
-        return True
-    if far.sum() > REFERENCE_MOST_FAR * changed.shape[0]:
+    if far.sum() > REFERENCE_MOST_FAR * max(changed.shape[0], FEW_REFERENCES):
         return False
     for gap in indices:
         order = nodes.orders[gap]
@@ -152,14 +154,20 @@ def move_references(
     for gap in indices:
         nodes.table[gap] = table[gap]
         response.held[gap] = far[gap]
-    column = np.zeros(changed.shape[0], dtype=np.int64)
-    fill_gaps(indices, nodes, response.equations, column, model)
+    resisted = damp_edges(response, gaps, damping)
+    if indices.shape[0] == 0:
+        condense_gaps(response, resisted, law, model)
+        return True
+    fill_gaps(indices, nodes, response.equations, model)
     renewed = True
     for k in range(changed.shape[0]):
         if changed[k] and renewed:
             renewed = _renew_gap(response, k, before[k], pressure, law, model)
-    if not (renewed and _replace_runs(response, changed, model)):
-        nodes.table[changed] = np.nan  # they serve for no other response
+        elif resisted[k]:
+            condense_gap(response, k, law, model.rules)
+            changed[k] = True
+    if not (renewed and _replace_runs(response, indices, model)):
+        nodes.table[indices] = np.nan  # they serve for no other response
         return False
     factor_runs(response, changed)
     if far.any():
@@ -170,6 +178,33 @@ def move_references(
                 linearise_in_current_potential(response, k, pressure, law, model)
         factor_runs(response, far)
     return True
+
+
+@compiled
+def damp_edges(response: LinearResponse, gaps: Array, damping: Array) -> Flags:
+    """Damp the motions of the edges from where they are; marks the gaps that are to be condensed.
+
+    Damped edges are where a reference was not moved to, if at all.
+    """
+    here = motion_to(response, gaps)
+    resisted = np.zeros(gaps.shape[0], dtype=np.bool_)
+    for e in range(damping.shape[0]):
+        if damping[e] != response.damping[e] or (
+            damping[e] != 0 and here[e] != response.here[e]
+        ):
+            resisted[e // 2] = True
+        response.damping[e], response.here[e] = damping[e], here[e]
+    return resisted
+
+
+@compiled
+def condense_gaps(response: LinearResponse, some: Flags, law: EdgeLaw, model: FieldModel) -> None:
+    """Eliminate the edges of some gaps anew, and factor the runs that hold them."""
+    for k in range(some.shape[0]):
+        if some[k]:
+            condense_gap(response, k, law, model.rules)
+    if some.any():
+        factor_runs(response, some)
 
 
 @compiled
@@ -203,15 +238,15 @@ def _renew_gap(
 
 
 @compiled
-def _replace_runs(response: LinearResponse, changed: Flags, model: FieldModel) -> bool:
+def _replace_runs(response: LinearResponse, changed: Integers, model: FieldModel) -> bool:
     """Place the runs anew that hold gaps that have changed.
 
     Returns whether they have enough charges.
     """
-    tree = response.tree
+    tree, count = response.tree, response.held.shape[0]
     renewed = np.zeros(tree.rank.shape[0], dtype=np.bool_)
-    renewed[: changed.shape[0]] = changed
-    for run in range(changed.shape[0], renewed.shape[0]):
+    renewed[changed] = True
+    for run in range(count, renewed.shape[0]):
         if renewed[tree.children[run, 0]] or renewed[tree.children[run, 1]]:
             renewed[run] = True
             if not replace_run(tree, run, response.nodes.table, model.digits):
@@ -237,9 +272,9 @@ def settle_response(
     response: LinearResponse, gaps: Array, prescribed: float, law: EdgeLaw, model: FieldModel
 ) -> bool:
     """Renew the response for a known equilibrium; returns False as :func:`move_references` does."""
-    renew_held(response, np.zeros(gaps.shape[0], dtype=np.bool_), law, model)
+    undamped = np.zeros(gaps.size)
     pressure = pressure_at(response, prescribed, model.device)
-    if not move_references(response, gaps, pressure, prescribed, law, model):
+    if not move_references(response, gaps, undamped, pressure, prescribed, law, model):
         return False
     solve_response(response, prescribed, model.device)
     return True

@@ -208,15 +208,26 @@ def _copy_gap(known: LinearResponse, j: int, out: LinearResponse, k: int) -> Non
     _copy(known.about, theirs, out.about, own)
     _copy(known.scaled_opening, theirs, out.scaled_opening, own)
     _copy(known.mean_by_potential, theirs, out.mean_by_potential, own)
+    _copy_edges(known, j, out, k)
+    for node in range(own.stop - own.start):
+        i, there = own.start + node, theirs.start + node
+        for side in range(2):
+            out.motion_by_potential[i, side] = known.motion_by_potential[there, side]
+            out.opening_by_potential[i, side] = known.opening_by_potential[there, side]
+            out.charge_by_edge[i, side] = known.charge_by_edge[there, side]
+            out.held_charge[i, side] = known.held_charge[there, side]
+
+
+@compiled
+def _copy_edges(known: LinearResponse, j: int, out: LinearResponse, k: int) -> None:
+    """Copy what is known of both edges of a gap."""
     for side in range(2):
         e, f = 2 * j + side, 2 * k + side
-        out.residual[f], out.isolated_correction[f] = (
-            known.residual[e],
-            known.isolated_correction[e],
-        )
+        out.opening[f], out.residual[f] = known.opening[e], known.residual[e]
+        out.opening_by_pressure[f] = known.opening_by_pressure[e]
+        out.damping[f], out.here[f] = known.damping[e], known.here[e]
+        out.isolated_correction[f] = known.isolated_correction[e]
         for column in range(2):
+            out.tangent[f, column] = known.tangent[e, column]
+            out.compliance[f, column] = known.compliance[e, column]
             out.motion[f, column] = known.motion[e, column]
-    for i in range(own.stop - own.start):
-        for side in range(2):
-            follows = known.motion_by_potential[theirs.start + i, side]
-            out.motion_by_potential[own.start + i, side] = follows
