@@ -99,10 +99,10 @@ REFERENCE_SCALE = 10.0
 """Length, in longest steps (``LONGEST_STEP``), over which the response changes in gaps and patches
 that are longer; its error is the motion squared over it. With one longest step 352 gaps took 17 %
 more CPU time, with the same losses to 2e-5."""
-SOFT_RATE = 2.0
-"""Mean |dn/dd| of all edges, as a unit. A faster edge is taken to be next to a fold, where its
-tangent changes fast, too: it may leave its reference by less. Without this, descents next to folds
-went to and fro between windows and all gaps, and took half of a loop's time."""
+SOFT_EDGE = 12.0
+"""Compliance of an edge to its opening, times the opening that descent cannot weigh, over a longest
+step. A softer edge is taken to be next to a fold, where its tangent changes fast, too: it may leave
+its reference by less. In loops at the paper's scale half of all edges have 4 to 8."""
 REFERENCE_BALANCE = 0.01
 """C_c. Edges further out of balance in the reference of their gap, in the potentials that it had,
 follow otherwise than its response has it. Without this rates were wrong by 2e-3 after some gaps had
@@ -191,8 +191,19 @@ RUNNING_LENGTH = 0.5
 """Longest steps; edges that move further in the model run."""
 RUNNING = 0.003
 """C_c. Edges further out of balance run, those nearer to it follow by their tangent."""
-MOST_DAMPING = 1e4
-"""Times the least 1/Δτ, at which all edges are damped."""
+DAMPING_GROWTH = 16.0
+"""Times by which the damping of running edges grows, where the edges are not stable with it. It
+begins as the tangent of their gaps."""
+MOST_DAMPING = 1e6
+"""Times that tangent; where the edges are not stable with it, they have no field."""
+SHORTEST_REACH = 0.1
+"""Longest steps; so short a step is not rejected."""
+FAINT_SADDLE = 0.01
+"""Faintest forces (``FAINT_FORCE``); at a saddle smaller ones are not followed."""
+MODEL_SHORT_STEP = 0.1
+"""Longest steps (0.005 λ_min) of one step through the model near balance, where modes of different
+edges may compete, and their times decide: with twenty times this a loop (γ = 0.04, seed 1) lost
+6e-5 less, as another edge came first."""
 SLOWEST = 0.01
 """Of the largest force. With equal speeds edges with less force than this are slower."""
 TIME_TRIES = 20

@@ -1,14 +1,14 @@
-"""Descent in energy along a jump: the gradient flow of the edges, by linearly implicit steps.
+"""Descent in energy along a jump: the gradient flow of the edges, on the tree of gaps; compiled.
 
-With n the outward motions and f = C_c² - C² the forces, a step (1/Δτ + H) Δn = f is Newton's step
-with a damping 1/Δτ at the edges that run: one more term in the tangent of each gap, so one pass of
-the tree of all gaps gives it (``linear_response``). All other edges follow by their tangent. As the
-forces fall the damping goes to zero, and the last step is Newton's. The damping is raised where the
-edges are not stable with it: the step would not be downhill.
+With n the outward motions and f = C_c² - C² the forces, the edges follow ṅ = f. Few of them run at
+a time: their tangent, with all others following, is condensed from the linear response
+(``condensed``). With it the flow of these edges is integrated through a model of their openings
+(``model_flow``), over several shortest waves where they run, and over a fraction of one near
+equilibria and saddles, where a gap closes or a patch vanishes. The field at the end of each step
+shows how wrong the model was. The others follow linearly.
 
-Where edges run, a step goes over several shortest waves: the flow of these edges is followed
-through a model of their openings (``model_flow``), made of their tangent with all others following
-(``condensed``), and the field at its end shows how wrong the model was.
+Where the edges are not stable, those that run are damped in the response: in the tangent of their
+gap a force 1/Δτ resists their motion. The condensed tangent is taken without it.
 """
 
 from __future__ import annotations
@@ -21,17 +21,21 @@ from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
 from adhesis.solver.sharp.descent.edge_model import model_about
 from adhesis.solver.sharp.descent.model_flow import (
-    ModelFlow,
     flow_through,
+    largest,
     near_balance,
     no_flow,
-    norm,
 )
 from adhesis.solver.sharp.descent.step_size import (
     model_error,
     next_reach,
 )
-from adhesis.solver.sharp.equilibrium.condensed import condense_tangent, follow_edges
+from adhesis.solver.sharp.equilibrium.condensed import (
+    condensed_residual,
+    follow_edges,
+    stiffness_of,
+    undamped,
+)
 from adhesis.solver.sharp.equilibrium.griffith import (
     EdgeLaw,
     critical_opening,
@@ -45,24 +49,23 @@ from adhesis.solver.sharp.equilibrium.linear_response import (
     pressure_at,
     solve_response,
 )
-from adhesis.solver.sharp.equilibrium.renewal import move_references
+from adhesis.solver.sharp.equilibrium.renewal import condense_gaps, damp_edges, move_references
 from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.gap.conformal_map import map_gaps
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
+    CLOSING_SHARE,
+    DAMPING_GROWTH,
     FIRST_REACH,
     FURTHEST_FOLLOWING,
     LEAST_REACH,
     LONG_CLOSING,
-    LONGEST_REACH,
-    MODEL_STEP,
     MOST_DAMPING,
-    RATE_GROWTH,
     REACH_CUT,
-    RECOVERY,
     RUNNING,
     RUNNING_LENGTH,
-    SLOWEST,
+    SHORTEST_REACH,
 )
 
 # Events that end a descent.
@@ -91,26 +94,6 @@ class Descent(NamedTuple):
     steps: int
 
 
-class LongStep(NamedTuple):
-    """Step through the model that the field at its end is to judge.
-
-    Attributes
-    ----------
-    edges : int array
-        That run in it; none for no step.
-    flow : ModelFlow
-    """
-
-    edges: Integers
-    flow: ModelFlow
-
-
-@compiled
-def no_long_step() -> LongStep:
-    """Make a step that is none."""
-    return LongStep(np.empty(0, dtype=np.int64), no_flow())
-
-
 @compiled_for_both
 def descend(
     response: LinearResponse,
@@ -123,135 +106,130 @@ def descend(
 ) -> Descent:
     """Descend in energy, d being ``prescribed``, until an event.
 
-    Edges that have begun to run are damped until the end. With equal speeds, for comparison, each
-    has the time Δτ in which its own force would move it by the longest step.
+    With equal speeds, for comparison, each edge has the time Δτ in which its own force would move
+    it by the longest step.
     """
-    damping = np.zeros(gaps.size)
-    runs = np.zeros(gaps.size, dtype=np.bool_)
-    before, tried = gaps, no_long_step()
-    reach, last = FIRST_REACH, np.zeros(gaps.size)
-    pressure, strongest, event, steps = (
-        pressure_at(response, prescribed, model.device), 0.0, STEP_LIMIT, 0
-    )  # fmt: skip
-    least = 1 / (MODEL_STEP * law.longest_step)
-    growth = least
+    damping, runs = np.zeros(gaps.size), np.zeros(gaps.size, dtype=np.bool_)
+    edges: Integers = np.flatnonzero(runs)  # that run, and those beside them
+    before, flow, reach = gaps, no_flow(), FIRST_REACH
+    pressure = pressure_at(response, prescribed, model.device)
+    strongest, event, steps = 0.0, STEP_LIMIT, 0
+    moved, judges = True, False
+    damped = 1.0
     while steps < most:
-        if not move_references(response, gaps, damping, pressure, prescribed, law, model):
-            event = OUTGROWN
-            break
-        steps += 1
-        now = solve_response(response, prescribed, model.device)
+        if moved:
+            if not move_references(response, gaps, damping, pressure, prescribed, law, model):
+                event = OUTGROWN
+                break
+        else:
+            condense_gaps(response, damp_edges(response, gaps, damping), model)
+        steps, moved = steps + 1, False
+        now = solve_response(response, prescribed, law, model.device)
         if not np.isfinite(now.pressure):
             event = NO_FIELD
             break
         if not now.stable:
-            growth *= RATE_GROWTH
-            if tried.edges.shape[0] > 0 and growth > MOST_DAMPING * least:
-                gaps, tried, growth = before, no_long_step(), least
-                reach = REACH_CUT
-            _run_soft(runs, response, growth > MOST_DAMPING * least)
-            _damp(damping, runs, response, growth, equal_speeds, law)
-            if growth > MOST_DAMPING**2 * least:
-                event = NO_FIELD
-                break
-            continue
-        if tried.edges.shape[0] > 0:
-            residual, _ = condense_tangent(response, tried.edges, now, law, model.device)
-            error = model_error(tried.flow, _openings(residual, tried.edges, gaps, law, model), law)
-            length = np.abs(tried.flow.motion).max() / law.longest_step
-            reach = next_reach(reach, length, error)
-            tried = no_long_step()
-            if error > 1:
-                gaps = before
-                continue
-        ahead = now.motion - response.here
-        if _run_more(runs, response, ahead, law):
-            _damp(damping, runs, response, growth, equal_speeds, law)
+            if not _run_soft(runs, response, damped > DAMPING_GROWTH):
+                damped *= DAMPING_GROWTH
+            if damped > MOST_DAMPING:
+                if not judges:
+                    event = NO_FIELD
+                    break
+                # the step was too long
+                gaps, judges, moved, damped, reach = before, False, True, 1.0, REACH_CUT * reach
+            _damp(damping, runs, damped, response)
             continue
         pressure = now.pressure
-        force = forces_of(response, runs)
-        strongest = max(strongest, norm(force))
-        balanced = near_balance(norm(force), strongest, law)
-        if reach >= LEAST_REACH and runs.any() and not balanced:
-            edges = _beside(runs)
-            residual, tangent = condense_tangent(response, edges, now, law, model.device)
+        if judges:
+            judges = False
+            stiffness = stiffness_of(response, edges, now, model.device)
+            residual = condensed_residual(stiffness, response, edges, now)
+            error = model_error(flow, residual, edges, gaps, law, model.panels)
+            length = np.abs(flow.motion).max() / law.longest_step
+            reach = max(next_reach(reach, length, error), SHORTEST_REACH)
+            if error > 1 and length > 1.5 * SHORTEST_REACH:
+                gaps, moved = before, True
+                continue
+        if _run_more(runs, response, now.motion - response.here, law):
+            _damp(damping, runs, damped, response)
+            continue
+        edges = _beside(runs)
+        stiffness = stiffness_of(response, edges, now, model.device)
+        residual = condensed_residual(stiffness, response, edges, now)
+        tangent = undamped(stiffness, response, edges)
+        force = force_at(residual, edges, gaps, law, model.panels)
+        strongest = max(strongest, force)
+        is_long = reach >= LEAST_REACH and not near_balance(force, strongest, law)
+        far = False
+        while True:
             openings = model_about(edges, gaps, residual, tangent, law, model.panels)
-            limit = step_limits(map_gaps(gaps), reach * law.longest_step, LONG_CLOSING)[edges]
-            flow = flow_through(openings, limit, equal_speeds, strongest, law, model.panels)
-            length = np.abs(flow.motion).max()
-            if flow.is_at_limit or length > RUNNING_LENGTH * law.longest_step:
-                to = response.here[edges] + flow.motion
-                way = follow_edges(response, edges, to, now, model.device) - response.here
-                there = move_edges(gaps, way)
-                if _run_far(runs, edges, way, law):
-                    _damp(damping, runs, response, growth, equal_speeds, law)
-                    continue
-                if not shortest_length(there) < law.smallest:
-                    before, gaps, tried = gaps, there, LongStep(edges, flow)
-                    growth = least
-                    _damp(damping, runs, response, growth, equal_speeds, law)
-                    continue
-        limit = step_limits(map_gaps(gaps), MODEL_STEP * law.longest_step)
-        share = 1.0
-        for e in range(limit.shape[0]):
-            if abs(ahead[e]) > limit[e]:
-                share = min(share, limit[e] / abs(ahead[e]))
-        ahead *= share
-        gaps = move_edges(gaps, ahead)
-        if np.abs(ahead).max() < law.rest_step and share == 1 and growth < 1.5 * least:
-            event = AT_REST
-            break
-        if shortest_length(gaps) < law.smallest:
+            most_motion, share = min(reach, 1.0) * law.longest_step, CLOSING_SHARE
+            if is_long:
+                most_motion, share = reach * law.longest_step, LONG_CLOSING
+            limit = step_limits(map_gaps(gaps), most_motion, share)[edges]
+            flow = flow_through(
+                openings, limit, equal_speeds, is_long, strongest, law, model.panels
+            )
+            size = largest(flow.motion)
+            to = response.here[edges] + flow.motion
+            way, pressure = follow_edges(stiffness, response, edges, to, now, model.device)
+            way -= response.here
+            way[edges] = flow.motion  # without rounding
+            far = _run_far(runs, edges, way, law)
+            there = move_edges(gaps, way)
+            vanished = shortest_length(there) < law.smallest
+            runs_on = flow.is_at_limit or size > RUNNING_LENGTH * law.longest_step
+            if far or not is_long or (runs_on and not vanished):
+                break
+            is_long = False
+            now = solve_response(response, prescribed, law, model.device)
+        if far:
+            _damp(damping, runs, damped, response)
+            continue
+        before, gaps, judges, moved = gaps, there, True, True
+        if vanished:
             event = VANISHED
             break
-        along = 0.0
-        for e in range(limit.shape[0]):
-            along += ahead[e] * last[e]
-        last = ahead
-        reach = min(RECOVERY * reach, LONGEST_REACH)
-        growth = 2 * growth if along < 0 else max(0.5 * growth, least)
-        _damp(damping, runs, response, growth, equal_speeds, law)
+        if size < law.rest_step and not flow.is_at_limit:
+            event = AT_REST
+            break
+        _damp(damping, runs, damped, response)
     if event == OUTGROWN:
         response.nodes.table[:] = np.nan
     return Descent(event, gaps, steps)
 
 
 @compiled
-def forces_of(response: LinearResponse, runs: Flags) -> Array:
-    """Compute the forces C_c² - C |C| on the edges that run, in the references; else 0."""
-    out = np.zeros(runs.shape[0])
-    for e in range(runs.shape[0]):
-        if runs[e]:
-            opening = response.opening[e]
-            critical = opening - response.residual[e]
-            out[e] = critical * critical - opening * abs(opening)
-    return out
+def force_at(
+    residual: Array, edges: Integers, gaps: Array, law: EdgeLaw, panels: Panels
+) -> float:
+    """Compute the norm of the forces C_c² - C |C| from C - C_c at some edges."""
+    square = 0.0
+    for i in range(edges.shape[0]):
+        critical, _ = critical_opening(gaps[edges[i] // 2, edges[i] % 2], law, panels)
+        opening = residual[i] + critical
+        square += (critical * critical - opening * abs(opening)) ** 2
+    return float(np.sqrt(square))
 
 
 @compiled
-def _damp(
-    damping: Array,
-    runs: Flags,
-    response: LinearResponse,
-    growth: float,
-    equal_speeds: bool,
-    law: EdgeLaw,
-) -> None:
-    """Damp the edges that run: 1/Δτ by the largest force or, with equal speeds, by the own one."""
-    force = np.abs(forces_of(response, runs))
-    most = max(force.max(), 1e-6 * law.critical * law.critical)
+def _damp(damping: Array, runs: Flags, times: float, response: LinearResponse) -> None:
+    """Damp the edges that run by so many times the tangent of their gaps."""
+    tangent = response.tangent
     for e in range(damping.shape[0]):
+        damping[e] = 0.0
         if runs[e]:
-            own = max(force[e], SLOWEST * most) if equal_speeds else most
-            damping[e] = growth * own
+            damping[e] = times * (abs(tangent[e, 0]) + abs(tangent[e, 1]))
 
 
 @compiled
-def _run_soft(runs: Flags, response: LinearResponse, everywhere: bool) -> None:
-    """Let the edges of gaps next to a fold run, or those of all."""
+def _run_soft(runs: Flags, response: LinearResponse, everywhere: bool) -> bool:
+    """Let the edges of gaps next to a fold run, or those of all; returns whether they are more."""
+    more = False
     for e in range(runs.shape[0]):
-        if everywhere or response.softness[e // 2] > 1:
-            runs[e] = True
+        if not runs[e] and (everywhere or response.softness[e // 2] > 1):
+            runs[e], more = True, True
+    return more
 
 
 @compiled
@@ -289,15 +267,3 @@ def _beside(runs: Flags) -> Integers:
             some[(e + 1) % count] = True
             some[e - 1] = True
     return np.flatnonzero(some)
-
-
-@compiled
-def _openings(
-    residual: Array, edges: Integers, gaps: Array, law: EdgeLaw, model: FieldModel
-) -> Array:
-    """Compute C from C - C_c at some edges."""
-    out = residual.copy()
-    for i in range(edges.shape[0]):
-        critical, _ = critical_opening(gaps[edges[i] // 2, edges[i] % 2], law, model.panels)
-        out[i] += critical
-    return out

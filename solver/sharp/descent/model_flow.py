@@ -25,7 +25,9 @@ from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.field.cholesky import factor_rows, padded, solve_column
 from adhesis.solver.sharp.gap.full_contact_stress import Panels
 from adhesis.solver.sharp.tolerances import (
+    FAINT_SADDLE,
     FORCES_FELL,
+    MODEL_SHORT_STEP,
     MODEL_STEP,
     MODEL_STEPS,
     NEAR_BALANCE,
@@ -69,10 +71,10 @@ def no_flow() -> ModelFlow:
 
 @compiled
 def flow_through(
-    model: EdgeModel, limit: Array, equal_speeds: bool, strongest: float, law: EdgeLaw,
-    panels: Panels,
+    model: EdgeModel, limit: Array, equal_speeds: bool, is_long: bool, strongest: float,
+    law: EdgeLaw, panels: Panels,
 ) -> ModelFlow:  # fmt: skip
-    """Follow the flow until an edge is at its limit, or near balance.
+    """Follow the flow until an edge is at its limit, or at rest; a long step, or near balance.
 
     ``model`` goes along with the edges. ``strongest`` is the largest norm of the forces on the way
     so far.
@@ -83,17 +85,18 @@ def flow_through(
     matrix = np.empty((edges, edges))
     force, step = np.empty(edges), np.empty(edges)
     factor = np.empty((edges, padded(edges)))
-    longest = MODEL_STEP * law.longest_step
+    longest = (MODEL_STEP if is_long else MODEL_SHORT_STEP) * law.longest_step
     count, length, share = 0, 0.0, 1.0
     while count < MODEL_STEPS and share == 1:
         model_forces(model, force)
         total = norm(force)
         strongest = max(strongest, total)
-        if near_balance(total, strongest, law):
+        if is_long and near_balance(total, strongest, law):
             break
         model_hessian(model, matrix)
-        size = implicit_step(matrix, force, longest, equal_speeds, factor, step)
-        if not size > RUNNING_ENDS * law.longest_step:
+        size, stable = implicit_step(matrix, force, longest, equal_speeds, factor, step)
+        faint = total < FAINT_SADDLE * law.force_error
+        if not size > RUNNING_ENDS * law.longest_step and (stable or faint):
             break
         share = share_within(model.motion, step, limit)
         if share < 1:
@@ -120,8 +123,10 @@ def near_balance(force: float, strongest: float, law: EdgeLaw) -> bool:
 @compiled
 def implicit_step(
     matrix: Array, force: Array, longest: float, equal_speeds: bool, factor: Array, step: Array
-) -> float:
+) -> tuple[float, bool]:
     """Take a linearly implicit step, (1/Δτ + H) Δn = force; returns the largest motion.
+
+    Returns also whether the edges are stable with the time of the largest force.
 
     No edge moves further than ``longest``. The time Δτ is that in which the largest force alone
     would move its edge so far; with equal speeds every edge has its own time, in which its own
@@ -131,7 +136,7 @@ def implicit_step(
     edges = force.shape[0]
     strongest = largest(force)
     growth = 1 / longest
-    size = 0.0
+    size, stable = 0.0, True
     for _ in range(TIME_TRIES):
         for e in range(edges):
             for f in range(e + 1):
@@ -139,6 +144,7 @@ def implicit_step(
             own = max(abs(force[e]), SLOWEST * strongest) if equal_speeds else strongest
             factor[e, e] += growth * own
         if not factor_rows(factor, 0.0):
+            stable = False
             growth *= RATE_GROWTH
             continue
         step[:] = force
@@ -149,7 +155,7 @@ def implicit_step(
         step *= longest / size
         growth *= min(RATE_GROWTH, 1.1 * size / longest)
         size = longest
-    return size
+    return size, stable
 
 
 @compiled

@@ -12,7 +12,9 @@ import numpy as np
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
 from adhesis.solver.sharp.descent.model_flow import ModelFlow
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, critical_opening
+from adhesis.solver.sharp.gap.full_contact_stress import Panels
+from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
     LONGEST_REACH,
     MODEL_ERROR,
@@ -24,23 +26,28 @@ from adhesis.solver.sharp.tolerances import (
 
 
 @compiled
-def model_error(flow: ModelFlow, field: Array, law: EdgeLaw) -> float:
+def model_error(
+    flow: ModelFlow, residual: Array, edges: Integers, gaps: Array, law: EdgeLaw, panels: Panels
+) -> float:
     """Measure by how much the openings of the model are wrong, in units of what is allowed.
 
-    ``field`` are the openings of the field at the end. On the way the errors are taken to grow as
-    the square of its length, and far from balance more is allowed.
+    ``residual`` is C - C_c of the field at the end. On the way the errors are taken to grow as the
+    square of its length, and far from balance more is allowed.
     """
     lengths, residuals = flow.lengths, flow.residuals
     last = lengths.shape[0] - 1
     worst = 0.0
-    for i in range(last + 1):
-        share = lengths[i] / lengths[last]
-        for e in range(field.shape[0]):
-            error = share * share * abs(field[e] - flow.opening[e])
+    for e in range(residual.shape[0]):
+        critical, _ = critical_opening(gaps[edges[e] // 2, edges[e] % 2], law, panels)
+        at_end = abs(residual[e] + critical - flow.opening[e])
+        for i in range(last + 1):
+            share = lengths[i] / lengths[last]
+            error = share * share * at_end
             unbalance = max(abs(residuals[i, e]) - error, 0.0)
-            # not written as max(): an error that is no number is too large
-            if not error <= worst * (MODEL_ERROR * law.critical + MODEL_SHARE * unbalance):
-                worst = error / (MODEL_ERROR * law.critical + MODEL_SHARE * unbalance)
+            allowed = MODEL_ERROR * law.critical + MODEL_SHARE * unbalance
+            # not written as > : an error that is no number is too large
+            if not error <= worst * allowed:
+                worst = error / allowed
     return worst
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled, compiled_for_both
-from adhesis.solver.sharp.equilibrium.gap_response import resistance
 from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.equilibrium.linear_response import (
     Flags,
@@ -26,10 +25,10 @@ from adhesis.solver.sharp.gap.quadrature import Integers
 @compiled
 def push_edges(
     response: LinearResponse, edges: Integers, force: Array, wanted: Flags
-) -> Array:
-    """Compute the motions at fixed p by forces, as -(C_e - C_c), on some edges.
+) -> tuple[Array, Array]:
+    """Compute the motions at fixed p by forces, as -(C_e - C_c), on some edges, and the potentials.
 
-    Of the gaps that are not ``wanted`` the motions are not computed.
+    Of the gaps that are not ``wanted`` they are not computed.
     """
     tree, factor, count = response.tree, response.factor, response.held.shape[0]
     runs = tree.rank.shape[0]
@@ -65,7 +64,7 @@ def push_edges(
                 g = potential[0, i]
                 alone[2 * k] += follows[i, 0] * g
                 alone[2 * k + 1] += follows[i, 1] * g
-    return alone
+    return alone, potential[0]
 
 
 @compiled
@@ -96,7 +95,7 @@ def compliance_of(
     for c in range(count):
         unit[:] = 0.0
         unit[c] = 1.0
-        motion = push_edges(response, edges, unit, wanted)
+        motion, _ = push_edges(response, edges, unit, wanted)
         more = pressure_by_force(response, edges[c], now, device)
         for f in range(count):
             out[f, c] = motion[edges[f]] + now.by_pressure[edges[f]] * more
@@ -112,53 +111,65 @@ def invert(matrix: Array) -> Array:
 
 
 @compiled
-def condense_tangent(
-    response: LinearResponse,
-    edges: Integers,
-    now: ResponseSolution,
-    law: EdgeLaw,
-    device: LoadingDevice,
-) -> tuple[Array, Array]:
-    """Compute C_e - C_c at some edges where they are, and ∂(C_e - C_c)/∂n_f, all others following.
+def stiffness_of(
+    response: LinearResponse, edges: Integers, now: ResponseSolution, device: LoadingDevice
+) -> Array:
+    """Compute ∂(C_e - C_c)/∂n_f between some edges, with their damping, all others following."""
+    compliance = compliance_of(response, edges, now, device)
+    out = np.eye(edges.shape[0])
+    eliminate(compliance, out)
+    return out
 
-    Returns also the inverse of the compliance, in which damping takes part.
-    """
-    stiffness = invert(compliance_of(response, edges, now, device))
+
+@compiled
+def undamped(stiffness: Array, response: LinearResponse, edges: Integers) -> Array:
+    """Return the tangent of some edges without their damping."""
+    out = stiffness.copy()
+    for e in range(edges.shape[0]):
+        out[e, e] -= response.damping[edges[e]]
+    return out
+
+
+@compiled
+def condensed_residual(
+    stiffness: Array, response: LinearResponse, edges: Integers, now: ResponseSolution
+) -> Array:
+    """Compute C_e - C_c at some edges where they are, all others following."""
     count = edges.shape[0]
-    residual = np.zeros(count)
+    out = np.zeros(count)
     for e in range(count):
         for f in range(count):
-            ahead = now.motion[edges[f]] - response.here[edges[f]]
-            residual[e] -= stiffness[e, f] * ahead
-    tangent = stiffness.copy()
-    for e in range(count):
-        tangent[e, e] -= resistance(response, edges[e], law)
-    return residual, tangent
+            out[e] -= stiffness[e, f] * (now.motion[edges[f]] - response.here[edges[f]])
+    return out
 
 
 @compiled
 def follow_edges(
+    stiffness: Array,
     response: LinearResponse,
     edges: Integers,
     motion: Array,
     now: ResponseSolution,
     device: LoadingDevice,
-) -> Array:
-    """Compute the motions of all edges from their references when some have a given ``motion``."""
-    stiffness = invert(compliance_of(response, edges, now, device))
+) -> tuple[Array, float]:
+    """Compute the motions of all edges from their references when some have a given ``motion``.
+
+    Also returns p. The potentials of the response are those with these motions from now on.
+    """
     count = edges.shape[0]
     force = np.zeros(count)
+    more = 0.0
     for e in range(count):
         for f in range(count):
             force[e] += stiffness[e, f] * (motion[f] - now.motion[edges[f]])
-    everywhere = np.ones(response.held.shape[0], dtype=np.bool_)
-    out = now.motion + push_edges(response, edges, force, everywhere)
-    more = 0.0
-    for e in range(count):
         more += force[e] * pressure_by_force(response, edges[e], now, device)
+    everywhere = np.ones(response.held.shape[0], dtype=np.bool_)
+    out, potential = push_edges(response, edges, force, everywhere)
     for e in range(out.shape[0]):
-        out[e] += now.by_pressure[e] * more
-    return out
+        out[e] += now.motion[e] + now.by_pressure[e] * more
+    for i in range(potential.shape[0]):
+        response.potential[0, i] += potential[i]
+    return out, now.pressure + more
 
 
 @compiled_for_both
@@ -170,5 +181,5 @@ def tangent_between(
     device: LoadingDevice,
 ) -> Array:
     """Compute ∂(C_e - C_c)/∂n_f between some edges, all others following."""
-    now = solve_response(response, prescribed, device)
-    return condense_tangent(response, edges, now, law, device)[1]
+    now = solve_response(response, prescribed, law, device)
+    return undamped(stiffness_of(response, edges, now, device), response, edges)

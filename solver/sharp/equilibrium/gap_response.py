@@ -33,7 +33,7 @@ def linearise_gap(out: LinearResponse, k: int, law: EdgeLaw, model: FieldModel) 
     _open_edges(out, k, solved, ends, model)
     _differentiate_edges(out, k, ends, law, model)
     _charge_edges(out, k, solved, singular, ends[:, 5], model.rules)
-    condense_gap(out, k, law, model.rules)
+    condense_gap(out, k, model.rules)
 
 
 @compiled_sums
@@ -180,16 +180,8 @@ def _charge_edges(
             out.charge_by_edge[first + i, side] = part
 
 
-@compiled
-def resistance(out: LinearResponse, e: int, law: EdgeLaw) -> float:
-    """Return what the damping of an edge adds to ∂(C_e - C_c)/∂n_e: per force as C_c² - C²."""
-    both = 2 * out.opening[e] - out.residual[e]  # C_e + C_c
-    value: float = out.damping[e] / max(both, law.overlap_limit)
-    return value
-
-
 @compiled_sums
-def condense_gap(out: LinearResponse, k: int, law: EdgeLaw, rules: GaussRules) -> None:
+def condense_gap(out: LinearResponse, k: int, rules: GaussRules) -> None:
     """Eliminate the motions of a gap's edges: its charges and edges by potentials and p.
 
     Damping resists the motion of an edge from where it is now.
@@ -198,7 +190,7 @@ def condense_gap(out: LinearResponse, k: int, law: EdgeLaw, rules: GaussRules) -
     m = behind - first
     compliance, motion = out.compliance[2 * k : 2 * k + 2], out.motion[2 * k : 2 * k + 2]
     tangent, pressure = out.tangent[2 * k : 2 * k + 2], out.about_pressure[k]
-    left, right = resistance(out, 2 * k, law), resistance(out, 2 * k + 1, law)
+    left, right = out.damping[2 * k], out.damping[2 * k + 1]
     a, b = tangent[0, 0] + left, tangent[0, 1]
     c, d = tangent[1, 0], tangent[1, 1] + right
     det = a * d - b * c

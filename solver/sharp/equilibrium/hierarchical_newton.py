@@ -90,7 +90,7 @@ def equilibrium_many(
         if not move_references(response, gaps, undamped, pressure, prescribed, law, model):
             is_outgrown = True
             break
-        now = solve_response(response, prescribed, model.device)
+        now = solve_response(response, prescribed, law, model.device)
         pressure = now.pressure
         step = now.motion - motion_to(response, gaps)
         size = np.abs(step).max()

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from adhesis.solver.model.profile import Array
 from adhesis.solver.runtime.jit import compiled
+from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw
 from adhesis.solver.sharp.field.cluster_tree import Tree
 from adhesis.solver.sharp.field.solution import Equations, LoadingDevice, Nodes
 from adhesis.solver.sharp.field.tree_factor import (
@@ -29,7 +30,7 @@ from adhesis.solver.sharp.field.tree_factor import (
     whole_tree,
 )
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT
-from adhesis.solver.sharp.tolerances import SOFT_RATE
+from adhesis.solver.sharp.tolerances import SOFT_EDGE
 
 Flags = NDArray[np.bool_]
 
@@ -65,7 +66,7 @@ class LinearResponse(NamedTuple):
     held_charge : array, shape (N, 2)
         Charges between held edges in the reference, and by a unit of p.
     damping, here : array, shape (2L,)
-        1/Δτ: force, as C_c² - C², that resists a unit of an edge's motion from where it is now, and
+        Resistance of an edge to its motion from where it is now, as C_e - C_c by the motion, and
         its motion from the reference up to there.
     compliance : array, shape (2L, 2)
         Inverse of the tangent with the damping.
@@ -82,7 +83,7 @@ class LinearResponse(NamedTuple):
     mean : array, shape (2,)
         Its mean opening, times 2π, likewise.
     softness : array, shape (L,)
-        Rate dn/dd of each gap's edges, or their neighbours', over that from which on gaps are soft.
+        Compliance of each gap's edges, or their neighbours', over that from which on gaps are soft.
     """
 
     nodes: Nodes
@@ -187,7 +188,7 @@ def allocate_response(
 
 @compiled
 def solve_response(
-    response: LinearResponse, prescribed: float, device: LoadingDevice
+    response: LinearResponse, prescribed: float, law: EdgeLaw, device: LoadingDevice
 ) -> ResponseSolution:
     """Solve for all edges, with d prescribed."""
     tree, nodes = response.tree, response.nodes
@@ -210,11 +211,10 @@ def solve_response(
     if device.compliance != 0:
         separation = (mean[0] + pressure * mean[1]) / (2 * np.pi)
     negative = response.factor.negative[-1]
-    rates = motion[:, 1] * rate
-    _update_softness(response.softness, rates)
+    _update_softness(response, motion, law)
     return ResponseSolution(
         motion=motion[:, 0] + pressure * motion[:, 1],
-        rate=rates,
+        rate=motion[:, 1] * rate,
         by_pressure=motion[:, 1].copy(),
         pressure=pressure,
         separation=separation,
@@ -224,16 +224,21 @@ def solve_response(
 
 
 @compiled
-def _update_softness(softness: Array, rate: Array) -> None:
-    """Compute how soft each gap is by its largest rate, or its neighbours'."""
-    count = softness.shape[0]
-    mean = np.abs(rate).mean()
+def _update_softness(response: LinearResponse, motion: Array, law: EdgeLaw) -> None:
+    """Compute how soft each gap is by its softest edge, or its neighbours'.
+
+    That is the compliance with which edges follow their openings, over that by roughness of the
+    shortest wave.
+    """
+    count, softness = response.held.shape[0], response.softness
+    unit = SOFT_EDGE * law.longest_step / law.overlap_limit
     for k in range(count):
-        largest = 0.0
+        softness[k] = 1.0
+    for e in range(2 * count):
+        soft = abs(motion[e, 1] / response.opening_by_pressure[e]) / unit
         for beside in range(-1, 2):
-            j = (k + beside) % count
-            largest = max(largest, abs(rate[2 * j]), abs(rate[2 * j + 1]))
-        softness[k] = max(largest / (SOFT_RATE * mean), 1.0)
+            k = (e // 2 + beside) % count
+            softness[k] = max(softness[k], soft)
 
 
 @compiled

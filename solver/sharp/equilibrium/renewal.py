@@ -156,7 +156,7 @@ def move_references(
         response.held[gap] = far[gap]
     resisted = damp_edges(response, gaps, damping)
     if indices.shape[0] == 0:
-        condense_gaps(response, resisted, law, model)
+        condense_gaps(response, resisted, model)
         return True
     fill_gaps(indices, nodes, response.equations, model)
     renewed = True
@@ -164,7 +164,7 @@ def move_references(
         if changed[k] and renewed:
             renewed = _renew_gap(response, k, before[k], pressure, law, model)
         elif resisted[k]:
-            condense_gap(response, k, law, model.rules)
+            condense_gap(response, k, model.rules)
             changed[k] = True
     if not (renewed and _replace_runs(response, indices, model)):
         nodes.table[indices] = np.nan  # they serve for no other response
@@ -172,7 +172,7 @@ def move_references(
     factor_runs(response, changed)
     if far.any():
         # their potentials are not those of the old edges: solved with these held
-        pressure = solve_response(response, prescribed, model.device).pressure
+        pressure = solve_response(response, prescribed, law, model.device).pressure
         for k in range(far.shape[0]):
             if far[k]:
                 linearise_in_current_potential(response, k, pressure, law, model)
@@ -198,11 +198,11 @@ def damp_edges(response: LinearResponse, gaps: Array, damping: Array) -> Flags:
 
 
 @compiled
-def condense_gaps(response: LinearResponse, some: Flags, law: EdgeLaw, model: FieldModel) -> None:
+def condense_gaps(response: LinearResponse, some: Flags, model: FieldModel) -> None:
     """Eliminate the edges of some gaps anew, and factor the runs that hold them."""
     for k in range(some.shape[0]):
         if some[k]:
-            condense_gap(response, k, law, model.rules)
+            condense_gap(response, k, model.rules)
     if some.any():
         factor_runs(response, some)
 
@@ -276,5 +276,5 @@ def settle_response(
     pressure = pressure_at(response, prescribed, model.device)
     if not move_references(response, gaps, undamped, pressure, prescribed, law, model):
         return False
-    solve_response(response, prescribed, model.device)
+    solve_response(response, prescribed, law, model.device)
     return True

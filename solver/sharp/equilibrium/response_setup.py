@@ -121,7 +121,7 @@ def update_response(
         else:
             _copy_gap(known, source[k], out, k)
     factor_runs(out, same < 0)
-    pressure = solve_response(out, prescribed, model.device).pressure
+    pressure = solve_response(out, prescribed, law, model.device).pressure
     if not np.isfinite(pressure):
         return out, False
     for k in range(fresh.shape[0]):
