@@ -41,6 +41,7 @@ from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import (
     DESCENT_LIMIT,
     FINER_FIELD,
+    FIRST_REACH,
     LAST_GAP,
     RESPONSE_TRIALS,
     RESTS,
@@ -227,17 +228,18 @@ class EdgeMechanics(EdgeProblem):
         equal_speeds: bool,
     ) -> tuple[Descent, Integers]:
         """Descend on a linear response; returns the orders that it came to, too."""
+        runs, reach = np.zeros(gaps.size, dtype=bool), FIRST_REACH
         while True:
             near = self.responses.near(gaps, prescribed, orders)
             if near is None:
-                return Descent(NO_FIELD, gaps, 0), orders
+                return Descent(NO_FIELD, gaps, 0, reach), orders
             end: Descent = descend(
-                near.response, gaps, prescribed, most, equal_speeds, law, self.model
+                near.response, gaps, prescribed, most, equal_speeds, runs, reach, law, self.model
             )
             self.count.add_descent(end.steps, end.steps)
             if end.event != OUTGROWN:
                 return end, near.response.nodes.orders.copy()
-            gaps = end.gaps
+            gaps, reach = end.gaps, end.reach
             near.is_outgrown = True
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:

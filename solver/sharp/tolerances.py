@@ -189,13 +189,20 @@ RUNNING_ENDS = 0.01
 """Longest steps; a shorter one ends the flow through the model."""
 RUNNING_LENGTH = 0.5
 """Longest steps; edges that move further in the model run."""
-RUNNING = 0.003
+RUNNING = 0.01
 """C_c. Edges further out of balance run, those nearer to it follow by their tangent."""
+LEAST_DAMPING = 2.0
+"""Times the tangent of their gaps: damping of running edges. With once that, it may cancel it."""
 DAMPING_GROWTH = 16.0
-"""Times by which the damping of running edges grows, where the edges are not stable with it. It
-begins as the tangent of their gaps."""
+"""Times by which that grows where the edges are not stable with it."""
+SOFT_SHARE = 0.3
+"""Of the softness of the softest gap; softer ones run where the edges are not stable."""
 MOST_DAMPING = 1e6
 """Times that tangent; where the edges are not stable with it, they have no field."""
+FOLLOWING = 0.2
+"""Longest steps; edges that Newton's step of all edges moves further run."""
+SHORT_REACH = 3.0
+"""Longest steps: reach of a step near balance."""
 SHORTEST_REACH = 0.1
 """Longest steps; so short a step is not rejected."""
 FAINT_SADDLE = 0.01

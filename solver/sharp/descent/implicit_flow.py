@@ -57,15 +57,18 @@ from adhesis.solver.sharp.gap.quadrature import Integers
 from adhesis.solver.sharp.tolerances import (
     CLOSING_SHARE,
     DAMPING_GROWTH,
-    FIRST_REACH,
+    FOLLOWING,
     FURTHEST_FOLLOWING,
+    LEAST_DAMPING,
     LEAST_REACH,
     LONG_CLOSING,
     MOST_DAMPING,
     REACH_CUT,
     RUNNING,
     RUNNING_LENGTH,
+    SHORT_REACH,
     SHORTEST_REACH,
+    SOFT_SHARE,
 )
 
 # Events that end a descent.
@@ -87,11 +90,14 @@ class Descent(NamedTuple):
         Where it ended.
     steps : int
         Solutions of the linear response.
+    reach : float
+        Of the next long step, in longest steps.
     """
 
     event: int
     gaps: Array
     steps: int
+    reach: float
 
 
 @compiled_for_both
@@ -101,21 +107,28 @@ def descend(
     prescribed: float,
     most: int,
     equal_speeds: bool,
+    runs: Flags,
+    reach: float,
     law: EdgeLaw,
     model: FieldModel,
 ) -> Descent:
     """Descend in energy, d being ``prescribed``, until an event.
 
+    ``runs`` marks the edges that run already, and is changed in place; ``reach`` is that of the
+    first long step.
+
     With equal speeds, for comparison, each edge has the time Δτ in which its own force would move
     it by the longest step.
     """
-    damping, runs = np.zeros(gaps.size), np.zeros(gaps.size, dtype=np.bool_)
+    damping = np.zeros(gaps.size)
     edges: Integers = np.flatnonzero(runs)  # that run, and those beside them
-    before, flow, reach = gaps, no_flow(), FIRST_REACH
+    before, flow = gaps, no_flow()
     pressure = pressure_at(response, prescribed, model.device)
     strongest, event, steps = 0.0, STEP_LIMIT, 0
     moved, judges = True, False
-    damped = 1.0
+    stiffness = np.empty((0, 0))
+    damped = LEAST_DAMPING
+    _damp(damping, runs, damped, response)
     while steps < most:
         if moved:
             if not move_references(response, gaps, damping, pressure, prescribed, law, model):
@@ -123,7 +136,7 @@ def descend(
                 break
         else:
             condense_gaps(response, damp_edges(response, gaps, damping), model)
-        steps, moved = steps + 1, False
+        steps, moved, stiffness = steps + 1, False, np.empty((0, 0))
         now = solve_response(response, prescribed, law, model.device)
         if not np.isfinite(now.pressure):
             event = NO_FIELD
@@ -136,7 +149,8 @@ def descend(
                     event = NO_FIELD
                     break
                 # the step was too long
-                gaps, judges, moved, damped, reach = before, False, True, 1.0, REACH_CUT * reach
+                gaps, judges, moved = before, False, True
+                damped, reach = LEAST_DAMPING, max(REACH_CUT * reach, SHORTEST_REACH)
             _damp(damping, runs, damped, response)
             continue
         pressure = now.pressure
@@ -153,8 +167,10 @@ def descend(
         if _run_more(runs, response, now.motion - response.here, law):
             _damp(damping, runs, damped, response)
             continue
-        edges = _beside(runs)
-        stiffness = stiffness_of(response, edges, now, model.device)
+        some = _beside(runs)
+        if stiffness.shape[0] == 0 or some.shape[0] != edges.shape[0]:
+            edges = some
+            stiffness = stiffness_of(response, edges, now, model.device)
         residual = condensed_residual(stiffness, response, edges, now)
         tangent = undamped(stiffness, response, edges)
         force = force_at(residual, edges, gaps, law, model.panels)
@@ -163,7 +179,7 @@ def descend(
         far = False
         while True:
             openings = model_about(edges, gaps, residual, tangent, law, model.panels)
-            most_motion, share = min(reach, 1.0) * law.longest_step, CLOSING_SHARE
+            most_motion, share = min(reach, SHORT_REACH) * law.longest_step, CLOSING_SHARE
             if is_long:
                 most_motion, share = reach * law.longest_step, LONG_CLOSING
             limit = step_limits(map_gaps(gaps), most_motion, share)[edges]
@@ -186,17 +202,18 @@ def descend(
         if far:
             _damp(damping, runs, damped, response)
             continue
-        before, gaps, judges, moved = gaps, there, True, True
+        judges = edges.shape[0] > 0
+        before, gaps, moved = gaps, there, True
         if vanished:
             event = VANISHED
             break
-        if size < law.rest_step and not flow.is_at_limit:
+        if largest(way) < law.rest_step and not flow.is_at_limit:
             event = AT_REST
             break
         _damp(damping, runs, damped, response)
     if event == OUTGROWN:
         response.nodes.table[:] = np.nan
-    return Descent(event, gaps, steps)
+    return Descent(event, gaps, steps, reach)
 
 
 @compiled
@@ -225,9 +242,10 @@ def _damp(damping: Array, runs: Flags, times: float, response: LinearResponse) -
 @compiled
 def _run_soft(runs: Flags, response: LinearResponse, everywhere: bool) -> bool:
     """Let the edges of gaps next to a fold run, or those of all; returns whether they are more."""
-    more = False
+    more, softest = False, response.softness.max()
     for e in range(runs.shape[0]):
-        if not runs[e] and (everywhere or response.softness[e // 2] > 1):
+        soft = response.softness[e // 2] > SOFT_SHARE * softest
+        if not runs[e] and (everywhere or soft):
             runs[e], more = True, True
     return more
 
@@ -237,8 +255,9 @@ def _run_more(runs: Flags, response: LinearResponse, ahead: Array, law: EdgeLaw)
     """Let edges run that are out of balance or move far; returns whether they are more."""
     more = False
     for e in range(runs.shape[0]):
-        far = abs(response.residual[e]) > RUNNING * law.critical or abs(ahead[e]) > law.rest_step
-        if far and not runs[e]:
+        unbalanced = abs(response.residual[e]) > RUNNING * law.critical
+        far = abs(ahead[e]) > FOLLOWING * law.longest_step
+        if (unbalanced or far) and not runs[e]:
             runs[e], more = True, True
     return more
 
