@@ -119,6 +119,8 @@ REFERENCE_PATCH = 0.2
 """Share of a patch by which it may change before the nodes beside it are placed anew."""
 FURTHER_ORDERS = 2
 """Orders by which the rule of a gap that has changed is raised beyond what it needs."""
+FURTHER_CHARGES = 1.25
+"""Factor on the charges of the runs that hold such a gap."""
 RESPONSES_KEPT = 3
 """Responses that are kept, each of another number of gaps."""
 RESPONSE_TRIALS = 4

@@ -211,8 +211,6 @@ def descend(
             event = AT_REST
             break
         _damp(damping, runs, damped, response)
-    if event == OUTGROWN:
-        response.nodes.table[:] = np.nan
     return Descent(event, gaps, steps, reach)
 
 

@@ -39,7 +39,7 @@ from adhesis.solver.sharp.field.solution import FieldModel
 from adhesis.solver.sharp.field.tree_factor import empty_factor
 from adhesis.solver.sharp.gap.conformal_map import LEFT, RIGHT, convergence_rate, in_order, map_gaps
 from adhesis.solver.sharp.gap.quadrature import Integers, choose_orders
-from adhesis.solver.sharp.tolerances import FURTHER_ORDERS, REFERENCE_MOST_FAR
+from adhesis.solver.sharp.tolerances import FURTHER_CHARGES, FURTHER_ORDERS, REFERENCE_MOST_FAR
 
 
 @compiled_for_both
@@ -101,7 +101,7 @@ def update_response(
     for run in range(same.shape[0]):
         if same[run] >= 0:
             rank[run] = known.tree.rank[same[run]]
-    tree = empty_tree(table, offset, children, rank, model.digits, True)
+    tree = empty_tree(table, offset, children, rank, FURTHER_CHARGES * model.digits, True)
     out = allocate_response(nodes, equations, tree, empty_factor(tree))
     out.held[:] = fresh
     tree.theta[: offset[-1]] = nodes.theta
