@@ -16,9 +16,16 @@ from adhesis.solver.sharp.descent.implicit_flow import (
     Descent,
     descend,
 )
+from adhesis.solver.sharp.descent.saddle import leaving_step, positions
 from adhesis.solver.sharp.equilibrium.branch_point import Point
 from adhesis.solver.sharp.equilibrium.condensed import tangent_between
-from adhesis.solver.sharp.equilibrium.griffith import EdgeLaw, imbalance, shortest_length
+from adhesis.solver.sharp.equilibrium.griffith import (
+    EdgeLaw,
+    imbalance,
+    move_edges,
+    shortest_length,
+    step_limits,
+)
 from adhesis.solver.sharp.equilibrium.hierarchical_newton import (
     EquilibriumOfMany,
     equilibrium_many,
@@ -40,6 +47,7 @@ from adhesis.solver.sharp.system.edge_problem import EdgeProblem
 from adhesis.solver.sharp.system.kept_responses import KeptResponses
 from adhesis.solver.sharp.tolerances import (
     DESCENT_LIMIT,
+    EQUAL_GAINS,
     FINER_FIELD,
     FIRST_REACH,
     LAST_GAP,
@@ -214,7 +222,10 @@ class EdgeMechanics(EdgeProblem):
                 point = self.equilibrium(gaps, prescribed, reach, orders, strict=strict)
                 if point is not None:
                     return point
-                if not strict and rests <= 2 * RESTS:
+                left_saddle = self._leave_saddle(gaps, prescribed)
+                if left_saddle is not None:
+                    gaps = left_saddle
+                elif not strict and rests <= 2 * RESTS:
                     gaps = self._perturb_most_unbalanced(gaps, prescribed, rests - RESTS)
         raise NoState("edges that descend in energy do not come to rest", prescribed)
 
@@ -241,6 +252,35 @@ class EdgeMechanics(EdgeProblem):
                 return end, near.response.nodes.orders.copy()
             gaps, reach = end.gaps, end.reach
             near.is_outgrown = True
+
+    def _leave_saddle(self, gaps: Array, prescribed: float) -> Array | None:
+        """Move edges without force off a saddle of the energy; None where they are stable.
+
+        Both directions along the softest modes are tried, and that on which energy falls more is
+        taken, of equal ones that in which the leading edge goes outwards.
+        """
+        near = self.responses.at(gaps, prescribed)
+        if near is None:
+            return None
+        every = np.arange(gaps.size)
+        tangent = tangent_between(near.response, every, prescribed, self.law, self.model.device)
+        by_edge = near.response.opening[:, None] * tangent
+        limit = step_limits(map_gaps(gaps), self.law.longest_step)
+        step = leaving_step(by_edge + by_edge.T, limit, positions(gaps, self.law.origin))
+        if step is None:
+            return None
+        ways = [move_edges(gaps, way) for way in (step, -step)]
+        onwards = self._force_along(ways[0], step, prescribed)
+        backwards = self._force_along(ways[1], -step, prescribed)
+        if not max(onwards, backwards) > 0:
+            return None
+        return ways[0] if onwards >= backwards * (1 - EQUAL_GAINS) else ways[1]
+
+    def _force_along(self, gaps: Array, step: Array, prescribed: float) -> float:
+        """Compute the force along a ``step`` at its end: positive where the energy falls."""
+        solution = self.solution(gaps, prescribed)
+        residual, _ = imbalance(solution, self.law, self.source.panels)
+        return -float((residual * (2 * solution.opening - residual)) @ step)
 
     def _smallest_of_last_gap(self, gaps: Array, smallest: float) -> float:
         """Return the length below which the last gap is closed.

@@ -99,10 +99,11 @@ REFERENCE_SCALE = 10.0
 """Length, in longest steps (``LONGEST_STEP``), over which the response changes in gaps and patches
 that are longer; its error is the motion squared over it. With one longest step 352 gaps took 17 %
 more CPU time, with the same losses to 2e-5."""
-SOFT_EDGE = 12.0
-"""Compliance of an edge to its opening, times the opening that descent cannot weigh, over a longest
-step. A softer edge is taken to be next to a fold, where its tangent changes fast, too: it may leave
-its reference by less. In loops at the paper's scale half of all edges have 4 to 8."""
+SOFT_EDGE = 6.0
+"""Compliance of an edge, over that of its gap by itself or by roughness of the shortest wave. A
+softer edge is taken to be next to a fold, where its tangent changes fast, too: it may leave its
+reference by less. In loops at the paper's scale half of all edges have 2 to 4. Without this folds
+were found up to 6e-4 h_max late."""
 REFERENCE_BALANCE = 0.01
 """C_c. Edges further out of balance in the reference of their gap, in the potentials that it had,
 follow otherwise than its response has it. Without this rates were wrong by 2e-3 after some gaps had

@@ -211,7 +211,7 @@ def solve_response(
     if device.compliance != 0:
         separation = (mean[0] + pressure * mean[1]) / (2 * np.pi)
     negative = response.factor.negative[-1]
-    _update_softness(response, motion, law)
+    _update_softness(response, motion, by_pressure, law, device)
     return ResponseSolution(
         motion=motion[:, 0] + pressure * motion[:, 1],
         rate=motion[:, 1] * rate,
@@ -224,18 +224,27 @@ def solve_response(
 
 
 @compiled
-def _update_softness(response: LinearResponse, motion: Array, law: EdgeLaw) -> None:
+def _update_softness(
+    response: LinearResponse, motion: Array, by_pressure: float, law: EdgeLaw, device: LoadingDevice
+) -> None:
     """Compute how soft each gap is by its softest edge, or its neighbours'.
 
-    That is the compliance with which edges follow their openings, over that by roughness of the
-    shortest wave.
+    That is the compliance with which edges follow their openings, over that of their gap by itself
+    or by roughness of the shortest wave, at the prescribed d: edges by p, times how much more p
+    changes than with all edges held (and without the potentials of other gaps).
     """
     count, softness = response.held.shape[0], response.softness
-    unit = SOFT_EDGE * law.longest_step / law.overlap_limit
+    held = 0.0
+    for i in range(response.held_charge.shape[0]):
+        held += response.tree.stretch[i] * response.held_charge[i, 1]
+    held = device.separation_weight * held - 2 * np.pi * device.compliance
+    more = abs(held / by_pressure) / SOFT_EDGE
+    rough, tangent = 0.5 * law.overlap_limit / law.longest_step, response.tangent
     for k in range(count):
         softness[k] = 1.0
     for e in range(2 * count):
-        soft = abs(motion[e, 1] / response.opening_by_pressure[e]) / unit
+        stiff = max(rough, abs(tangent[e, 0]) + abs(tangent[e, 1]))
+        soft = more * stiff * abs(motion[e, 1] / response.opening_by_pressure[e])
         for beside in range(-1, 2):
             k = (e // 2 + beside) % count
             softness[k] = max(softness[k], soft)
