@@ -2,9 +2,10 @@
 
     python benchmarks/finite_range.py [--profiles 40] [--seed 1]
 
-Of random even profiles whose loops have one patch throughout, the zero-range loss (by ``sharp``
-and by the formulas here) and the exact one at half of the least of ``valid_range``, ``edge_range``
-and ``touch_range``: it must be less than a tenth off. Exit code 1 if one is.
+Of random even profiles whose loops have one even patch throughout, the losses of zero range (by
+``sharp``, and by the formulas here) are set beside the exact one at half of the least of
+``valid_range``, ``edge_range`` and ``touch_range``: it must be less than a tenth off. Exit code 1
+if one is.
 
 The profile is h = Σ A_n cos(nθ), θ = 2πx/λ, in contact for |θ| < a, cohesive for a < |θ| < c, where
 the gap grows from 0 to δ. With y = sin²(a/2), u = sin(θ/2), and P_n Legendre's polynomials:
@@ -187,7 +188,8 @@ def compare(amplitudes, alpha, share):
     problem = Problem(Profile(PERIOD, coefficients), HalfSpace(MODULUS, 0.0), gamma)
     loop = run_loop(make_method("sharp", problem, accuracy=1e-4), max_penetration=share)
     kinds = sorted(jump.kind for jump in loop.jumps if not jump.small_scale)
-    if kinds != ["pull-off", "snap-in"] or loop.largest_contact_fraction > 0.9:
+    raced = any(jump.raced for jump in loop.jumps)  # one edge runs ahead: no longer even
+    if kinds != ["pull-off", "snap-in"] or raced or loop.largest_contact_fraction > 0.9:
         return None
     scene = OnePatch(HEIGHT * q0 * np.asarray(amplitudes), gamma * q0 / MODULUS)
     depth = share * loop.problem.profile.h_max * q0
