@@ -1049,3 +1049,15 @@ def test_campaigns_that_come_along_are_comparable_with_the_paper_campaign():
             for task in other.tasks()[:: other.sweep.realisations]:
                 quoted = paper.m2(task.hurst)
                 assert make_problem(other, task).profile.m2 == pytest.approx(quoted, rel=0.05)
+
+
+def test_loops_of_a_machine_are_drawn_against_its_own_penetration(tmp_path):
+    plan = parse_campaign(
+        campaign(hurst=(0.7,), gamma=(0.04,), realisations=2).text.replace(
+            "max_penetration = 0.9", "max_penetration = 0.9\nstiffness = 1e9"
+        )
+    )
+    data = aggregate(write(tmp_path / "r.h5", plan, rows(plan)))
+    with style():
+        figure = loops.loop_against_penetration(data)
+    assert "u_\\mathrm{tot}" in figure.axes[0].get_xlabel()

@@ -106,8 +106,11 @@ def loop_against_penetration(data: Aggregate) -> Figure:
         row[0].axhline(0, color="0.5", linewidth=0.5)
         row[1].set_ylabel("contact fraction $A/A_0$")
         row[1].set_ylim(bottom=0)
+    label = r"penetration $\tilde\Delta = \Delta/h_\mathrm{max}$"
+    if data.campaign.cycle.stiffness is not None:
+        label = r"penetration of the far side $u_\mathrm{tot}/h_\mathrm{max}$"
     for axes in grid[-1]:
-        axes.set_xlabel(r"penetration $\tilde\Delta = \Delta/h_\mathrm{max}$")
+        axes.set_xlabel(label)
     _legend(data, figure, 6)
     return figure
 
