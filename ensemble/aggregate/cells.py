@@ -208,9 +208,10 @@ def read_cells(results: Results, status: NDArray[np.uint8]) -> list[Cell]:
 def _estimates(values: dict[str, Array]) -> dict[str, Estimate]:
     with_interval = np.array([values[name] for name in _WITH_INTERVAL])
     found = dict(zip(_WITH_INTERVAL, estimates(with_interval), strict=True))
-    share = found["small_scale_share"]
-    low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave [0, 1]
-    found["small_scale_share"] = replace(share, low=float(low), high=float(high))
+    for name in ("small_scale_share", "largest_contact_fraction"):
+        share = found[name]
+        low, high = np.clip([share.low, share.high], 0, 1)  # Student's interval may leave [0, 1]
+        found[name] = replace(share, low=float(low), high=float(high))
     rest = [name for name in values if name not in found and name not in _NOT_AVERAGED]
     plain = estimates(np.array([values[name] for name in rest]), with_interval=False)
     return found | dict(zip(rest, plain, strict=True))

@@ -14,7 +14,7 @@ from adhesis.ensemble.campaign.axes import Axis
 from adhesis.ensemble.campaign.tasks import place
 from adhesis.ensemble.quantities import percent, stress_text, with_unit
 from adhesis.ensemble.report import paper
-from adhesis.ensemble.report.further_axes import cell_name, lines_along, together
+from adhesis.ensemble.report.further_axes import cell_name, failed_cells, lines_along, together
 from adhesis.ensemble.report.tables.loss_tables import least
 from adhesis.ensemble.task.doubt import why_beyond
 
@@ -145,8 +145,7 @@ def missing(data: Aggregate) -> list[str]:
     empty = [cell_name(cell) for cell in data.cells if not cell.done and cell.pending]
     if empty:
         out.append(f"No task is finished yet for {_listed(empty)}.")
-    failed = [cell_name(cell) for cell in data.cells if not cell.done and not cell.pending]
-    if failed:
+    if failed := failed_cells(data):
         out.append(
             f"WARNING: all tasks failed for {_listed(failed)}: figures and averages lack "
             f"{'this cell' if len(failed) == 1 else 'these cells'}."

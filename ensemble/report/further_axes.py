@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from adhesis.ensemble.aggregate.average import Aggregate
 from adhesis.ensemble.aggregate.cells import Cell
 from adhesis.ensemble.campaign.axes import Axis
@@ -63,6 +65,21 @@ def common(data: Aggregate) -> list[tuple[str, float]]:
     """
     alike = set(data.cells[0].others).intersection(*(cell.others for cell in data.cells))
     return [other for other in data.cells[0].others if other in alike]
+
+
+def failed_cells(data: Aggregate) -> list[str]:
+    """Return the names of the cells of which every task failed."""
+    return [cell_name(cell) for cell in data.cells if not cell.done and not cell.pending]
+
+
+def below(data: Aggregate, others: Sequence[tuple[str, float]]) -> str:
+    """Return what stands below a figure: what its cells have in common, and which are missing."""
+    failed = failed_cells(data)
+    parts = [place(others)] if others else []
+    if failed:
+        more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        parts.append(f"missing, as all tasks failed: {failed[0]}{more}")
+    return "; ".join(parts)
 
 
 def shown_cells(data: Aggregate) -> str:

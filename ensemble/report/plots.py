@@ -45,10 +45,9 @@ class Plots:
         return f"<Plots: {', '.join(names)}>"
 
     def _draw(self, name: str) -> Panels:
-        from adhesis.ensemble.campaign.tasks import place
         from adhesis.ensemble.report.figures import loops, loss_figures, shapes_and_spectra
         from adhesis.ensemble.report.figures.style import say_below, style
-        from adhesis.ensemble.report.further_axes import common
+        from adhesis.ensemble.report.further_axes import below, common
 
         modules = (loops, loss_figures, shapes_and_spectra)
         draw: Callable[[Aggregate], Figure] = next(
@@ -57,7 +56,7 @@ class Plots:
         with style():
             shown = self._averages().shown
             figure = draw(shown)
-            say_below(figure, place(common(shown)))
+            say_below(figure, below(shown, common(shown)))
             figure.canvas.draw()  # the layout is found with the style's own sizes
         return Panels(figure.axes)
 

@@ -71,7 +71,6 @@ def _write_files(
     """Write all files; returns the names of the figures."""
     progress("tables")
     # Imported here: matplotlib and xarray take a second, and a bad file is refused at once.
-    from adhesis.ensemble.campaign.tasks import place
     from adhesis.ensemble.report.curves_dataset import write_curves
     from adhesis.ensemble.report.figures.catalogue import (
         HEIGHTS,
@@ -85,7 +84,7 @@ def _write_files(
     )
     from adhesis.ensemble.report.figures.loss_figures import of_penetration
     from adhesis.ensemble.report.figures.style import save, say_below, style
-    from adhesis.ensemble.report.further_axes import common
+    from adhesis.ensemble.report.further_axes import below, common
     from adhesis.ensemble.report.html import html_page
     from adhesis.ensemble.report.markdown_page import write_page
     from adhesis.ensemble.report.tables import loss_tables, mechanisms, works
@@ -119,7 +118,7 @@ def _write_files(
         with style():
             figure = item.draw(data if item.whole else data.shown)
             if not item.whole:
-                say_below(figure, place(common(data.shown)))
+                say_below(figure, below(data, common(data.shown)))
         save(figure, directory / item.name)
     progress("pages")
     page = write_page(data, sections)

@@ -461,6 +461,8 @@ def test_failed_tasks_are_loud(tmp_path):
     text = " ".join(findings.missing(results.averages))
     assert "WARNING: all tasks failed for H = 0.8, γ = 1 J/m²" in text
     assert "yet" not in text
+    below = results.plot.contact_against_stress()[0].figure.get_supxlabel()
+    assert below == "missing, as all tasks failed: H = 0.8, γ = 1 J/m²"
 
 
 @pytest.mark.mpi

@@ -27,7 +27,7 @@ from adhesis.ensemble.report.figures.style import (
     say_below,
     spread_out,
 )
-from adhesis.ensemble.report.further_axes import axis_label, lines_along, together
+from adhesis.ensemble.report.further_axes import axis_label, below, lines_along, together
 
 _LOG_FROM = 20  # an axis that spans more is logarithmic
 
@@ -107,7 +107,7 @@ def _draw(data: Aggregate, axis: Axis) -> Figure:
     handles, texts = grid[0][0].get_legend_handles_labels()
     if any(texts):
         legend_above(figure, handles, 3 if second is None else 2)
-    say_below(figure, place(fixed))
+    say_below(figure, below(data, fixed))
     return figure
 
 
