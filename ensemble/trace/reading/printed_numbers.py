@@ -77,7 +77,7 @@ def value(field: str, decimal: str) -> float | None:
 
 def printed_form(field: str) -> tuple[int, bool]:
     """Return the number of decimals of a printed number, and whether it has an exponent."""
-    digits, exponent, _ = re.fullmatch(r"([^eEdD]*)([eEdD]?)(.*)", field).groups()  # type: ignore[union-attr]
+    digits, exponent = re.split(r"[eEdD]", field, maxsplit=1)[0], re.search(r"[eEdD]", field)
     return len(re.split(r"[.,]", digits)[1]) if re.search(r"[.,]", digits) else 0, bool(exponent)
 
 
